@@ -12,7 +12,7 @@ from dsc.model.rules import STEP, Command, Handler, Response, Rule
 from dsc.model.states import AnyState, DynamicState, SubmachineState
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.syntax.effect import mentioned, quantified_in, substitute_effect
-from knowledge_base.language.syntax.expression import Term, free_variables, quantified, substitute, substitute_term
+from knowledge_base.language.syntax.expression import Term, free_variables, substitute
 
 Outcomes = Mapping[str, Mapping[str, str] | None]
 """Event name -> its attributes with their types."""
@@ -173,7 +173,7 @@ def about_step(rule: Rule, step: Step, plot: ActionPlot) -> Rule:
 
 def filled(terms: Terms, values: Mapping[str, Term]) -> dict[str, Term]:
     """Return the terms with variables replaced by other terms."""
-    return {name: substitute_term(term, values) for name, term in terms.items()}
+    return {name: substitute(term, values) for name, term in terms.items()}
 
 
 def terms_of(command: Command) -> Terms:
@@ -190,7 +190,7 @@ def terms_of(command: Command) -> Terms:
 def _command(command: Command, values: Mapping[str, Term]) -> Command:
     match command:
         case Configure(to=value):
-            return command.model_copy(update={"to": substitute_term(value, values)})
+            return command.model_copy(update={"to": substitute(value, values)})
         case Send(arguments=arguments):
             return command.model_copy(update={"arguments": filled(arguments, values)})
         case Switch():
@@ -198,7 +198,7 @@ def _command(command: Command, values: Mapping[str, Term]) -> Command:
 
 
 def _refuse_capture(rule: Rule, arguments: Terms, plot: ActionPlot) -> None:
-    own = frozenset() if rule.when is None else quantified(rule.when)
+    own = frozenset() if rule.when is None else quantified_in(rule.when)
     own |= frozenset() if rule.do.tell is None else quantified_in(rule.do.tell)
     for name, term in arguments.items():
         for hidden in sorted(own & free_variables(term)):

@@ -13,7 +13,6 @@ from knowledge_base.language.syntax.effect import NO_EFFECT, AllOf, Effect, ForE
 from knowledge_base.language.syntax.expression import (
     TRUE,
     And,
-    Arithmetic,
     Constant,
     Expression,
     Forall,
@@ -21,6 +20,7 @@ from knowledge_base.language.syntax.expression import (
     TypedVariable,
     Variable,
     free_variables,
+    substitute,
 )
 from knowledge_base.language.syntax.sexpr import Group, Node, Word, parse_variables
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text, variables_text
@@ -35,7 +35,14 @@ from knowledge_base.pddl.definition import (
 )
 
 ACTION, DURATIVE_ACTION = ":action", ":durative-action"
-
+_PARTS = {
+    ACTION: (":parameters", ":precondition", ":effect"),
+    DURATIVE_ACTION: (":parameters", ":duration", ":condition", ":effect"),
+}
+_COMPARED = (
+    *("duration", "precondition", "condition over all", "condition at the end"),
+    *("effect at the start", "effect"),
+)
 _DURATION = Variable("duration")
 _START, _OVER_ALL, _END = "at start", "over all", "at end"
 _T = TypeVar("_T")
@@ -183,27 +190,9 @@ def _with_duration(effect: Effect, duration: Duration) -> Effect:
         case NumericEffect(_, _, value) if _DURATION.name in free_variables(value):
             if not duration.fixed:
                 raise refused(CHOSEN_DURATION, "?duration", effect.place)
-            return replace(effect, value=_term_with_duration(value, duration))
+            return replace(effect, value=substitute(value, {_DURATION.name: duration.least}))
         case _:
             return effect
-
-
-def _term_with_duration(term: Term, duration: Duration) -> Term:
-    if term == _DURATION:
-        return duration.least
-    if isinstance(term, Arithmetic):
-        return replace(term, args=tuple(_term_with_duration(arg, duration) for arg in term.args))
-    return term
-
-
-_PARTS = {
-    ACTION: (":parameters", ":precondition", ":effect"),
-    DURATIVE_ACTION: (":parameters", ":duration", ":condition", ":effect"),
-}
-_COMPARED = (
-    *("duration", "precondition", "condition over all", "condition at the end"),
-    *("effect at the start", "effect"),
-)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,38 +11,14 @@ from dataclasses import dataclass
 from knowledge_base.errors import ParseError, Place, UnsupportedConstructError, nearest, printable
 from knowledge_base.language.syntax.sexpr import Group, Node, Word, read
 
-REQUIREMENTS = frozenset(
-    {
-        ":strips",
-        ":typing",
-        ":negative-preconditions",
-        ":disjunctive-preconditions",
-        ":equality",
-        ":existential-preconditions",
-        ":universal-preconditions",
-        ":quantified-preconditions",
-        ":conditional-effects",
-        ":fluents",
-        ":numeric-fluents",
-        ":object-fluents",
-        ":adl",
-        ":durative-actions",
-        ":duration-inequalities",
-        ":continuous-effects",
-        ":derived-predicates",
-        ":timed-initial-literals",
-        ":preferences",
-        ":constraints",
-        ":action-costs",
-        ":time",
-        ":domain-axioms",
-        ":goal-utilities",
-        ":hierarchy",
-        ":method-preconditions",
-        ":contingent",
-        ":multi-agent",
-    }
-)
+REQUIREMENTS = frozenset({
+    ":strips", ":typing", ":negative-preconditions", ":disjunctive-preconditions", ":equality",
+    ":existential-preconditions", ":universal-preconditions", ":quantified-preconditions",
+    ":conditional-effects", ":fluents", ":numeric-fluents", ":object-fluents", ":adl", ":durative-actions",
+    ":duration-inequalities", ":continuous-effects", ":derived-predicates", ":timed-initial-literals",
+    ":preferences", ":constraints", ":action-costs", ":time", ":domain-axioms", ":goal-utilities", ":hierarchy",
+    ":method-preconditions", ":contingent", ":multi-agent",
+})  # fmt: skip
 """Requirements of PDDL 1.2 to 3.1 and its relatives; only constructs in use are checked."""
 
 
@@ -172,7 +148,7 @@ class _Construct:
 
 
 SECTIONS: Mapping[str, _Construct] = {
-    ":process": _Construct("numbers that change by themselves while time passes", _HYBRID),
+    ":process": _Construct("numbers that change by themselves over time", _HYBRID),
     ":event": _Construct("changes that happen by themselves", _HYBRID),
     ":task": _Construct("tasks that methods break down", _HIERARCHICAL),
     ":method": _Construct("ways to break a task down", _HIERARCHICAL),
@@ -182,7 +158,7 @@ SECTIONS: Mapping[str, _Construct] = {
 """Sections of domains and problems."""
 
 ACTION_PARTS: Mapping[str, _Construct] = {
-    ":observe": _Construct("what is found out only while the plan is carried out", _CONTINGENT),
+    ":observe": _Construct("observations during the execution of the plan", _CONTINGENT),
 }
 
 _TRAJECTORIES = (
@@ -190,18 +166,18 @@ _TRAJECTORIES = (
     *("sometime-after", "sometime-before", "hold-during", "hold-after"),
 )
 _FORMS: Mapping[str, _Construct] = {
-    "preference": _Construct("conditions that may be given up", _WHOLE_PLANS),
-    "oneof": _Construct("a world that is not known at first", _CONTINGENT),
-    "unknown": _Construct("a world that is not known at first", _CONTINGENT),
+    "preference": _Construct("conditions that a plan may violate", _WHOLE_PLANS),
+    "oneof": _Construct("a world with an unknown first state", _CONTINGENT),
+    "unknown": _Construct("a world with an unknown first state", _CONTINGENT),
     "probabilistic": _Construct("effects that happen by chance", _CHANCE),
     **dict.fromkeys(_TRAJECTORIES, _Construct("conditions on whole plans", _WHOLE_PLANS)),
 }
-_CONTINUOUS = _Construct("numbers that change while the action goes on", _HYBRID)
+_CONTINUOUS = _Construct("numbers that change during the action", _HYBRID)
 TIMED_INITIAL = _Construct("facts that change by themselves at a given time", _TEMPORAL)
 OBJECT_FLUENTS = _Construct("functions whose values are things", _OBJECTS)
-DURATION_AT_END = _Construct("a duration that is settled only at the end", _TEMPORAL)
+DURATION_AT_END = _Construct("a duration that is chosen at the end", _TEMPORAL)
 ACROSS_TIMES = _Construct("an effect at one time under a condition at another", _TEMPORAL)
-CHOSEN_DURATION = _Construct("an effect that depends on how long was chosen", _TEMPORAL)
+CHOSEN_DURATION = _Construct("an effect that depends on a chosen duration", _TEMPORAL)
 
 
 def refused(construct: _Construct, called: str, place: Place | None) -> UnsupportedConstructError:

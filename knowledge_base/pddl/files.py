@@ -155,7 +155,7 @@ def _piece(handle: int, path: Path, size: int, *, begun: bool) -> bytes:
         if piece or begun or not stat.S_ISFIFO(os.fstat(handle).st_mode):
             return piece
         if time.monotonic() > patience:
-            raise _unreadable(path, f"it is a pipe, and nobody wrote into it for {WRITER_S:g} s")
+            raise _unreadable(path, f"it is a pipe, and no process wrote into it for {WRITER_S:g} s")
         time.sleep(_LOOK_S)
 
 

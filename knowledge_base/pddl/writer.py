@@ -1,131 +1,27 @@
-"""Domains and worlds as PDDL files, which `parse_domain` and `read_problem` read back."""
+"""Domains and worlds as PDDL files, which `parse_domain` and `read_problem` read back.
+
+A file has no places, notes or version.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from graphlib import TopologicalSorter
-from typing import Protocol, TypeVar
+from typing import Protocol
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Content, Fact
-from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Signature, Vocabulary
-from knowledge_base.language.syntax.durative import Duration, DurativeParts
-from knowledge_base.language.syntax.effect import NO_EFFECT, AllOf, Effect
+from knowledge_base.language.checking.vocabulary import Signature, Vocabulary
+from knowledge_base.language.syntax.durative import Duration
+from knowledge_base.language.syntax.effect import AllOf, Effect
 from knowledge_base.language.syntax.expression import KEYWORDS, TRUE, And, Constant, Expression, TypedVariable
 from knowledge_base.language.syntax.sexpr import TypedName
-from knowledge_base.language.syntax.text import LONGEST_NUMBER, to_text
+from knowledge_base.language.syntax.text import LONGEST_NUMBER, to_text, types_text
 from knowledge_base.pddl.action_text import ACTION, DURATIVE_ACTION, ActionText
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.spelling import is_name, is_plain_name, value_text
-
-_T = TypeVar("_T")
-
-
-def domain_to_text(domain: DomainText) -> str:
-    """The domain as text; parents come before their subtypes, since some readers need that order.
-
-    Raises:
-        InputError: a name that PDDL cannot spell, such as one with blanks or capitals.
-    """
-    for name in _names(domain):
-        if not is_plain_name(name):
-            raise InputError(f"{name!r} cannot be a name in PDDL, which has lower case and no blanks there")
-    sections = [
-        _section(":requirements", domain.requirements, together=True),
-        _section(":types", [_name(one) for one in _from_the_top(domain.types)]),
-        _section(":constants", [_name(one) for one in domain.constants]),
-        _section(":predicates", [_declaration(one) for one in domain.predicates]),
-        _section(":functions", [f"{_declaration(one)} - {one.result or 'number'}" for one in domain.functions]),
-        *map(axiom_to_text, domain.axioms),
-        *map(action_to_text, domain.actions),
-    ]
-    return "\n".join([f"(define (domain {domain.name})", *filter(None, sections)]) + ")\n"
-
-
-def _names(domain: DomainText) -> Iterator[str]:
-    yield domain.name
-    for named in (domain.types, domain.constants, domain.predicates, domain.functions, domain.actions):
-        yield from (one.name for one in named)
-
-
-def _section(keyword: str, lines: Sequence[str], *, together: bool = False) -> str:
-    if not lines:
-        return ""
-    return (" " if together else "\n    ").join([f"  ({keyword}", *lines]) + ")"
-
-
-def _from_the_top(types: Iterable[TypedName]) -> list[TypedName]:
-    """Parents before their subtypes."""
-    named = {one.name: one for one in types}
-    order = TopologicalSorter({name: one.types for name, one in named.items()}).static_order()
-    return [named[name] for name in order if name in named]
-
-
-def _name(one: TypedName) -> str:
-    return f"{one.name} - {_types(one.types)}"
-
-
-def _types(types: Sequence[str]) -> str:
-    return types[0] if len(types) == 1 else f"(either {' '.join(types)})" if types else ROOT_TYPE
-
-
-def _declaration(one: DeclarationText) -> str:
-    return "(" + " ".join([one.name, *map(_parameter, one.parameters)]) + ")"
-
-
-def _parameter(parameter: TypedVariable) -> str:
-    return f"?{parameter.name} - {_types(parameter.types)}"
-
-
-def action_to_text(action: ActionText) -> str:
-    """One action as text of a file."""
-    durative = action.duration is not None and action.timed is not None
-    lines = [f"  ({DURATIVE_ACTION if durative else ACTION} {action.name}"]
-    lines.append(f":parameters ({' '.join(map(_parameter, action.parameters))})")
-    if action.duration is not None and action.timed is not None:
-        lines.append(f":duration {_duration(action.duration)}")
-        lines.append(f":condition {_conditions(action.timed)}")
-        lines.append(f":effect {_effects(action.timed)}")
-    else:
-        lines.append(f":precondition {to_text(action.precondition)}")
-        lines.append(f":effect {to_text(action.effect)}")
-    return "\n    ".join(lines) + ")"
-
-
-def axiom_to_text(axiom: AxiomText) -> str:
-    """One rule for a derived predicate as text of a file."""
-    return f"  (:derived {_declaration(axiom.head)}\n    {to_text(axiom.condition)})"
-
-
-def _duration(duration: Duration) -> str:
-    if duration.fixed:
-        return f"(= ?duration {to_text(duration.least)})"
-    bounds = [] if duration.least == Constant(0) else [f"(>= ?duration {to_text(duration.least)})"]
-    if duration.most != Constant(math.inf):
-        bounds.append(f"(<= ?duration {to_text(duration.most)})")
-    return bounds[0] if len(bounds) == 1 else f"(and {' '.join(bounds)})" if bounds else "()"
-
-
-def _conditions(timed: DurativeParts) -> str:
-    def parts(e: Expression) -> tuple[Expression, ...]:
-        return e.parts if isinstance(e, And) else (e,)
-
-    named = {"at start": timed.start, "over all": timed.over_all, "at end": timed.end}
-    return _by_time({when: () if e == TRUE else parts(e) for when, e in named.items()}, to_text)
-
-
-def _effects(timed: DurativeParts) -> str:
-    def parts(e: Effect) -> tuple[Effect, ...]:
-        return e.parts if isinstance(e, AllOf) else (e,)
-
-    named = {"at start": timed.start_effect, "at end": timed.end_effect}
-    return _by_time({when: () if e == NO_EFFECT else parts(e) for when, e in named.items()}, to_text)
-
-
-def _by_time(parts: dict[str, tuple[_T, ...]], written: Callable[[_T], str]) -> str:
-    return f"(and {' '.join(f'({when} {written(one)})' for when, each in parts.items() for one in each)})"
 
 
 class WrittenWorld(Protocol):
@@ -134,22 +30,61 @@ class WrittenWorld(Protocol):
     @property
     def schema(self) -> Vocabulary:
         """Its declarations."""
-        ...
 
     @property
     def nodes(self) -> Mapping[str, str]:
         """Its objects with their types, constants too."""
-        ...
 
     @property
     def facts(self) -> Iterable[Fact]:
         """Its facts."""
-        ...
 
     @property
     def values(self) -> Mapping[Fact, Content]:
         """The values of its functions."""
-        ...
+
+
+def domain_to_text(domain: DomainText) -> str:
+    """The domain as text; parents come before their subtypes, since some readers need that order.
+
+    Raises:
+        InputError: a name that PDDL cannot spell, such as one with blanks or capitals.
+    """
+    declared = (domain.types, domain.constants, domain.predicates, domain.functions, domain.actions)
+    for name in (domain.name, *(one.name for named in declared for one in named)):
+        if not is_plain_name(name):
+            raise _unspellable(name)
+    lists = {
+        ":types": [_name(one) for one in _from_the_top(domain.types)],
+        ":constants": [_name(one) for one in domain.constants],
+        ":predicates": [_declaration(one) for one in domain.predicates],
+        ":functions": [f"{_declaration(one)} - {one.result or 'number'}" for one in domain.functions],
+    }
+    sections = [
+        *([f"  (:requirements {' '.join(domain.requirements)})"] if domain.requirements else ()),
+        *(_section(keyword, lines) for keyword, lines in lists.items() if lines),
+        *map(axiom_to_text, domain.axioms),
+        *map(action_to_text, domain.actions),
+    ]
+    return "\n".join([f"(define (domain {domain.name})", *sections]) + ")\n"
+
+
+def action_to_text(action: ActionText) -> str:
+    """One action as text of a file."""
+    parameters = f":parameters ({' '.join(map(_parameter, action.parameters))})"
+    duration, timed = action.duration, action.timed
+    if duration is None or timed is None:
+        parts = [f":precondition {to_text(action.precondition)}", f":effect {to_text(action.effect)}"]
+        return _section(f"{ACTION} {action.name}", [parameters, *parts])
+    condition = _by_time({"at start": timed.start, "over all": timed.over_all, "at end": timed.end})
+    effect = _by_time({"at start": timed.start_effect, "at end": timed.end_effect})
+    parts = [f":duration {_duration(duration)}", f":condition {condition}", f":effect {effect}"]
+    return _section(f"{DURATIVE_ACTION} {action.name}", [parameters, *parts])
+
+
+def axiom_to_text(axiom: AxiomText) -> str:
+    """One rule for a derived predicate as text of a file."""
+    return _section(f":derived {_declaration(axiom.head)}", [to_text(axiom.condition)])
 
 
 def problem_to_text(
@@ -172,20 +107,59 @@ def problem_to_text(
     heads = {fact.predicate for fact in (*state.facts, *state.values)}
     for word in (name, domain, *state.nodes, *set(state.nodes.values()), *heads):
         if not is_name(word) or (word in KEYWORDS and word in heads):
-            raise InputError(f"{word!r} cannot be a name in PDDL, which has lower case and no blanks there")
-    said = [_fact(fact, schema.predicate(fact.predicate)) for fact in state.facts]
+            raise _unspellable(word)
+    facts = [_fact(fact, schema.predicate(fact.predicate)) for fact in state.facts]
     values = [
         f"(= {_fact(fluent, schema.function(fluent.predicate))} {_written(content, quoted=True)})"
         for fluent, content in state.values.items()
     ]
     objects = [f"{thing} - {type_name}" for thing, type_name in state.nodes.items() if thing not in schema.constants]
-    sections = (_section(":objects", objects), _section(":init", [*said, *values]), f"  (:goal {to_text(goal)})")
-    wanted = [] if metric is None else [f"  (:metric {metric.direction} {to_text(metric.term)})"]
-    return "\n".join([f"(define (problem {name}) (:domain {domain})", *sections, *wanted]) + ")\n"
+    sections = [_section(":objects", objects), _section(":init", [*facts, *values]), f"  (:goal {to_text(goal)})"]
+    if metric is not None:
+        sections.append(f"  (:metric {metric.direction} {to_text(metric.term)})")
+    return "\n".join([f"(define (problem {name}) (:domain {domain})", *sections]) + ")\n"
 
 
-def _section(keyword: str, lines: list[str]) -> str:
+def _unspellable(name: str) -> InputError:
+    return InputError(f"{name!r} cannot be a name in PDDL, which has lower case and no blanks there")
+
+
+def _section(keyword: str, lines: Sequence[str]) -> str:
     return "\n    ".join([f"  ({keyword}", *lines]) + ")"
+
+
+def _from_the_top(types: Iterable[TypedName]) -> Iterator[TypedName]:
+    """Parents before their subtypes."""
+    named = {one.name: one for one in types}
+    order = TopologicalSorter({name: one.types for name, one in named.items()}).static_order()
+    return (named[name] for name in order if name in named)
+
+
+def _name(one: TypedName) -> str:
+    return f"{one.name} - {types_text(one.types)}"
+
+
+def _parameter(parameter: TypedVariable) -> str:
+    return f"?{parameter.name} - {types_text(parameter.types)}"
+
+
+def _declaration(one: DeclarationText) -> str:
+    return "(" + " ".join([one.name, *map(_parameter, one.parameters)]) + ")"
+
+
+def _duration(duration: Duration) -> str:
+    if duration.fixed:
+        return f"(= ?duration {to_text(duration.least)})"
+    bounds = [] if duration.least == Constant(0) else [f"(>= ?duration {to_text(duration.least)})"]
+    if duration.most != Constant(math.inf):
+        bounds.append(f"(<= ?duration {to_text(duration.most)})")
+    return bounds[0] if len(bounds) == 1 else f"(and {' '.join(bounds)})" if bounds else "()"
+
+
+def _by_time(parts: Mapping[str, Expression | Effect]) -> str:
+    """The parts of a durative condition or effect, each with its time; true and the empty effect have no parts."""
+    timed = [(when, one) for when, e in parts.items() for one in (e.parts if isinstance(e, And | AllOf) else (e,))]
+    return f"(and {' '.join(f'({when} {to_text(one)})' for when, one in timed)})"
 
 
 def _fact(fact: Fact, signature: Signature) -> str:

@@ -31,8 +31,7 @@ from knowledge_base.language.syntax.expression import (
     Variable,
     free_variables,
     fresh,
-    renamed,
-    renamed_term,
+    substitute,
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from planning.domain import GroundStep, PlanningDomain
@@ -152,10 +151,10 @@ def _comparison(e: Comparison, changes: Sequence[Leaf]) -> Expression:
 def _hit(leaf: Leaf, own: tuple[Term, ...], asked: tuple[Term, ...]) -> Expression:
     """When the change is about just these arguments."""
     taken = frozenset[str]().union(*map(free_variables, asked))
-    names = {v.name: fresh(v.name, taken) for v in leaf.variables if v.name in taken}
-    variables = tuple(replace(v, name=names.get(v.name, v.name)) for v in leaf.variables)
-    same = (_compared("=", renamed_term(mine, names), other) for mine, other in zip(own, asked, strict=True))
-    matching = conjunction((*same, renamed(leaf.condition, names)))
+    names = {v.name: Variable(fresh(v.name, taken)) for v in leaf.variables if v.name in taken}
+    variables = tuple(replace(v, name=names.get(v.name, v).name) for v in leaf.variables)
+    same = (_compared("=", substitute(mine, names), other) for mine, other in zip(own, asked, strict=True))
+    matching = conjunction((*same, substitute(leaf.condition, names)))
     return Exists(variables, matching) if variables and matching != FALSE else matching
 
 

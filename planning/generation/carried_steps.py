@@ -28,7 +28,6 @@ from knowledge_base.language.syntax.expression import (
     Or,
     Term,
     substitute,
-    substitute_term,
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from planning.domain import PlanningAction, PlanningDomain
@@ -96,7 +95,7 @@ def _is_false(e: Expression, bindings: Mapping[str, Value]) -> bool:
         case And(parts):
             return any(_is_false(part, bindings) for part in parts)
         case Comparison("=" | "!=" as operator):
-            sides = [substitute_term(side, bindings) for side in (e.left, e.right)]
+            sides = [substitute(side, bindings) for side in (e.left, e.right)]
             values = [side.value for side in sides if isinstance(side, Constant)]
             return len(values) == len(sides) and (values[0] == values[1]) is not (operator == "=")
         case _:
@@ -278,7 +277,7 @@ def _limit(action: PlanningAction, bindings: Mapping[str, Value]) -> Term | None
     """Return the time limit from the action's own duration, or `None`."""
     if action.duration is None or action.duration.most == Constant(float("inf")):
         return None
-    match substitute_term(action.duration.most, bindings):
+    match substitute(action.duration.most, bindings):
         case Constant(int() | float() as most):
             return Constant(PATIENCE * most)
         case most:
@@ -300,4 +299,4 @@ def _literals(effect: Effect) -> list[Add | Delete]:
 
 
 def _ground(atom: Atom, bindings: Mapping[str, Value]) -> Atom:
-    return Atom(atom.predicate, tuple(substitute_term(arg, bindings) for arg in atom.args))
+    return Atom(atom.predicate, tuple(substitute(arg, bindings) for arg in atom.args))

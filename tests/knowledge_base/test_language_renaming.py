@@ -2,7 +2,7 @@
 
 import pytest
 
-from knowledge_base.language.syntax.expression import free_variables, fresh, renamed
+from knowledge_base.language.syntax.expression import Variable, free_variables, fresh, substitute
 from knowledge_base.language.syntax.text import parse_condition, to_text
 
 
@@ -24,7 +24,7 @@ from knowledge_base.language.syntax.text import parse_condition, to_text
     ],
 )
 def test_free_variables_are_renamed_and_no_quantifier_catches_them(before, names, after):
-    result = renamed(parse_condition(before), names)
+    result = substitute(parse_condition(before), {old: Variable(new) for old, new in names.items()})
     assert to_text(result) == after
     assert free_variables(result) == {names.get(name, name) for name in free_variables(parse_condition(before))}
 

@@ -63,7 +63,9 @@ def test_a_pipe_that_nobody_writes_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "WRITER_S", 0.05)
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    with pytest.raises(InputError, match=r"cannot read the file: it is a pipe, and nobody wrote into it for 0\.05 s"):
+    with pytest.raises(
+        InputError, match=r"cannot read the file: it is a pipe, and no process wrote into it for 0\.05 s"
+    ):
         files.read_text(pipe)
 
 

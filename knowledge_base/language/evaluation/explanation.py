@@ -30,7 +30,6 @@ from knowledge_base.language.syntax.expression import (
     Not,
     Or,
     substitute,
-    substitute_term,
 )
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.spelling import value_text
@@ -199,7 +198,7 @@ def _detail(e: Atom | Comparison, world: World, bindings: Bindings) -> str | Non
     of = world.schema.computed.get(e.predicate)
     if of is None:
         return None
-    inputs = of.inputs(tuple(substitute_term(arg, bindings) for arg in e.args))
+    inputs = of.inputs(tuple(substitute(arg, bindings) for arg in e.args))
     return ", ".join(_input(read, world) for read in inputs) or None
 
 

@@ -31,7 +31,6 @@ from knowledge_base.language.syntax.expression import (
     Variable,
     free_variables,
     substitute,
-    substitute_term,
     variables_in_order,
 )
 from knowledge_base.language.syntax.text import to_text
@@ -181,7 +180,7 @@ class _Follower:
         return QueryStep(kind, self._text(e), by, finds, matches, self._varies, reached)
 
     def _text(self, e: Expression | Term) -> str:
-        return to_text(substitute_term(e, self._params) if isinstance(e, Term) else substitute(e, self._params))
+        return to_text(substitute(e, self._params))
 
 
 def _expression(conjunct: Conjunct) -> Expression:

@@ -1,9 +1,13 @@
-"""Effects as frozen values: how an action changes the world (PDDL 2.1 effects with `forall` and `when`)."""
+"""Effects as frozen values: how an action changes the world (PDDL 2.1 effects with `forall` and `when`).
+
+Values that are built in Python have no limit of depth. `check_depth` validates them without recursion, because all
+functions that walk them recurse.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
@@ -11,17 +15,16 @@ from knowledge_base.language.syntax.expression import (
     Atom,
     Call,
     Constant,
+    Exists,
     Expression,
+    Forall,
     Located,
     Term,
     TypedVariable,
     Variable,
     free_variables,
     parts_of,
-    quantified,
     substitute,
-    substitute_term,
-    unshadowed,
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.sexpr import MAX_DEPTH
@@ -82,57 +85,63 @@ ASSIGNMENTS = ("assign", "increase", "decrease", "scale-up", "scale-down")
 EFFECT_KEYWORDS = ("and", "not", "forall", "when", *ASSIGNMENTS)
 """The words that open an effect and are not predicates."""
 
+Form = Expression | Term | Effect
+
+
+def parts_of_form(form: Form) -> tuple[Form, ...]:
+    """The effects, conditions and terms that `form` directly consists of."""
+    match form:
+        case Add(atom) | Delete(atom):
+            return (atom,)
+        case AllOf(parts):
+            return parts
+        case ForEach(_, effect):
+            return (effect,)
+        case When(condition, effect):
+            return (condition, effect)
+        case NumericEffect(_, call, value):
+            return (call, value)
+        case _:
+            return parts_of(form)
+
 
 def substitute_effect(effect: Effect, bindings: Mapping[str, Value | Term]) -> Effect:
     """The effect with values or terms in place of the variables that `bindings` names; inner variables shadow them."""
-    if isinstance(effect, AllOf):
-        return AllOf(tuple(substitute_effect(part, bindings) for part in effect.parts))
-    if isinstance(effect, ForEach):
-        return ForEach(effect.variables, substitute_effect(effect.effect, unshadowed(effect.variables, bindings)))
-    if isinstance(effect, When):
-        return When(substitute(effect.condition, bindings), substitute_effect(effect.effect, bindings))
-    if isinstance(effect, NumericEffect):
-        call = Call(effect.call.function, tuple(substitute_term(arg, bindings) for arg in effect.call.args))
-        return NumericEffect(effect.operator, call, substitute_term(effect.value, bindings))
-    atom = Atom(effect.atom.predicate, tuple(substitute_term(arg, bindings) for arg in effect.atom.args))
-    return type(effect)(atom)
+    match effect:
+        case Add(atom) | Delete(atom):
+            return replace(effect, atom=substitute(atom, bindings))
+        case AllOf(parts):
+            return replace(effect, parts=tuple(substitute_effect(part, bindings) for part in parts))
+        case ForEach(variables, inner):
+            own = {v.name for v in variables}
+            outer = {name: value for name, value in bindings.items() if name not in own}
+            return replace(effect, effect=substitute_effect(inner, outer))
+        case When(condition, inner):
+            return replace(effect, condition=substitute(condition, bindings), effect=substitute_effect(inner, bindings))
+        case NumericEffect(_, call, value):
+            return replace(effect, call=substitute(call, bindings), value=substitute(value, bindings))
 
 
-def quantified_in(effect: Effect) -> frozenset[str]:
-    """The names of the variables that quantifiers in the effect bind."""
-    if isinstance(effect, AllOf):
-        return frozenset[str]().union(*map(quantified_in, effect.parts))
-    if isinstance(effect, ForEach):
-        return quantified_in(effect.effect) | {variable.name for variable in effect.variables}
-    if isinstance(effect, When):
-        return quantified(effect.condition) | quantified_in(effect.effect)
-    return frozenset()
+def quantified_in(form: Form) -> frozenset[str]:
+    """The names of the variables that quantifiers in a condition or effect bind."""
+    inner = frozenset[str]().union(*map(quantified_in, parts_of_form(form)))
+    return inner | {v.name for v in form.variables} if isinstance(form, Exists | Forall | ForEach) else inner
 
 
-def mentioned(part: Expression | Term | Effect) -> frozenset[str]:
+def mentioned(form: Form) -> frozenset[str]:
     """The variables that a condition, term or effect mentions and does not itself bind."""
-    if isinstance(part, Add | Delete):
-        return free_variables(part.atom)
-    if isinstance(part, AllOf):
-        return frozenset().union(*(mentioned(inner) for inner in part.parts))
-    if isinstance(part, ForEach):
-        return mentioned(part.effect) - {variable.name for variable in part.variables}
-    if isinstance(part, When):
-        return free_variables(part.condition) | mentioned(part.effect)
-    if isinstance(part, NumericEffect):
-        return free_variables(part.call) | free_variables(part.value)
-    return free_variables(part)
+    if not isinstance(form, Effect):
+        return free_variables(form)
+    inner = frozenset[str]().union(*map(mentioned, parts_of_form(form)))
+    return inner - {v.name for v in form.variables} if isinstance(form, ForEach) else inner
 
 
 def effect_parts(effect: Effect) -> Iterator[Effect]:
     """The effect and all effects inside it."""
     yield effect
-    match effect:
-        case AllOf(parts):
-            for part in parts:
-                yield from effect_parts(part)
-        case ForEach(_, body) | When(_, body):
-            yield from effect_parts(body)
+    for part in parts_of_form(effect):
+        if isinstance(part, Effect):
+            yield from effect_parts(part)
 
 
 def effect_leaves(effect: Effect) -> Iterator[Add | Delete | NumericEffect]:
@@ -145,37 +154,17 @@ def effect_conditions(effect: Effect) -> Iterator[Expression]:
     return (part.condition for part in effect_parts(effect) if isinstance(part, When))
 
 
-_Node = Expression | Term | Effect
-
-_judged: IdentityCache[_Node, bool] = IdentityCache()
+_shallow: IdentityCache[Form, bool] = IdentityCache()
 
 
-def check_depth(node: _Node) -> None:
-    """Raise `InputError` if `node` is nested deeper than a text may be, `MAX_DEPTH`; remembered by identity."""
-    if _judged.find(node, None) is None:
-        _judged.keep(node, None, _check(node))
-
-
-def _check(node: _Node) -> bool:
-    level = [node]
+def check_depth(form: Form) -> None:
+    """Raise `InputError` if `form` is nested deeper than text can be, `MAX_DEPTH`; remembered by identity."""
+    if _shallow.find(form, None):
+        return
+    level = [form]
     for _ in range(MAX_DEPTH):
-        level = [part for one in level for part in _parts(one) if not isinstance(part, Variable | Constant)]
+        level = [part for one in level for part in parts_of_form(one) if not isinstance(part, Variable | Constant)]
         if not level:
-            return True
-    raise InputError(f"this is nested more than {MAX_DEPTH} deep", place=level[0].place or node.place)
-
-
-def _parts(node: _Node) -> tuple[_Node, ...]:
-    match node:
-        case Add(atom) | Delete(atom):
-            return (atom,)
-        case AllOf(parts):
-            return parts
-        case ForEach(_, effect):
-            return (effect,)
-        case When(condition, effect):
-            return (condition, effect)
-        case NumericEffect(_, call, value):
-            return (call, value)
-        case _:
-            return parts_of(node)
+            _shallow.keep(form, None, made=True)
+            return
+    raise InputError(f"this is nested more than {MAX_DEPTH} deep", place=level[0].place or form.place)

@@ -1,8 +1,7 @@
-"""Conditions as frozen values: what a text means, without saying on which world.
+"""Conditions and terms as frozen values, without a world.
 
 The forms are those of PDDL 2.1 conditions (Fox & Long 2003) plus `!=`, quoted text and truth values; a type
-is also a unary predicate. Two expressions are equal when they say the same, wherever they were written:
-places take no part in comparison.
+is also a unary predicate. Comparison ignores places, so the same text at two places gives equal expressions.
 """
 
 from __future__ import annotations
@@ -10,14 +9,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import overload
 
 from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place
 from knowledge_base.facts import Value
 from knowledge_base.spelling import is_plain_name
-
-Bound = TypeVar("Bound")
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,88 +196,55 @@ def variable_place(e: Expression | Term, name: str) -> Place | None:
     return next((place for place in found if place is not None), None)
 
 
-def substitute(e: Expression, bindings: Mapping[str, Value | Term]) -> Expression:
-    """`e` with the free variables in `bindings` replaced by values or terms; quantified ones shadow.
+@overload
+def substitute(e: Atom, bindings: Mapping[str, Value | Term]) -> Atom: ...
+@overload
+def substitute(e: Call, bindings: Mapping[str, Value | Term]) -> Call: ...
+@overload
+def substitute(e: Expression, bindings: Mapping[str, Value | Term]) -> Expression: ...
+@overload
+def substitute(e: Term, bindings: Mapping[str, Value | Term]) -> Term: ...
+def substitute(e: Expression | Term, bindings: Mapping[str, Value | Term]) -> Expression | Term:
+    """`e` with the free variables in `bindings` replaced by values or terms; quantified variables shadow.
 
-    Names in `bindings` that do not occur free in `e` are ignored. Places are kept. A variable in a term must not meet
-    a quantifier of its name in `e`, see `quantified`.
+    Names in `bindings` that are not free in `e` are ignored. Places are kept. A quantified variable that a new term
+    mentions gets a fresh name.
     """
+    made: Expression | Term = e
     match e:
-        case Atom():
-            return replace(e, args=_all(e.args, bindings))
-        case Not(body):
-            return replace(e, body=substitute(body, bindings))
-        case And(parts) | Or(parts):
-            return replace(e, parts=tuple(substitute(p, bindings) for p in parts))
-        case Imply(premise, conclusion):
-            return replace(e, premise=substitute(premise, bindings), conclusion=substitute(conclusion, bindings))
-        case Exists() | Forall():
-            return replace(e, body=substitute(e.body, unshadowed(e.variables, bindings)))
-        case Comparison(_, left, right):
-            return replace(e, left=substitute_term(left, bindings), right=substitute_term(right, bindings))
-
-
-def substitute_term(term: Term, bindings: Mapping[str, Value | Term]) -> Term:
-    """`term` with the variables in `bindings` replaced by values or terms."""
-    match term:
         case Variable(name) if name in bindings:
             value = bindings[name]
-            return value if isinstance(value, Term) else Constant(value, place=term.place)
-        case Call(_, args) | Arithmetic(_, args):
-            return replace(term, args=_all(args, bindings))
-        case _:
-            return term
+            made = value if isinstance(value, Term) else Constant(value, place=e.place)
+        case Atom(_, args) | Call(_, args) | Arithmetic(_, args):
+            made = replace(e, args=tuple(substitute(arg, bindings) for arg in args))
+        case And(parts) | Or(parts):
+            made = replace(e, parts=tuple(substitute(part, bindings) for part in parts))
+        case Not(body):
+            made = replace(e, body=substitute(body, bindings))
+        case Imply(premise, conclusion):
+            made = replace(e, premise=substitute(premise, bindings), conclusion=substitute(conclusion, bindings))
+        case Comparison(_, left, right):
+            made = replace(e, left=substitute(left, bindings), right=substitute(right, bindings))
+        case Exists(variables, body) | Forall(variables, body):
+            variables, inner = _entered(variables, body, bindings)
+            made = replace(e, variables=variables, body=substitute(body, inner))
+    return made
 
 
-def quantified(e: Expression) -> frozenset[str]:
-    """The names of the variables that quantifiers in `e` bind."""
-    inner = frozenset[str]().union(*(quantified(part) for part in parts_of(e) if isinstance(part, Expression)))
-    return inner | {v.name for v in e.variables} if isinstance(e, Exists | Forall) else inner
-
-
-def unshadowed(variables: tuple[TypedVariable, ...], bindings: Mapping[str, Bound]) -> dict[str, Bound]:
-    """The bindings that are still visible inside a quantifier over `variables`."""
-    own = {v.name for v in variables}
-    return {name: value for name, value in bindings.items() if name not in own}
-
-
-def _all(args: tuple[Term, ...], bindings: Mapping[str, Value | Term]) -> tuple[Term, ...]:
-    return tuple(substitute_term(a, bindings) for a in args)
+def _entered(
+    variables: tuple[TypedVariable, ...], body: Expression, bindings: Mapping[str, Value | Term]
+) -> tuple[tuple[TypedVariable, ...], dict[str, Value | Term]]:
+    """A quantifier's variables and the bindings inside; a variable that a new term mentions gets a fresh name."""
+    own, free = {v.name for v in variables}, free_variables(body)
+    inner = {name: value for name, value in bindings.items() if name in free and name not in own}
+    met = {name for value in inner.values() if isinstance(value, Term) for name in variables_in_order(value)}
+    if own.isdisjoint(met):
+        return variables, inner
+    names = {name: fresh(name, own | free | met) for name in own & met}
+    inner |= {name: Variable(new) for name, new in names.items()}
+    return tuple(replace(v, name=names.get(v.name, v.name)) for v in variables), inner
 
 
 def fresh(name: str, taken: Container[str]) -> str:
-    """The name with a number behind it, so that it is none of those taken."""
+    """The name with the first number that makes it differ from those `taken`."""
     return next(other for n in itertools.count(2) if (other := f"{name}_{n}") not in taken)
-
-
-def renamed(e: Expression, names: Mapping[str, str]) -> Expression:
-    """`e` with other names for free variables; a quantified variable that a new name would meet gets out of its way."""
-    match e:
-        case Atom(_, args):
-            return replace(e, args=tuple(renamed_term(a, names) for a in args))
-        case Not(body):
-            return replace(e, body=renamed(body, names))
-        case And(parts) | Or(parts):
-            return replace(e, parts=tuple(renamed(p, names) for p in parts))
-        case Imply(premise, conclusion):
-            return replace(e, premise=renamed(premise, names), conclusion=renamed(conclusion, names))
-        case Comparison(_, left, right):
-            return replace(e, left=renamed_term(left, names), right=renamed_term(right, names))
-        case Exists(variables, body) | Forall(variables, body):
-            own = {v.name for v in variables}
-            outer = {old: new for old, new in names.items() if old not in own and old in free_variables(body)}
-            taken = own | free_variables(body) | set(outer.values())
-            moved = {old: fresh(old, taken) for old in own & set(outer.values())}
-            variables = tuple(replace(v, name=moved.get(v.name, v.name)) for v in variables)
-            return replace(e, variables=variables, body=renamed(body, {**outer, **moved}))
-
-
-def renamed_term(term: Term, names: Mapping[str, str]) -> Term:
-    """`term` with other names for variables."""
-    match term:
-        case Variable(name) if name in names:
-            return replace(term, name=names[name])
-        case Call(_, args) | Arithmetic(_, args):
-            return replace(term, args=tuple(renamed_term(a, names) for a in args))
-        case _:
-            return term

@@ -21,8 +21,10 @@ from knowledge_base.language.syntax.effect import (
     Delete,
     Effect,
     ForEach,
+    Form,
     NumericEffect,
     When,
+    parts_of_form,
 )
 from knowledge_base.language.syntax.expression import (
     COMPARISONS,
@@ -244,12 +246,12 @@ def _call(group: Group) -> Call:
     return Call(head, tuple(parse_term(a) for a in group.items[1:]), place=group.place)
 
 
-_Form = Call | Arithmetic | Atom | And | Or | Not | Imply | Comparison | AllOf | Delete | When | NumericEffect
+_HEADS = {And: "and", AllOf: "and", Or: "or", Not: "not", Delete: "not", Imply: "imply", When: "when"}
 
 
-def to_text(node: Expression | Term | Effect) -> str:
-    """`node` on one line of PDDL, losslessly: `parse(to_text(x)) == x`."""
-    match node:
+def to_text(form: Form) -> str:
+    """`form` on one line of PDDL, losslessly: `parse(to_text(x)) == x`."""
+    match form:
         case Variable(name):
             return f"?{name}"
         case Constant(value, quoted):
@@ -257,43 +259,21 @@ def to_text(node: Expression | Term | Effect) -> str:
         case Add(atom):
             return to_text(atom)
         case Exists(variables, body) | Forall(variables, body) | ForEach(variables, body):
-            head = "exists" if isinstance(node, Exists) else "forall"
+            head = "exists" if isinstance(form, Exists) else "forall"
             return f"({head} {variables_text(variables)} {to_text(body)})"
+        case Atom(head) | Call(head) | Arithmetic(head) | Comparison(head) | NumericEffect(head):
+            pass
         case _:
-            head, parts = _form(node)
-            return "(" + " ".join([head, *map(to_text, parts)]) + ")"
+            head = _HEADS[type(form)]
+    return "(" + " ".join([head, *map(to_text, parts_of_form(form))]) + ")"
 
 
-def variables_text(variables: Iterable[TypedVariable]) -> str:
-    """A typed list in parentheses: `(?a - cup ?b - object)`, each variable with a type of its own."""
-    listed = tuple(variables)
-    if not any(v.types for v in listed):
-        return "(" + " ".join(f"?{v.name}" for v in listed) + ")"
-    return "(" + " ".join(_typed(v) for v in listed) + ")"
+def variables_text(variables: Sequence[TypedVariable]) -> str:
+    """A typed list in parentheses: `(?a - cup ?b - object)`, each variable with its type, or none with any."""
+    typed = any(v.types for v in variables)  # a variable without a type would take that of the next one
+    return "(" + " ".join(f"?{v.name} - {types_text(v.types)}" if typed else f"?{v.name}" for v in variables) + ")"
 
 
-def _typed(variable: TypedVariable) -> str:
-    types = variable.types or ("object",)  # left out, it would take the type of the next one
-    return f"?{variable.name} - " + (types[0] if len(types) == 1 else f"(either {' '.join(types)})")
-
-
-def _form(node: _Form) -> tuple[str, Sequence[Expression | Term | Effect]]:
-    form: tuple[str, Sequence[Expression | Term | Effect]]
-    match node:
-        case Call(head, args) | Arithmetic(head, args) | Atom(head, args):
-            form = head, args
-        case And(parts):
-            form = "and", parts
-        case AllOf(effects):
-            form = "and", effects
-        case Or(parts):
-            form = "or", parts
-        case Not(body) | Delete(body):
-            form = "not", (body,)
-        case Imply(premise, conclusion):
-            form = "imply", (premise, conclusion)
-        case When(condition, effect):
-            form = "when", (condition, effect)
-        case Comparison(operator, left, right) | NumericEffect(operator, left, right):
-            form = operator, (left, right)
-    return form
+def types_text(types: Sequence[str]) -> str:
+    """The types of a name in a typed list."""
+    return types[0] if len(types) == 1 else f"(either {' '.join(types)})" if types else "object"
