@@ -2,5 +2,30 @@
 
 from __future__ import annotations
 
-from knowledge_base.cli.app import app as app
-from knowledge_base.cli.inputs import readers as readers
+import typer
+
+from knowledge_base.cli import changes, queries
+from knowledge_base.cli.console import readers as readers
+
+app = typer.Typer(
+    rich_markup_mode=None,
+    no_args_is_help=True,
+    help="A world model: query it, change it, inspect its past, watch it, draw it.",
+)
+for command in (
+    changes.new,
+    queries.show,
+    queries.query,
+    queries.ask,
+    changes.tell,
+    changes.retract,
+    queries.watch,
+    queries.history,
+    queries.check,
+    queries.at,
+    changes.compact,
+):
+    app.command()(command)
+app.command("import")(changes.import_)
+app.command()(changes.export)
+app.command()(changes.draw)

@@ -1,21 +1,41 @@
-"""Commands that query a present or past world."""
+"""Commands that query a present or past world, list a store's past changes, and follow new ones."""
 
 from __future__ import annotations
 
+import time
 from dataclasses import asdict
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from knowledge_base.cli.inputs import Domain, Json, Source, Store, opened, opened_store
-from knowledge_base.cli.printing import print_json, print_json_list, print_table
+from knowledge_base.cli.console import (
+    Domain,
+    Json,
+    Source,
+    Store,
+    change_form,
+    clock_time,
+    delta_lines,
+    explanation_lines,
+    moment,
+    opened,
+    opened_store,
+    print_json,
+    print_json_list,
+    print_line,
+    print_table,
+)
+from knowledge_base.errors import InputError, UnknownNameError, printable
+from knowledge_base.spelling import value_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
-    from knowledge_base.facts import Value
+    from knowledge_base.facts import Change, Value
     from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.pddl import ProblemText
+    from knowledge_base.store import KnowledgeBase
     from knowledge_base.view import View
 
 Expr = Annotated[str, typer.Argument(metavar="EXPR", help="A condition; the answers bind its variables, such as ?x.")]
@@ -31,6 +51,13 @@ Seconds = Annotated[
 ]
 NO = 1
 """Exit status of the answer `no`; 2 is a mistake, as for every command."""
+Pattern = Annotated[
+    str | None, typer.Argument(metavar="[PATTERN]", help="Only changes of this, e.g. '(on ?x table)' or '(weight ?x)'.")
+]
+TOGETHER = 1000
+"""Number of changes that are read together."""
+POLL_S = 0.1
+"""Seconds between two looks at a store that other processes write."""
 
 
 def query(
@@ -65,7 +92,6 @@ def ask(
     json: Json = False,
 ) -> None:
     """Answer whether EXPR is true. Exit status: 0 yes, 1 no."""
-    from knowledge_base.cli.printing import explanation_lines
     from knowledge_base.language.evaluation.world import Bounds
 
     with opened(source, domain) as (kb, _):
@@ -102,14 +128,66 @@ def at(
     json: Json = False,
 ) -> None:
     """Show a past world of a store, or query it."""
-    from knowledge_base.cli.versions import moment
-
     with opened_store(store) as kb:
         then = kb.at(**moment(when))
         if expression is None:
             _show(then, None, None, as_json=json)
         else:
             _answer(then, expression, _params(param), limit, seconds, as_json=json)
+
+
+def history(
+    store: Store,
+    pattern: Pattern = None,
+    since: Annotated[int | None, typer.Option(metavar="VERSION", help="Only later changes.")] = None,
+    until: Annotated[int | None, typer.Option(metavar="VERSION", help="Only changes up to this one.")] = None,
+    json: Json = False,
+) -> None:
+    """List each change with its time and author."""
+    with opened_store(store) as kb:
+        touches = _touches(kb, pattern)
+        changes = filter(touches, _changes(kb, kb.oldest if since is None else since, until))
+        if json:
+            print_json_list(map(change_form, changes))
+            return
+        rows = ([c.version, clock_time(c.time), c.author, "\n".join(delta_lines(c.delta))] for c in changes)
+        print_table(["version", "time", "author", "change"], rows)
+
+
+def check(store: Store, json: Json = False) -> None:
+    """Check that a store's knowledge is complete and unchanged; reads all of it. For runs see `dsc runs check`."""
+    from knowledge_base.journal.archive import Archive
+
+    archive = Archive(store.resolve(), None)
+    last = archive.require_all()
+    if json:
+        print_json({"oldest": archive.oldest(), "newest": last})
+        return
+    typer.echo(f"versions {archive.oldest()} to {last}: as they were written")
+
+
+def watch(
+    store: Store,
+    pattern: Pattern = None,
+    count: Annotated[int | None, typer.Option(min=1, help="End after this number of changes.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after this number of seconds.")] = None,
+    json: Json = False,
+) -> None:
+    """Print changes as others commit them, until Ctrl-C."""
+    with opened_store(store) as kb:
+        touches, left = _touches(kb, pattern), count
+        end = None if seconds is None else time.monotonic() + seconds
+
+        def heard(change: Change) -> None:
+            nonlocal left
+            if left != 0 and touches(change):
+                _print(change, as_json=json)
+                left = None if left is None else left - 1
+
+        kb.subscribe(heard)
+        while left != 0 and (end is None or time.monotonic() < end):
+            kb.refresh()
+            time.sleep(POLL_S)
 
 
 def _answer(
@@ -122,8 +200,6 @@ def _answer(
     as_json: bool,
 ) -> None:
     """Print the answers as they are found, without a list of all in memory."""
-    from itertools import chain, islice
-
     from knowledge_base.language.evaluation.world import Bounds
     from knowledge_base.language.syntax.expression import variables_in_order
 
@@ -142,9 +218,7 @@ def _answer(
 
 
 def _show(world: View, problem: ProblemText | None, thing: str | None, *, as_json: bool) -> None:
-    from knowledge_base.errors import UnknownNameError
     from knowledge_base.language.syntax.text import to_text
-    from knowledge_base.spelling import value_text
 
     things, facts, values = world.nodes(), world.facts(), world.values()
     if thing is not None:
@@ -176,7 +250,6 @@ def _parsed(expression: str) -> Expression:
 
 def _params(said: list[str] | None) -> dict[str, Value]:
     """Return the bindings of `x=VALUE` options; values are written as in the language."""
-    from knowledge_base.errors import InputError
     from knowledge_base.language.syntax.expression import Constant
     from knowledge_base.language.syntax.text import parse_term
 
@@ -188,3 +261,28 @@ def _params(said: list[str] | None) -> dict[str, Value]:
             raise InputError(f"a parameter is written x=VALUE, not '{one}'")
         found[name.removeprefix("?")] = value.value
     return found
+
+
+def _changes(kb: KnowledgeBase, since: int, until: int | None) -> Iterator[Change]:
+    """Yield the changes of a store, in several reads."""
+    last = kb.version if until is None else until
+    kb.changes(last, last)  # report a wrong version before the first change
+    yield from kb.changes(since, min(last, since + TOGETHER))
+    for first in range(since + TOGETHER, last, TOGETHER):
+        yield from kb.changes(first, min(last, first + TOGETHER))
+
+
+def _touches(kb: KnowledgeBase, pattern: str | None) -> Callable[[Change], bool]:
+    from knowledge_base.conditions.pattern import touches
+    from knowledge_base.language.syntax.text import parse_condition
+
+    return (lambda _: True) if pattern is None else touches(parse_condition(pattern, "PATTERN"), {}, kb.schema)
+
+
+def _print(change: Change, *, as_json: bool) -> None:
+    if as_json:
+        print_line(change_form(change))
+        return
+    typer.echo(f"version {change.version}, {clock_time(change.time)}, {change.author}")
+    for line in delta_lines(change.delta):
+        typer.echo(f"  {printable(line)}")

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from knowledge_base.cli import app
-from knowledge_base.cli.printing import print_json, print_json_list, print_table
+from knowledge_base.cli.console import print_json, print_json_list, print_table
 from knowledge_base.errors import InputError
 
 DOMAIN = """(define (domain d) (:types cup place)
@@ -130,7 +130,7 @@ def test_a_list_is_printed_item_by_item_as_if_at_once(items, capsys) -> None:
 
 
 def test_a_long_table_is_printed_in_parts(monkeypatch, capsys) -> None:
-    monkeypatch.setattr("knowledge_base.cli.printing.MOST_ROWS", 2)
+    monkeypatch.setattr("knowledge_base.cli.console.MOST_ROWS", 2)
     print_table(["number"], ([number] for number in range(5)))
     assert capsys.readouterr().out.count("number") == 3
     print_table(["number"], [])

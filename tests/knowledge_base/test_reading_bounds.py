@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from knowledge_base import KnowledgeBase
-from knowledge_base.cli.app import app
+from knowledge_base.cli import app
 from knowledge_base.errors import InputError, ParseError, SchemaError
 from knowledge_base.journal.sidecar_files import is_database
 from knowledge_base.pddl import files
