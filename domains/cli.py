@@ -16,8 +16,8 @@ import typer
 from typer.core import TyperGroup
 
 from dsc.cli.plots import app as plot_app
+from dsc.cli.runs import NoOpen, Port, view_command
 from dsc.cli.runs import app as runs_app
-from dsc.cli.view import NoOpen, Port, view_command
 from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import readers
 from planning.cli import bundles_command, doctor_command, plan_command
@@ -171,7 +171,7 @@ def _viewed(
     deployed: CleanUpTable, follow: partial[Report], port: int, *, opens: bool, control: bool, wait: bool
 ) -> Report:
     """Run with a page in the browser, which stays open after the run."""
-    from dsc.cli.view import page, until_interrupt, viewer_installed
+    from dsc.cli.runs import page, until_interrupt, viewer_installed
     from dsc.trace import header
 
     viewer_installed()

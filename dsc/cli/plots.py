@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import os
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from dsc.errors import Finding
+from knowledge_base.cli.console import print_json
+from knowledge_base.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dsc.components.component import Component
     from dsc.dynamic.library import Library
-    from dsc.errors import Finding
     from dsc.model.plot import ActionPlot
     from dsc.text.plot_files import Neighbours
-    from knowledge_base.errors import InputError
     from knowledge_base.world.schema import Schema
 
 app = typer.Typer(
@@ -69,7 +72,7 @@ def check(
     components = None if robot is None else robot_of(robot)
     found = [(file, finding) for file in files for finding in _findings(file, domain, neighbours, components)]
     if json:
-        _print_json([_as_data(file, finding) for file, finding in found])
+        print_json([_as_data(file, finding) for file, finding in found])
     else:
         for file, finding in found:
             typer.echo(f"{finding}" if finding.place else f"{file}: {finding}")
@@ -92,13 +95,12 @@ def show(
 ) -> None:
     """Show a plot: as a tree in the terminal, as a drawing, or as YAML."""
     from dsc.drawing import draw
-    from dsc.text.plot_files import load_plot, plot_to_yaml
-    from knowledge_base.errors import UnknownNameError
+    from dsc.text.plot_files import Neighbours, load_plot, plot_to_yaml
     from knowledge_base.output_files import Output
 
     out = None if svg is None else Output(svg, "--svg", file)
     plot = load_plot(file)
-    library, broken = _neighbours(file, plot)
+    library, broken = Neighbours().of(file, plot)
     if out is not None:
         out.keep(*_files(library))
     try:
@@ -145,13 +147,12 @@ def export(
     """Write a plot in another form; name constructs that the form lacks."""
     from dsc.drawing import draw
     from dsc.scxml.writer import to_scxml
-    from dsc.text.plot_files import load_plot
+    from dsc.text.plot_files import Neighbours, load_plot
     from dsc.text.text_diagrams import to_mermaid, to_plantuml
-    from knowledge_base.errors import InputError
     from knowledge_base.output_files import Output
 
     def to_svg(plot: ActionPlot) -> str:
-        library, _ = _neighbours(file, plot)
+        library, _ = Neighbours().of(file, plot)
         output.keep(*_files(library))
         return draw(plot, library)
 
@@ -177,8 +178,6 @@ def diff(
     json: Annotated[bool, typer.Option("--json", help="Print a JSON list of differences.")] = False,
 ) -> None:
     """Say what is different between two plots. Exit status: 0 nothing, 1 something."""
-    from dataclasses import asdict
-
     from dsc.drawing.svg import above
     from dsc.text.plot_difference import differences, draw_difference
     from knowledge_base.output_files import Output
@@ -187,7 +186,7 @@ def diff(
     before, after = _load(old), _load(new)
     found = differences(before, after)
     if json:
-        _print_json([asdict(difference) for difference in found])
+        print_json([asdict(difference) for difference in found])
     else:
         for difference in found:
             typer.echo(str(difference))
@@ -226,16 +225,14 @@ def schema(
     from dsc.text.plot_files import json_schema
     from dsc.text.profiles import profile_schema
 
-    _print_json(profile_schema() if profile else json_schema())
+    print_json(profile_schema() if profile else json_schema())
 
 
 def _findings(
     file: Path, domain: Path | None, neighbours: Neighbours, components: tuple[Component, ...] | None
 ) -> list[Finding]:
     """Findings about one file; an unreadable file is one finding."""
-    from dsc.errors import Finding
     from dsc.validation import review_plot, validate_plot
-    from knowledge_base.errors import InputError
 
     known = _schema(file, domain)
     try:
@@ -258,12 +255,6 @@ def _load(file: Path) -> ActionPlot:
     from dsc.text.yaml import read_file
 
     return parse_scxml(read_file(file), str(file)) if file.suffix == ".scxml" else load_plot(file)
-
-
-def _neighbours(file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
-    from dsc.text.plot_files import Neighbours
-
-    return Neighbours().of(file, plot)
 
 
 def _schema(file: Path, domain: Path | None) -> Schema | None:
@@ -296,12 +287,6 @@ def _files(library: Library) -> list[Path]:
     """Files of its plots."""
     places = [plot.place(("plot",)) for plot in library]
     return [Path(place.source) for place in places if place is not None and place.source]
-
-
-def _print_json(data: object) -> None:
-    import json
-
-    typer.echo(json.dumps(data, indent=2))
 
 
 def _print_tree(plot: ActionPlot) -> None:

@@ -1,16 +1,25 @@
-"""Commands `dsc runs`: list, show, replay and check kept runs; they only read the store, also during a run."""
+"""Commands `dsc runs` and `dsc view`: inspect kept runs, and show a run in the browser; they only read the store.
+
+`page` shows a page of `dsc run --view`, too: its address is printed before the content exists.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+from knowledge_base.cli.console import print_line
+from knowledge_base.errors import InputError
 
+if TYPE_CHECKING:
     from dsc.runs.archive import RunArchive, RunRow, StepRow
+    from dsc.viewer.live import LivePage
+    from dsc.viewer.records import RecordLog
+    from dsc.viewer.server import Viewer
 
 app = typer.Typer(
     name="runs", rich_markup_mode=None, no_args_is_help=True, help="Look at runs that were kept with --store."
@@ -21,6 +30,11 @@ DIVERGED = 1
 Store = Annotated[Path, typer.Argument(metavar="FILE", help="The store.")]
 Number = Annotated[int | None, typer.Option("--run", min=1, help="Which run.  [default: the last one]")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+MOST_COMPLAINTS = 5
+"""Upper bound of damaged records named on the terminal; the rest is counted."""
+Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 picks a free one.")]
+NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
+P = TypeVar("P", "LivePage", "Viewer")
 
 
 @app.command("list")
@@ -31,7 +45,7 @@ def list_(file: Store, as_json: AsJson = False) -> None:
     with archive(file) as runs:
         found = [_summary(runs, run) for run in runs.runs()]
     if as_json:
-        _print_json(found)
+        print_line(found)
         return
     for one in found:
         typer.echo(f"{one['run']:4}  {one['plot']}  {one['steps']} steps, {one['seconds']:.1f} s, {one['state']}")
@@ -48,7 +62,7 @@ def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
         summary = _summary(runs, row) | {"header": row.header, "arguments": row.arguments}
         under_way = _open(runs, row)
     if as_json:
-        _print_json(summary | {"under_way": under_way, "macrosteps": [_step_form(step) for step in steps]})
+        print_line(summary | {"under_way": under_way, "macrosteps": [_step_form(step) for step in steps]})
         return
     for step in steps:
         typer.echo(f"{step.time:8.1f} s {step.number:5}  {_taken(step)}: {', '.join(_innermost(step.configuration))}")
@@ -65,7 +79,7 @@ def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
     done = again(file, run)
     found = None if done.divergence is None else str(done.divergence)
     if as_json:
-        _print_json({"run": done.run, "steps": done.steps, "divergence": found})
+        print_line({"run": done.run, "steps": done.steps, "divergence": found})
     elif found is None:
         typer.echo(f"run {done.run}: {done.steps} steps, all as they were")
     else:
@@ -84,6 +98,59 @@ def check(file: Store) -> None:
         for run in runs.require_all():
             last = runs.last(run.number)
             typer.echo(f"run {run.number}: {last.number} steps as they were written, {_state(run)}")
+
+
+def view_command(
+    file: Annotated[Path, typer.Argument(metavar="TRACE.jsonl|STORE", help="A trace or a store.")],
+    port: Port = 0,
+    no_open: NoOpen = False,
+) -> None:
+    """Look at a recorded run, or at a store as others change it, in the browser; Ctrl-C ends it."""
+    viewer_installed()
+    from dsc.viewer.address import PageAddress
+    from dsc.viewer.record_sources import records_of
+    from dsc.viewer.server import Viewer
+
+    with records_of(file) as log:
+        _complain(file, log)
+        with page(Viewer(log, PageAddress.on(port)), opens=not no_open) as viewer:
+            until_interrupt(viewer)
+
+
+@contextmanager
+def page(shown: P, *, opens: bool) -> Iterator[P]:
+    """Show a page in a browser during the block; print its address first."""
+    shown.start()
+    typer.echo(shown.url)
+    if opens:
+        import webbrowser
+
+        with suppress(webbrowser.Error):  # the address is printed: people can open it themselves
+            webbrowser.open(shown.one_time_url)
+    try:
+        yield shown
+    finally:
+        shown.close()
+
+
+def until_interrupt(viewer: LivePage | Viewer) -> None:
+    """Serve the page until Ctrl-C."""
+    typer.echo("Ctrl-C ends it", err=True)
+    try:
+        viewer.wait()
+    except KeyboardInterrupt:
+        typer.echo("", err=True)
+
+
+def viewer_installed() -> None:
+    """Raise `InputError` unless the extra is installed."""
+    from importlib.util import find_spec
+
+    missing = [name for name in ("starlette", "uvicorn", "websockets") if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"the viewer needs {', '.join(missing)}: pip install 'dynamic-state-charts[viewer]'", found=missing[0]
+        )
 
 
 def _summary(runs: RunArchive, run: RunRow) -> dict[str, Any]:
@@ -128,7 +195,11 @@ def _step_form(step: StepRow) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _print_json(data: Any) -> None:
-    import json
-
-    typer.echo(json.dumps(data))
+def _complain(file: Path, log: RecordLog) -> None:
+    """Name on the terminal the records that the page cannot show."""
+    for complaint in log.complaints[:MOST_COMPLAINTS]:
+        typer.echo(complaint, err=True)
+    if (more := len(log.complaints) - MOST_COMPLAINTS) > 0:
+        typer.echo(f"{file}: {more} more records are damaged", err=True)
+    if not log.live and len(log) == 0:
+        typer.echo(f"{file}: there are no records", err=True)

@@ -162,8 +162,8 @@ def print_json_list(items: Iterable[Any], said: Mapping[str, Any] | None = None,
     write(f"{end}{tail}\n")
 
 
-def print_line(said: Mapping[str, Any]) -> None:
-    """Print one JSON object on a line and flush, for programs that follow the output."""
+def print_line(said: Any) -> None:
+    """Print one JSON value on a line and flush, for programs that follow the output."""
     typer.echo(json.dumps(said))
     sys.stdout.flush()
 

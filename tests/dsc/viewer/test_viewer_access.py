@@ -14,7 +14,7 @@ pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 httpx = pytest.importorskip("httpx", reason="the extra `viewer` is not installed")
 
-from dsc.cli.view import page  # noqa: E402
+from dsc.cli.runs import page  # noqa: E402
 from dsc.trace import header  # noqa: E402
 from dsc.viewer.access import CODE_LIFE_S, MOST_WRONG_CODES, Access, Keys  # noqa: E402
 from dsc.viewer.address import PageAddress  # noqa: E402

@@ -99,10 +99,10 @@ def test_what_cannot_be_shown_is_refused_with_its_line(tmp_path, lines, message)
 
 def test_the_command_names_what_is_damaged(tmp_path, monkeypatch) -> None:
     from domains.cli import app
-    from dsc.cli import view
+    from dsc.cli import runs
 
     path = tmp_path / "run.jsonl"
-    monkeypatch.setattr(view, "until_interrupt", lambda _viewer: None)
+    monkeypatch.setattr(runs, "until_interrupt", lambda _viewer: None)
     path.write_text("\n".join([HEADER, *(line[:-1] for line in LINES)]))
     said = CliRunner().invoke(app, ["view", str(path), "--no-open"])
     assert (said.exit_code, said.stderr.count("is damaged: it ends in the middle")) == (0, 5)
