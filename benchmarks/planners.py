@@ -32,7 +32,7 @@ from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, installed
 from planning.engines.request import written
 from planning.generation.plan_to_plot import plot_from_plan
-from planning.ordering.partial_order import deordered
+from planning.ordering.causal_tracing import deordered
 from planning.plan import Plan, PlanFound
 from planning.problem.construction import ProblemBuilder, build_problem
 from planning.strips import Problem

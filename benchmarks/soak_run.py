@@ -40,7 +40,7 @@ from dsc.testing.faults import USUAL, Fault, Faults, Interleaving
 from dsc.testing.invariants import executed_once, kept_run
 from knowledge_base.errors import DamagedStoreError
 from planning import PlannerProcess
-from planning.engines.cache import CachingPlanner
+from planning.engines.race import CachingPlanner
 from planning.testing import FaultyPlanner
 
 MOST_STEPS = 5_000

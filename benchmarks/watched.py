@@ -33,8 +33,8 @@ from dsc.trace import Listener, header
 from dsc.viewer.address import PageAddress
 from dsc.viewer.live import LivePage
 from planning import Planner
-from planning.engines.cache import CachingPlanner
 from planning.engines.planner import PlannerProcess
+from planning.engines.race import CachingPlanner
 
 WATCHED = {"no page": None, "nobody looks": 0, "1 browser": 1, "8 browsers": 8}
 SCENARIO = "table: {cups: 4, cans: 3, crisp_cans: [small, large]}"

@@ -35,9 +35,8 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema_compatibility import require_extension
 from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of, shipped_by
 from planning.domain import PlanningDomain
-from planning.engines.cache import CachingPlanner
 from planning.engines.planner import Planner, PlannerProcess
-from planning.engines.race import PlannerRace
+from planning.engines.race import CachingPlanner, PlannerRace
 from planning.execution.component import PlanningComponent
 from planning.execution.search import Foresight
 from planning.problem.construction import check_goal

@@ -15,7 +15,7 @@ from unified_planning.model import Problem as UpProblem
 from knowledge_base.errors import InputError
 from knowledge_base.pddl import Metric, ProblemText, read_problem
 from planning.domain import PlanningDomain
-from planning.problem.costs import TOTAL_COST
+from planning.problem.operators import TOTAL_COST
 
 if TYPE_CHECKING:
     from knowledge_base import View

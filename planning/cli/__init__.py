@@ -72,7 +72,7 @@ def doctor_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Show which planning engines there are, what each can do, and how to install what is missing."""
-    from planning.engines.installed import findings
+    from planning.engines.registry import findings
 
     found = findings()
     if as_json:

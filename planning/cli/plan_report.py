@@ -58,7 +58,7 @@ def answer_of(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
 
 def ordered(order: PartialOrder) -> dict[str, Any]:
     """Return the concurrent chains, and the steps that each step waits for; steps are numbered from 1."""
-    from planning.ordering.chains import chains
+    from planning.ordering.partial_order import chains
 
     linked = {(link.provider, link.user) for link in order.links}
     found = chains(order.earlier, lambda one, other: (one, other) in linked)

@@ -56,7 +56,7 @@ def plan_command(
     from knowledge_base.output_files import Output
     from planning.cancellable_work import WorkLimitError
     from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
-    from planning.problem.constructs import why_no_engine
+    from planning.problem.relevance import why_no_engine
 
     output = None if plot is None else Output(plot, "--plot", *files)
     domain, read, world = read_files(files)
@@ -85,7 +85,8 @@ def plan_command(
 
 
 def _order(plan: Plan, domain: PlanningDomain, world: KnowledgeBase, goal: Expression) -> PartialOrder:
-    from planning.ordering.partial_order import deordered, in_sequence
+    from planning.ordering.causal_tracing import deordered
+    from planning.ordering.partial_order import in_sequence
     from planning.ordering.timed_links import linked
     from planning.problem.axioms import Derivable
 
@@ -179,7 +180,7 @@ def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, se
     import asyncio
 
     from planning.cancellable_work import WorkLimit, WorkLimitError, aside
-    from planning.explanation.unsolvability import why_unsolvable
+    from planning.explanation import why_unsolvable
     from planning.problem.axioms import Derivable
 
     patience = WorkLimit(seconds)

@@ -14,11 +14,9 @@ from fractions import Fraction
 from importlib.util import find_spec
 from math import lcm
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from planning.engines.registry import Engine
-    from planning.engines.worker import Answers, Request, Search
+from planning.engines.registry import Engine
+from planning.engines.worker import Answers, Request, Search
 
 # The first search is lazy greedy with h_FF alone. On the clean-up table, preferred operators and landmarks are not
 # faster up to 50 items, and plans have up to twice as many trips. Later searches only look for a better plan.

@@ -5,24 +5,19 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import threading
 import time
+from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import AbstractContextManager, aclosing, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from planning.action_elimination import indispensable
 from planning.cancellable_work import aside
-from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
+from planning.engines.process import EngineProcess, EngineStoppedError, OutOfTimeError, answers, worker
 from planning.engines.registry import can_time, cannot, in_concert, nobody
 from planning.engines.request import written
 from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Callable, Sequence
-
-    from planning.plan import PlanningOutcome
-    from planning.strips import Problem
+from planning.strips import Problem
 
 
 @runtime_checkable
@@ -187,8 +182,8 @@ class PlannerProcess:
             return
         started = time.monotonic()
         try:
-            async with aclosing(_answers(process, written(problem), seconds)) as answers:
-                async for answer in answers:
+            async with aclosing(answers(process, written(problem), seconds)) as heard:
+                async for answer in heard:
                     outcome = self._judged(answer, problem, time.monotonic() - started)
                     if best is None or (isinstance(outcome, PlanFound) and outcome.cost < best.cost):
                         yield outcome
@@ -258,40 +253,3 @@ def _times(timed: Any) -> list[tuple[int, float, float]]:
     if not all(math.isfinite(start) and math.isfinite(seconds) for _, start, seconds in times):
         raise ValueError
     return times
-
-
-async def _answers(process: EngineProcess, request: bytes, seconds: float) -> AsyncGenerator[dict[str, Any], None]:
-    """Yield the process's answers as they arrive; closing the generator ends the search.
-
-    Raises:
-        OutOfTimeError, EngineStoppedError: as `EngineProcess.ask`.
-    """
-    loop, deadline = asyncio.get_running_loop(), Deadline(seconds)
-    heard: asyncio.Queue[dict[str, Any] | Exception | None] = asyncio.Queue()
-
-    def tell(what: dict[str, Any] | Exception | None) -> None:
-        _call(loop, lambda: heard.put_nowait(what))
-
-    def ask() -> None:
-        try:
-            process.ask(request, deadline, tell)
-        except Exception as error:  # noqa: BLE001  passed to the waiting task
-            tell(error)
-        else:
-            tell(None)
-
-    threading.Thread(target=ask, daemon=True).start()
-    try:
-        while (answer := await heard.get()) is not None:
-            if isinstance(answer, Exception):
-                raise answer
-            yield answer
-    finally:
-        deadline.shorten(0)
-        process.wake()
-
-
-def _call(loop: asyncio.AbstractEventLoop, what: Callable[[], object]) -> None:
-    """Call `what` in the loop; a closed loop has no waiting task."""
-    with contextlib.suppress(RuntimeError):
-        loop.call_soon_threadsafe(what)

@@ -1,7 +1,8 @@
-"""A worker process as an object: ask, wait in real time, kill. A blocking thread uses it."""
+"""A worker process as an object, which a thread or a task asks in real time, and which can be killed."""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import os
@@ -14,14 +15,15 @@ import tempfile
 import threading
 import time
 import weakref
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
+from typing import Any
 
 _LONGEST_ANSWER = 1 << 26  # bytes; endless output must not fill the memory
+
 _GRACE = 1.0  # seconds for a worker to report the end of a killed search
+
 _MOST_PROCESSES = 1 << 31  # upper bound of process ids
+
 _LONGEST_WAIT = 3600.0  # seconds; a selector takes no infinity
 
 
@@ -267,3 +269,40 @@ def _kill_groups(groups: Iterable[int]) -> None:
 def _close(fds: Iterable[int]) -> None:
     for fd in fds:
         os.close(fd)
+
+
+async def answers(process: EngineProcess, request: bytes, seconds: float) -> AsyncGenerator[dict[str, Any], None]:
+    """Yield the process's answers as they arrive; closing the generator ends the search.
+
+    Raises:
+        OutOfTimeError, EngineStoppedError: as `EngineProcess.ask`.
+    """
+    loop, deadline = asyncio.get_running_loop(), Deadline(seconds)
+    heard: asyncio.Queue[dict[str, Any] | Exception | None] = asyncio.Queue()
+
+    def tell(what: dict[str, Any] | Exception | None) -> None:
+        _call(loop, lambda: heard.put_nowait(what))
+
+    def ask() -> None:
+        try:
+            process.ask(request, deadline, tell)
+        except Exception as error:  # noqa: BLE001  passed to the waiting task
+            tell(error)
+        else:
+            tell(None)
+
+    threading.Thread(target=ask, daemon=True).start()
+    try:
+        while (answer := await heard.get()) is not None:
+            if isinstance(answer, Exception):
+                raise answer
+            yield answer
+    finally:
+        deadline.shorten(0)
+        process.wake()
+
+
+def _call(loop: asyncio.AbstractEventLoop, what: Callable[[], object]) -> None:
+    """Call `what` in the loop; a closed loop has no waiting task."""
+    with contextlib.suppress(RuntimeError):
+        loop.call_soon_threadsafe(what)

@@ -6,17 +6,14 @@ pyperplan grounds. On all but the hardest problems this takes several times as l
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from pyperplan.heuristics.relaxation import hFFHeuristic
 from pyperplan.search.a_star import greedy_best_first_search
 from pyperplan.task import Operator, Task
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from planning.engines.registry import Engine
-    from planning.engines.worker import Answers, Request, Search
+from planning.engines.registry import Engine
+from planning.engines.worker import Answers, Request, Search
 
 
 def searching(engine: Engine) -> Search:  # noqa: ARG001

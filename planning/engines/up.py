@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import subprocess
+from collections.abc import Sequence
 from fractions import Fraction
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from unified_planning.engines import PlanGenerationResultStatus, pddl_planner
+from unified_planning.engines.results import PlanGenerationResult
 from unified_planning.environment import Environment
 from unified_planning.model import (
     DurativeAction,
@@ -23,19 +25,11 @@ from unified_planning.model.metrics import MinimizeActionCosts
 from unified_planning.plans import TimeTriggeredPlan
 
 from knowledge_base.facts import Fact
+from planning.engines.registry import Engine
 from planning.engines.request import read
+from planning.engines.worker import Answers, Request, Search
 from planning.quantities import Assignment, NumericBound, Operation, Quantity
-from planning.strips import Problem
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from unified_planning.engines.results import PlanGenerationResult
-    from unified_planning.model import Problem as UpProblem
-
-    from planning.engines.registry import Engine
-    from planning.engines.worker import Answers, Request, Search
-    from planning.strips import ActionSpan, GroundAction, Problem
+from planning.strips import ActionSpan, GroundAction, Problem
 
 
 def translated(problem: Problem, *, costs: bool = False, environment: Environment | None = None) -> UpProblem:

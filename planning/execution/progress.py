@@ -23,8 +23,8 @@ from planning.domain import PlanningDomain
 from planning.execution.regression import CausalNeeds
 from planning.plan import Plan, PlanStep
 from planning.problem.construction import build_problem
-from planning.problem.costs import TOTAL_COST
 from planning.problem.derived import derivation
+from planning.problem.operators import TOTAL_COST
 from planning.quantities import worth
 from planning.strips import Problem
 from planning.validation import validate

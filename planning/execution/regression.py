@@ -36,7 +36,7 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from planning.domain import GroundStep, PlanningDomain
 from planning.plan import PlanStep
-from planning.problem.relevance import changed, names_of
+from planning.problem.expressions import changed, names_of
 
 FALSE = Or(())
 _CHANGING = {"increase": "+", "decrease": "-", "scale-up": "*", "scale-down": "/"}

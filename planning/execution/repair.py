@@ -15,10 +15,12 @@ from planning.execution.plan_run import EscalationStep, Failure, PlanRun, PlanRu
 from planning.execution.progress import PlanProgress, is_true, shortest_end
 from planning.generation.carried_steps import expectation, implementing
 from planning.generation.plan_to_plot import laid_out, plot_of
-from planning.ordering.partial_order import PartialOrder, deordered, in_sequence
+from planning.ordering.causal_tracing import deordered
+from planning.ordering.partial_order import PartialOrder, in_sequence
 from planning.ordering.timed_links import linked
 from planning.plan import Plan, PlanStep
-from planning.problem.relevance import names_of, relevant
+from planning.problem.expressions import names_of
+from planning.problem.relevance import relevant
 
 if TYPE_CHECKING:
     from dsc.dynamic.library import Library

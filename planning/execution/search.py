@@ -14,11 +14,11 @@ from planning.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.engines.registry import timing
 from planning.execution.planner_call import Answer, PlannerCalls
 from planning.execution.progress import local_repair
-from planning.explanation.unsolvability import why_unsolvable
-from planning.ordering.partial_order import deordered
+from planning.explanation import why_unsolvable
+from planning.ordering.causal_tracing import deordered
 from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
 from planning.problem.construction import build_problem
-from planning.problem.constructs import why_no_engine
+from planning.problem.relevance import why_no_engine
 from planning.validation import Validation, validate
 
 if TYPE_CHECKING:

@@ -32,7 +32,7 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from planning.domain import PlanningAction, PlanningDomain
 from planning.plan import PlanStep
-from planning.problem.relevance import changed, names_of
+from planning.problem.expressions import changed, names_of
 
 
 @dataclass(frozen=True, slots=True)

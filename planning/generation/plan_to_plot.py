@@ -9,25 +9,20 @@ partial order, mostly the steps of one robot. Outcomes without an inherited rule
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
+from dsc.dynamic.library import Library
 from dsc.events import FAILURES, GAVE_UP
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import CONTINUE, REPLAN, Rule
+from planning.domain import PlanningDomain
 from planning.generation.carried_steps import CarriedStep, Carrier, Usage, sketched
 from planning.generation.control_flow import FINISHED, ControlFlow, Writer, passed
-from planning.ordering.chains import chains
-from planning.ordering.partial_order import PartialOrder, in_sequence, scheduled
+from planning.ordering.partial_order import PartialOrder, chains, in_sequence, scheduled
+from planning.plan import Plan, PlanStep
 from planning.problem.derived import derivation
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
-
-    from dsc.dynamic.library import Library
-    from planning.domain import PlanningDomain
-    from planning.plan import Plan, PlanStep
 
 WORK = "work"
 """Name of the state with the regions."""

@@ -1,4 +1,14 @@
-"""Causal tracing: simulate a plan, and record for each condition the step that establishes it.
+"""Causal tracing: record for each condition of a plan the step that establishes it, and de-order the steps (S1.5).
+
+*De-ordering* keeps only the ordered pairs of the plan with a reason (Bäckström 1998, *Computational aspects of
+reordering plans*). The reasons:
+
+- Link: a step needs a condition that an earlier step establishes.
+- Threat: a later step falsifies a condition that an earlier step needs.
+- Conflict: one step makes a fact true that the other makes false, or both change a number and do not commute.
+
+Every linearization then takes the same steps to the same end. A fact that a step both deletes and adds counts as false
+in between, so that two such steps never overlap.
 
 Sets of steps are bits, and each fact has one record, so that the cost of a step depends on its own facts. The needs and
 changes of most steps are plain facts in every world, and are cached for each step. Other steps are evaluated in the
@@ -22,12 +32,41 @@ from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.domain import GroundStep, PlanningAction, PlanningDomain
+from planning.ordering.partial_order import PRESENT, CausalLink, PartialOrder, reduction
 from planning.ordering.step_dependencies import Changes, Ground, Support, changes, conjuncts, favours, support
-from planning.plan import PlanStep
+from planning.plan import Plan, PlanStep
 from planning.problem.conditions import Literal
+from planning.problem.derived import derivation
 
-PRESENT = 0
-"""The provider of facts that hold initially."""
+
+def causal_links(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> tuple[CausalLink, ...]:
+    """Return the causal links of a plan from `world` to the goal, by user.
+
+    The plan leads to the goal as long as all of them hold.
+
+    Raises:
+        InputError: the plan does not lead to the goal.
+    """
+    return deordered(plan, domain, world, goal).links
+
+
+def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> PartialOrder:
+    """Return the plan without ordered pairs that have no reason.
+
+    Every linearization leads from `world` to the goal. The result is not always the least such order, which is NP-hard
+    to find.
+
+    Raises:
+        InputError: the plan does not lead to the goal; `planning.validation.validate` returns the step and the reason.
+    """
+    derived = derivation(domain)
+    tracing = CausalTrace(derived.world(world))
+    for number, step in enumerate(plan.steps, start=1):
+        tracing.take(number, step, derived.domain)
+    tracing.reach(len(plan.steps) + 1, derived.expand(goal))
+    links = tuple(dict.fromkeys(CausalLink(*link) for link in tracing.links))
+    steps = {number: bits for number, bits in tracing.earlier.items() if number <= len(plan.steps)}
+    return PartialOrder(plan.steps, links, reduction(steps))
 
 
 class CausalTrace:

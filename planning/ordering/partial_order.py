@@ -1,38 +1,24 @@
-"""Causal links of a plan, and the partial order that follows from them (S1.5).
+"""The partial order of a plan's steps, with its causal links; few control flows for it, and purposes of steps.
 
 A *causal link*: a step, or the present, establishes a condition that a later step, or the goal, needs (Tate 1977,
 *Generating project networks*).
 
-*De-ordering* keeps only the ordered pairs of the plan with a reason (Bäckström 1998, *Computational aspects of
-reordering plans*). The reasons:
-
-- Link: a step needs a condition that an earlier step establishes.
-- Threat: a later step falsifies a condition that an earlier step needs.
-- Conflict: one step makes a fact true that the other makes false, or both change a number and do not commute.
-
-Every linearization then takes the same steps to the same end. A fact that a step both deletes and adds counts as false
-in between, so that two such steps never overlap.
+Few control flows are a minimum chain cover (Dilworth 1950), found by matching (Fulkerson 1956).
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.text import to_text
-from planning.domain import PlanningDomain
-from planning.ordering.causal_tracing import PRESENT, CausalTrace
 from planning.plan import Plan, PlanStep
-from planning.problem.derived import derivation
 
-__all__ = [
-    "PRESENT", "CausalLink", "PartialOrder", "causal_links", "deordered", "in_sequence", "reduced", "scheduled",
-    "standing",
-]  # fmt: skip
+PRESENT = 0
+"""The provider of facts that hold initially."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,36 +91,6 @@ def scheduled(plan: Plan) -> PartialOrder:
     return replace(order, begin_before=frozenset(begun))
 
 
-def causal_links(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> tuple[CausalLink, ...]:
-    """Return the causal links of a plan from `world` to the goal, by user.
-
-    The plan leads to the goal as long as all of them hold.
-
-    Raises:
-        InputError: the plan does not lead to the goal.
-    """
-    return deordered(plan, domain, world, goal).links
-
-
-def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> PartialOrder:
-    """Return the plan without ordered pairs that have no reason.
-
-    Every linearization leads from `world` to the goal. The result is not always the least such order, which is NP-hard
-    to find.
-
-    Raises:
-        InputError: the plan does not lead to the goal; `planning.validation.validate` returns the step and the reason.
-    """
-    derived = derivation(domain)
-    tracing = CausalTrace(derived.world(world))
-    for number, step in enumerate(plan.steps, start=1):
-        tracing.take(number, step, derived.domain)
-    tracing.reach(len(plan.steps) + 1, derived.expand(goal))
-    links = tuple(dict.fromkeys(CausalLink(*link) for link in tracing.links))
-    steps = {number: bits for number, bits in tracing.earlier.items() if number <= len(plan.steps)}
-    return PartialOrder(plan.steps, links, _reduced(steps))
-
-
 def standing(links: Iterable[CausalLink], done: Collection[int], begun: Collection[int]) -> tuple[CausalLink, ...]:
     """Return the links whose facts must hold now: all their providers are done, and their users have not begun."""
     waiting = [link for link in links if link.user not in begun]
@@ -147,10 +103,10 @@ def reduced(pairs: Iterable[tuple[int, int]]) -> frozenset[tuple[int, int]]:
     direct: dict[int, int] = defaultdict(int)
     for first, second in pairs:
         direct[second] |= 1 << first
-    return _reduced(direct)
+    return reduction(direct)
 
 
-def _reduced(direct: Mapping[int, int]) -> frozenset[tuple[int, int]]:
+def reduction(direct: Mapping[int, int]) -> frozenset[tuple[int, int]]:
     """Return the transitive reduction; `direct` has for each step the steps before it, as bits."""
     earlier: dict[int, int] = {}
     kept: list[tuple[int, int]] = []
@@ -163,3 +119,106 @@ def _reduced(direct: Mapping[int, int]) -> frozenset[tuple[int, int]]:
             open_ &= ~covered
         earlier[number] = covered
     return frozenset(kept)
+
+
+@dataclass(frozen=True, slots=True)
+class Purpose:
+    """The purpose of a step in a plan.
+
+    Attributes:
+        number: the step's number, counted from 1.
+        step: the step.
+        provides: the conditions that it establishes, each with the later step that needs it; `None` is the goal.
+        serves: the conditions of the goal that it contributes to, directly or through later steps.
+    """
+
+    number: int
+    step: PlanStep
+    provides: tuple[tuple[Expression, int | None], ...]
+    serves: tuple[Expression, ...]
+
+    def __str__(self) -> str:
+        """Text such as `3 (pick-up cup1 table): (holding cup1) for step 4; serves (tidy cup1)`."""
+        if not self.provides:
+            return f"{self.number} {self.step}: nothing needs what it does"
+        users: dict[str, list[str]] = {}
+        for fact, user in self.provides:
+            users.setdefault("the goal" if user is None else f"step {user}", []).append(to_text(fact))
+        said = "; ".join(f"{' '.join(facts)} for {user}" for user, facts in users.items())
+        direct = {fact for fact, user in self.provides if user is None}
+        further = [to_text(fact) for fact in self.serves if fact not in direct]
+        return f"{self.number} {self.step}: {said}" + (f"; serves {' '.join(further)}" if further else "")
+
+
+def why(order: PartialOrder, number: int) -> Purpose:
+    """Return the purpose of step `number`, from its causal links."""
+    goal = len(order.steps) + 1
+    own = [link for link in order.links if link.provider == number]
+    provides = tuple((link.fact, None if link.user == goal else link.user) for link in own)
+    return Purpose(number, order.steps[number - 1], provides, _served(order.links, number, goal))
+
+
+def _served(links: tuple[CausalLink, ...], number: int, goal: int) -> tuple[Expression, ...]:
+    reached, before = {number}, 0
+    while before != len(reached):  # along a time line, a later step may provide for an earlier one
+        before = len(reached)
+        reached |= {link.user for link in links if link.provider in reached}
+    return tuple(dict.fromkeys(link.fact for link in links if link.provider in reached and link.user == goal))
+
+
+Kin = Callable[[int, int], bool]
+"""Returns whether two steps should share a chain, e.g. because one robot takes both."""
+
+
+def chains(earlier: Mapping[int, frozenset[int]], kin: Kin) -> tuple[tuple[int, ...], ...]:
+    """Return the fewest chains that contain each step once, ordered by their first steps.
+
+    A chain is a sequence of steps each of which ends before the next begins. Among the covers with the fewest chains,
+    the result extends a maximum matching of kin.
+
+    Args:
+        earlier: for each step in order, the steps that end before it begins.
+        kin: see `Kin`.
+    """
+    matching = _Matching(earlier)
+    for relatives in (kin, _any_pair):
+        for second in earlier:
+            matching.follow(second, relatives)
+    following = {first: second for second, first in matching.before.items()}
+    return tuple(_chain(first, following) for first in earlier if first not in matching.before)
+
+
+def _any_pair(_first: int, _second: int) -> bool:
+    return True
+
+
+def _chain(first: int, following: Mapping[int, int]) -> tuple[int, ...]:
+    chain = [first]
+    while chain[-1] in following:
+        chain.append(following[chain[-1]])
+    return tuple(chain)
+
+
+class _Matching:
+    """A matching of steps with their direct predecessors; `follow` extends it along an augmenting path."""
+
+    def __init__(self, earlier: Mapping[int, frozenset[int]]) -> None:
+        self.before: dict[int, int] = {}
+        self._after: dict[int, int] = {}
+        self._earlier = {number: sorted(those, reverse=True) for number, those in earlier.items()}
+
+    def follow(self, second: int, kin: Kin) -> None:
+        """Give a step a direct predecessor if it has none and the matching allows one."""
+        if second not in self.before:
+            self._augment(second, kin, set())
+
+    def _augment(self, second: int, kin: Kin, tried: set[int]) -> bool:
+        for first in self._earlier[second]:
+            if first in tried or not kin(first, second):
+                continue
+            tried.add(first)
+            other = self._after.get(first)
+            if other is None or self._augment(other, kin, tried):
+                self.before[second], self._after[first] = first, second
+                return True
+        return False

@@ -12,26 +12,21 @@ Plans of that kind are for display only: a monitor watches facts and numbers, ne
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
+from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, effect_conditions, effect_leaves
 from knowledge_base.language.syntax.expression import Atom, Exists, Expression, Or, TypedVariable, Variable
+from knowledge_base.pddl.problem_text import Metric
+from planning.cancellable_work import WorkLimit
+from planning.domain import Axiom, PlanningDomain
 from planning.planning_actions import PlanningAction
 from planning.problem.construction import build_problem
-from planning.problem.derived import denied, derivation
-from planning.problem.relevance import name_of, names_of, relevant
-from planning.strips import UnsupportedActionError, UnsupportedGoalError
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
-
-    from knowledge_base.language.evaluation.world import World
-    from knowledge_base.pddl.problem_text import Metric
-    from planning.cancellable_work import WorkLimit
-    from planning.domain import Axiom, PlanningDomain
-    from planning.problem.derived import Derivation
-    from planning.strips import GroundAction, Problem
+from planning.problem.derived import Derivation, derivation
+from planning.problem.expressions import denied, name_of, names_of
+from planning.problem.relevance import relevant
+from planning.strips import GroundAction, Problem, UnsupportedActionError, UnsupportedGoalError
 
 _DERIVE = "derive "  # with a blank, which no declared name contains
 

@@ -8,8 +8,8 @@ and bounds on numbers that actions change.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact, Value
@@ -38,9 +38,6 @@ from knowledge_base.language.syntax.text import to_text
 from planning.cancellable_work import WorkLimit
 from planning.quantities import OPPOSITE, Assignment, NumericBound, Quantity, combined
 from planning.strips import UnsupportedActionError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,38 +13,31 @@ The steps, in order:
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact
 from knowledge_base.language.checking.check import check
 from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.expression import Expression, Term
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import to_text
+from knowledge_base.pddl.problem_text import Metric
 from planning.cancellable_work import WorkLimit
-from planning.problem.assembly import Assembly
+from planning.domain import PlanningDomain
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, Some
-from planning.problem.constructs import refuse_unforeseeable
-from planning.problem.costs import ignored, metric_of
 from planning.problem.derived import derivation
+from planning.problem.expressions import names_of
 from planning.problem.grounding import Variant
-from planning.problem.operators import OperatorCache, OperatorIndex, numbered, things_of
-from planning.problem.reduction import Task, pruned
+from planning.problem.operators import OperatorCache, ignored, metric_of, numbered, things_of
+from planning.problem.reduction import pruned, spared
 from planning.problem.relaxed_reachability import reachable
-from planning.problem.relevance import Relevant, names_of, relevant
-from planning.problem.symmetry import spared
+from planning.problem.relevance import Relevant, refuse_unforeseeable, relevant
+from planning.problem.task import Assembly, Numbering, OperatorIndex, Task
 from planning.problem.temporal import build_temporal_problem, durative
 from planning.quantities import NumericBound
 from planning.strips import Problem, UnsupportedActionError, UnsupportedGoalError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from knowledge_base.language.evaluation.world import World
-    from knowledge_base.pddl.problem_text import Metric
-    from planning.domain import PlanningDomain
-    from planning.problem.numbering import Numbering
 
 # Names with blanks, which clash with no declared name.
 _ACTING, _FINISHED = Literal(Fact("still acting")), Literal(Fact("finished acting"))

@@ -7,14 +7,15 @@ support it.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import networkx as nx
 
 from knowledge_base.errors import SchemaError
-from knowledge_base.facts import Delta, Fact
+from knowledge_base.facts import Delta, Fact, Value
 from knowledge_base.language.evaluation.evaluator import query
+from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.effect import effect_conditions
 from knowledge_base.language.syntax.expression import (
     And,
@@ -33,17 +34,9 @@ from knowledge_base.language.syntax.expression import (
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.world.overlay import Overlay
-from planning.problem.relevance import changed, names_of
-from planning.problem.rewriting import instantiated, rewritten, type_test
+from planning.domain import Axiom, PlanningAction, PlanningDomain
+from planning.problem.expressions import changed, denied, instantiated, names_of, rewritten, type_test
 from planning.strips import UnsupportedActionError, UnsupportedGoalError
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
-
-    from knowledge_base.facts import Value
-    from knowledge_base.language.evaluation.world import World
-    from planning.domain import Axiom, PlanningAction, PlanningDomain
-
 
 _AXIOMS = "planners with axioms of their own, such as Fast Downward run by itself"
 
@@ -274,18 +267,3 @@ def _is_circle(component: frozenset[str], graph: nx.DiGraph[str]) -> bool:
 
 def _holds(fact: Fact, world: World) -> bool:
     return world.holds(fact.predicate, fact.args)
-
-
-def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
-    """Yield the atoms under an odd number of negations; with `wanted` false, under an even number."""
-    match e:
-        case Atom():
-            yield from () if wanted else (e,)
-        case Not(body):
-            yield from denied(body, wanted=not wanted)
-        case Imply(premise, conclusion):
-            yield from denied(premise, wanted=not wanted)
-            yield from denied(conclusion, wanted=wanted)
-        case _:
-            for part in parts_of(e):
-                yield from denied(part, wanted=wanted)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from knowledge_base.facts import Fact, Value
+from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.syntax.expression import And, Atom, Constant, Expression, Variable
+from planning.cancellable_work import WorkLimit
+from planning.domain import PlanningAction
 from planning.plan import PlanStep
 from planning.problem.conditions import (
     Every,
@@ -22,13 +25,6 @@ from planning.problem.conditions import (
 )
 from planning.quantities import Assignment, combined, fluents
 from planning.strips import UnsupportedActionError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-
-    from knowledge_base.language.checking.vocabulary import Vocabulary
-    from planning.cancellable_work import WorkLimit
-    from planning.domain import PlanningAction
 
 _MOST_CONDITIONS = 6  # of one ground action; each doubles the number of variants
 _MOST_ALTERNATIVES = 64

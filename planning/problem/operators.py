@@ -1,131 +1,36 @@
-"""Ground operators of a domain in numbers, found by relaxed reachability and kept from one problem to the next."""
+"""Ground operators of a domain with their costs, found by relaxed reachability and kept for the next problem."""
 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 from knowledge_base.facts import Content, Fact, Value
-from knowledge_base.language.checking.vocabulary import ROOT_TYPE
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Vocabulary
+from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.effect import ForEach, effect_conditions, effect_parts
-from knowledge_base.language.syntax.expression import Exists, Expression, Forall, Term, Variable, parts_of
+from knowledge_base.language.syntax.expression import (
+    Arithmetic,
+    Call,
+    Exists,
+    Expression,
+    Forall,
+    Term,
+    Variable,
+    parts_of,
+)
+from knowledge_base.language.syntax.text import to_text
+from knowledge_base.pddl.problem_text import TOTAL_TIME, Metric
 from planning.cancellable_work import WorkLimit
+from planning.domain import PlanningAction
 from planning.plan import PlanStep
 from planning.problem.conditions import Grounder
-from planning.problem.costs import Costs
+from planning.problem.expressions import names_of
 from planning.problem.grounding import JoinRule, ReachedFacts, Variant, joined_atoms, variants
-from planning.problem.numbering import Numbering
 from planning.problem.relevance import Relevant
-from planning.quantities import Assignment
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-
-    from knowledge_base.language.checking.vocabulary import Vocabulary
-    from knowledge_base.language.evaluation.world import World
-    from planning.domain import PlanningAction
-
-
-_T = TypeVar("_T")
-_MOST_KNOWN = 16
-
-
-class GroundOperator(NamedTuple):
-    """One variant of a ground action in numbers; a tuple, since each problem makes thousands.
-
-    Attributes:
-        step: the step; `None` for bookkeeping.
-        needs: literals and bounds that must hold before.
-        adds: literals that hold afterwards, and fluents that it changes.
-        deletes: literals that no longer hold afterwards.
-        assignments: the changes of these fluents.
-        cost: `None` if its change of the metric is not a cost.
-        number: an identity that the operator keeps when pruning removes parts of it.
-    """
-
-    step: PlanStep | None
-    needs: tuple[int, ...]
-    adds: tuple[int, ...]
-    deletes: tuple[int, ...]
-    assignments: tuple[Assignment, ...] = ()
-    cost: float | None = 1.0
-    number: int = -1
-
-
-Key = tuple[str, tuple[str, ...]] | None
-
-
-def key(step: PlanStep | None) -> Key:
-    """Return the step by value, which is hashed much faster than the step."""
-    return None if step is None else (step.action, step.args)
-
-
-class OperatorIndex:
-    """Ground operators in order, with indexes built on first use; positions refer to operators."""
-
-    def __init__(self, ways: Sequence[GroundOperator]) -> None:
-        self.all = ways
-        self._known: dict[Hashable, Any] = {}
-
-    def known(self, key: Hashable, work_out: Callable[[], _T]) -> _T:
-        """Return the cached result for `key`, or compute and cache it."""
-        found: _T = self._known.pop(key) if key in self._known else work_out()
-        self._known[key] = found  # the latest is evicted last
-        if len(self._known) > _MOST_KNOWN:
-            del self._known[next(iter(self._known))]
-        return found
-
-    @cached_property
-    def counts(self) -> Sequence[int]:
-        """The number of needs of each operator."""
-        return [len(way.needs) for way in self.all]
-
-    @cached_property
-    def users(self) -> Mapping[int, Sequence[int]]:
-        """Literal or bound -> the operators that need it."""
-        users: dict[int, list[int]] = {}
-        for i, way in enumerate(self.all):
-            for one in way.needs:
-                users.setdefault(one, []).append(i)
-        return users
-
-    @cached_property
-    def adders(self) -> Mapping[int, Sequence[int]]:
-        """Literal or fluent -> the operators that add or change it without needing it."""
-        adders: dict[int, list[int]] = {}
-        for i, way in enumerate(self.all):
-            for one in way.adds:
-                if one not in way.needs:
-                    adders.setdefault(one, []).append(i)
-        return adders
-
-    @cached_property
-    def touching(self) -> Mapping[int, Sequence[int]]:
-        """Literal, bound or fluent -> the operators that need, add, change or delete it."""
-        touching: dict[int, list[int]] = {}
-        for i, way in enumerate(self.all):
-            for one in {*way.needs, *way.adds, *way.deletes}:
-                touching.setdefault(one, []).append(i)
-        return touching
-
-    @cached_property
-    def naming(self) -> Mapping[str, Sequence[int]]:
-        """Object -> the operators whose steps name it."""
-        naming: dict[str, list[int]] = {}
-        for i, way in enumerate(self.all):
-            for name in set(way.step.args) if way.step else ():
-                naming.setdefault(name, []).append(i)
-        return naming
-
-    @cached_property
-    def of_step(self) -> Mapping[Key, Sequence[int]]:
-        """Step, see `key` -> its operators."""
-        of_step: dict[Key, list[int]] = {}
-        for i, way in enumerate(self.all):
-            of_step.setdefault(key(way.step), []).append(i)
-        return of_step
+from planning.problem.task import GroundOperator, Numbering, OperatorIndex
+from planning.quantities import Assignment, linear
 
 
 class Consulted:
@@ -319,3 +224,55 @@ def _ranges_over_all(action: PlanningAction, schema: Vocabulary) -> bool:
 
 def _quantified(e: Expression | Term) -> bool:
     return isinstance(e, Exists | Forall) or any(map(_quantified, parts_of(e)))
+
+
+TOTAL_COST = Call("total-cost")
+"""The sum of action costs in PDDL; the default metric of a domain that declares it."""
+
+
+def metric_of(metric: Metric | None, schema: Vocabulary) -> Term | None:
+    """Return the term to minimize: by default `(total-cost)`, if it is declared."""
+    if metric is not None:
+        return metric.term if metric.direction == "minimize" else Arithmetic("-", (metric.term,))
+    declared = schema.functions.get(TOTAL_COST.function)
+    return TOTAL_COST if declared is not None and declared.arity == 0 else None
+
+
+def ignored(metric: Term) -> str:
+    """Return the note for a metric that is not an action cost."""
+    if TOTAL_TIME.function in names_of(metric):
+        return f"the metric {to_text(metric)} is ignored: one action at a time is planned for without regard to time"
+    return f"the metric {to_text(metric)} is ignored: it is no sum of numbers that actions raise by fixed amounts"
+
+
+@dataclass(frozen=True, slots=True)
+class Costs:
+    """Action costs.
+
+    Attributes:
+        coefficients: factor of each numeric fluent in the metric; `None` if the metric is not a linear sum.
+    """
+
+    coefficients: Mapping[Fact, float] | None
+
+    @staticmethod
+    def of(metric: Term | None, grounder: Grounder) -> Costs | None:
+        """Return the costs by a metric; `None` without one."""
+        if metric is None:
+            return None
+        declared = grounder.world.schema.functions
+        known = all(name in declared for name in names_of(metric))  # PDDL has `total-time` without a declaration
+        return Costs(linear(grounder.quantity(metric, {})) if known else None)
+
+    def cost(self, assignments: Iterable[Assignment]) -> float | None:
+        """Return the cost of an action with these effects; `None` if its change of the metric is not a cost."""
+        if self.coefficients is None:
+            return None
+        total = 0.0
+        for one in assignments:
+            coefficient = self.coefficients.get(one.fluent, 0.0)
+            if coefficient and not (one.increase and isinstance(one.amount, int | float)):
+                return None
+            if coefficient and isinstance(one.amount, int | float):
+                total += coefficient * one.amount
+        return total if total >= 0 else None

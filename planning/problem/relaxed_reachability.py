@@ -8,17 +8,11 @@ from scratch if a bounded number of tests cannot decide.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from planning.problem.task import GroundOperator, Numbering, Task
 from planning.quantities import NumericBound, helps
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from planning.problem.numbering import Numbering
-    from planning.problem.operators import GroundOperator
-    from planning.problem.reduction import Task
 
 _GIVEN = -1  # instead of an operator: the fact holds initially
 _DEEPEST = 50

@@ -1,17 +1,20 @@
-"""Relevance for a goal (S1.5): the relevant actions, predicates and functions; exact, like `reduction`."""
+"""Relevance for a goal (S1.5; exact, like `reduction`), and relevant constructs that engines cannot plan with."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from knowledge_base.language.syntax.effect import Add, Delete, Effect, NumericEffect, effect_conditions, effect_leaves
-from knowledge_base.language.syntax.expression import Atom, Call, Constant, Expression, Term, Variable, parts_of
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
-
-    from planning.domain import PlanningAction
+from knowledge_base.errors import Place
+from knowledge_base.language.syntax.effect import Add, Delete, NumericEffect, effect_conditions, effect_leaves
+from knowledge_base.language.syntax.expression import Atom, Call, Comparison, Expression, Term, parts_of
+from knowledge_base.language.syntax.text import to_text
+from knowledge_base.world.schema import Schema
+from planning.domain import PlanningAction, PlanningDomain
+from planning.plan import NobodyCan
+from planning.problem.derived import derivation
+from planning.problem.expressions import changed, name_of, names_of
+from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,25 +68,108 @@ def _counted(metric: Term | None, leaves: Collection[Add | Delete | NumericEffec
     return own.union(_amounts(leaves, own))
 
 
-def names_of(e: Expression | Term) -> Iterator[str]:
-    """Yield the predicates, types and functions in an expression."""
-    agenda = [e]
-    while agenda:
-        one = agenda.pop()
-        if isinstance(one, Constant | Variable):
-            continue
-        if isinstance(one, Atom):
-            yield one.predicate
-        elif isinstance(one, Call):
-            yield one.function
-        agenda.extend(reversed(parts_of(one)))
+def refuse_unforeseeable(goal: Expression, actions: Iterable[PlanningAction], domain: PlanningDomain) -> None:
+    """Raise an error if the goal or a relevant action has a condition that no engine can foresee.
+
+    Raises:
+        UnsupportedGoalError, UnsupportedActionError: with the place and the condition.
+    """
+    schema = domain.schema
+    changing = frozenset[str]().union(*(changed(action.effect) for action in domain.actions.values()))
+    content = {name for name in changing & schema.functions.keys() if schema.result(name) != "number"}
+    if not content and not schema.computed:
+        return
+    for asked, why in _unforeseeable(goal, schema, changing, content):
+        raise UnsupportedGoalError(f"the goal asks for {why}", place=asked.place)
+    for action in actions:
+        for condition in (action.precondition, *effect_conditions(action.effect)):
+            for asked, why in _unforeseeable(condition, schema, changing, content):
+                raise UnsupportedActionError(f"planning action '{action.name}' asks for {why}", place=asked.place)
 
 
-def name_of(leaf: Add | Delete | NumericEffect) -> str:
-    """Return the predicate or function of a change."""
-    return leaf.call.function if isinstance(leaf, NumericEffect) else leaf.atom.predicate
+def _unforeseeable(
+    e: Expression, schema: Schema, changing: Collection[str], content: Collection[str]
+) -> Iterator[tuple[Expression, str]]:
+    for atom, read in _computed_from(e, schema, changing):
+        told = f"{to_text(atom)} reads {to_text(read)}"
+        yield atom, f"what is computed from something that planning actions change: {told}"
+    for part in _parts(e):
+        if isinstance(part, Comparison | Atom) and any(_name(inner) in content for inner in _parts(part)):
+            yield part, f"a value that planning actions change, and which is no number: {to_text(part)}"
 
 
-def changed(effect: Effect) -> frozenset[str]:
-    """Return the predicates and functions that an effect changes."""
-    return frozenset(map(name_of, effect_leaves(effect)))
+def _computed_from(
+    e: Expression | Term, schema: Schema, changing: Collection[str]
+) -> Iterator[tuple[Atom, Expression | Term]]:
+    """Yield the computed atoms in `e`, each with the expressions it reads from `changing`."""
+    if isinstance(e, Atom) and e.predicate in schema.computed:
+        for read in schema.computed[e.predicate].inputs(e.args):
+            yield from ((e, part) for part in _parts(read) if _name(part) in changing)
+            yield from ((e, inner) for _, inner in _computed_from(read, schema, changing))
+    for part in parts_of(e):
+        yield from _computed_from(part, schema, changing)
+
+
+def _parts(e: Expression | Term) -> Iterator[Expression | Term]:
+    yield e
+    for part in parts_of(e):
+        yield from _parts(part)
+
+
+def _name(e: Expression | Term) -> str | None:
+    """Return the function or predicate of the expression."""
+    return e.function if isinstance(e, Call) else e.predicate if isinstance(e, Atom) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Construct:
+    """A condition on numbers that actions change.
+
+    Attributes:
+        owner: `the goal`, or the planning action with the condition.
+        text: the condition, in PDDL.
+        place: its place in the source file.
+    """
+
+    owner: str
+    text: str
+    place: Place | None
+
+    def __str__(self) -> str:
+        """One line: `jars.pddl:7:9: planning action 'pour' compares numbers that actions change: (> (litres ?a) 0)`."""
+        said = f"{self.owner} compares numbers that actions change: {self.text}"
+        return f"{self.place}: {said}" if self.place else said
+
+
+def numeric_constructs(domain: PlanningDomain, goal: Expression) -> Iterator[Construct]:
+    """Yield the numeric conditions relevant to `goal`: the goal's own first, then those of actions."""
+    derived = derivation(domain)
+    goal = derived.expand(goal)
+    matters = relevant(goal, None, derived.domain.actions.values())
+    conditions = [("the goal", goal)]
+    for action in matters.actions:
+        owned = (action.precondition, *effect_conditions(action.effect))
+        conditions += [(f"planning action '{action.name}'", one) for one in owned]
+    for owner, condition in conditions:
+        for comparison in _comparisons(condition):
+            if not matters.changing.isdisjoint(names_of(comparison)):
+                yield Construct(owner, to_text(comparison), comparison.place)
+
+
+def why_no_engine(domain: PlanningDomain, goal: Expression, nobody: NobodyCan) -> str:
+    """Return in one line the construct that no installed engine supports, its place, and an engine to install.
+
+    Args:
+        domain: the planning domain.
+        goal: the condition to reach.
+        nobody: the engine selection's answer.
+    """
+    construct = next(numeric_constructs(domain, goal), None)
+    return nobody.message if construct is None else f"{construct}; {nobody.who}"
+
+
+def _comparisons(e: Expression | Term) -> Iterator[Comparison]:
+    if isinstance(e, Comparison):
+        yield e
+    for part in parts_of(e):
+        yield from _comparisons(part)

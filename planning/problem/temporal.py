@@ -8,32 +8,26 @@ relaxation cannot prove that.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
-from knowledge_base.facts import Fact
+from knowledge_base.facts import Fact, Value
 from knowledge_base.language.evaluation.evaluator import evaluate_term
 from knowledge_base.language.evaluation.terms import as_number
+from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.effect import AllOf
 from knowledge_base.language.syntax.expression import And, Expression
+from planning.cancellable_work import WorkLimit
+from planning.domain import PlanningAction, PlanningDomain
 from planning.plan import PlanStep
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, alternatives
+from planning.problem.expressions import changed
 from planning.problem.grounding import Variant, variants
-from planning.problem.numbering import NOT, as_fact
-from planning.problem.operators import GroundOperator, OperatorCache, OperatorIndex
-from planning.problem.reduction import Task
+from planning.problem.operators import OperatorCache
 from planning.problem.relaxed_reachability import reachable
-from planning.problem.relevance import changed, relevant
+from planning.problem.relevance import Relevant, relevant
+from planning.problem.task import NOT, GroundOperator, OperatorIndex, Task, as_fact
 from planning.strips import ActionSpan, GroundAction, Problem, UnsupportedActionError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-
-    from knowledge_base.facts import Value
-    from knowledge_base.language.evaluation.world import World
-    from planning.cancellable_work import WorkLimit
-    from planning.domain import PlanningAction, PlanningDomain
-    from planning.problem.relevance import Relevant
 
 LONGEST = 1e6
 """Upper bound in seconds of an action whose domain sets none."""

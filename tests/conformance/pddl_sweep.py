@@ -44,7 +44,7 @@ from planning.plan import (
     TimedOut,
 )
 from planning.problem.construction import build_problem
-from planning.problem.constructs import why_no_engine
+from planning.problem.relevance import why_no_engine
 from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 PAGE = Path(__file__).parents[2] / "docs" / "pddl.md"

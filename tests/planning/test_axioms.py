@@ -15,7 +15,7 @@ from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
-from planning.explanation.unsolvability import why_unsolvable
+from planning.explanation import why_unsolvable
 from planning.plan import PlanStep
 from planning.problem.axioms import Derivable
 from planning.problem.derived import derivation

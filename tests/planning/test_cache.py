@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from fake_engines import FIRST, GOAL, PROBLEM, SECOND, START
 
-from planning.engines.cache import CachingPlanner
+from planning.engines.race import CachingPlanner
 from planning.plan import Plan, PlanFound, ProvenUnsolvable, TimedOut
 from planning.strips import Problem
 

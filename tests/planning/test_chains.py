@@ -5,8 +5,7 @@ from itertools import combinations, pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planning.ordering.chains import chains
-from planning.ordering.partial_order import PartialOrder
+from planning.ordering.partial_order import PartialOrder, chains
 from planning.plan import PlanStep
 
 

@@ -7,7 +7,7 @@ from knowledge_base.language.syntax.text import parse_condition
 from planning import Executive
 from planning.domain import PlanningDomain
 from planning.plan import NobodyCan
-from planning.problem.constructs import numeric_constructs, why_no_engine
+from planning.problem.relevance import numeric_constructs, why_no_engine
 
 JARS = """(define (domain jars) (:types jar)
   (:predicates (sealed ?j - jar) (full ?j - jar) (washed ?j - jar))

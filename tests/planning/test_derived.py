@@ -13,7 +13,7 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
-from planning.explanation.unsolvability import why_unsolvable
+from planning.explanation import why_unsolvable
 from planning.plan import Plan, PlanStep
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation

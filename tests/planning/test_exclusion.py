@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from knowledge_base.facts import Fact
 from planning.cancellable_work import WorkLimit
-from planning.explanation.mutexes import goal_mutexes
+from planning.explanation import goal_mutexes
 from planning.plan import PlanStep
 from planning.strips import GroundAction, Problem
 

@@ -6,7 +6,7 @@ from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning.domain import PlanningDomain
-from planning.explanation.unsolvability import why_unsolvable
+from planning.explanation import why_unsolvable
 from planning.problem.construction import build_problem
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")

@@ -4,7 +4,8 @@ import pytest
 
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.text import parse_condition
-from planning.ordering.purposes import purposes
+from planning.ordering.causal_tracing import deordered
+from planning.ordering.partial_order import why
 from planning.plan import Plan, PlanStep
 
 GOAL = parse_condition("(and (tidy cup1) (hand-free))")
@@ -13,6 +14,11 @@ GOAL = parse_condition("(and (tidy cup1) (hand-free))")
 def steps(*texts):
     words = (text.split() for text in texts)
     return tuple(PlanStep(name, tuple(args)) for name, *args in words)
+
+
+def purposes(plan, *of):
+    order = deordered(plan, *of)
+    return [why(order, number) for number in range(1, len(plan.steps) + 1)]
 
 
 def test_every_step_says_what_it_brings_about_for_whom_and_what_that_serves(clean_up, table):

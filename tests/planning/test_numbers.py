@@ -14,7 +14,7 @@ from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.engines.request import read, written
-from planning.explanation.unsolvability import why_unsolvable
+from planning.explanation import why_unsolvable
 from planning.plan import PlanStep
 from planning.problem.construction import build_problem
 from planning.quantities import Assignment, NumericBound, Operation, linear, text

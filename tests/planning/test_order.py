@@ -13,7 +13,8 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
-from planning.ordering.partial_order import PartialOrder, causal_links, deordered, reduced, standing
+from planning.ordering.causal_tracing import causal_links, deordered
+from planning.ordering.partial_order import PartialOrder, reduced, standing
 from planning.plan import Plan, PlanStep
 from planning.validation import validate
 

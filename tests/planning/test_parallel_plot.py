@@ -11,7 +11,8 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning import Executive, Plan, PlanningDomain, PlanStep, plot_from_plan
 from planning.generation.carried_steps import fitting, usage
-from planning.ordering.partial_order import PartialOrder, deordered
+from planning.ordering.causal_tracing import deordered
+from planning.ordering.partial_order import PartialOrder
 from planning.plan import PlanFound, Timing
 
 DOMAIN = PlanningDomain.parse("""

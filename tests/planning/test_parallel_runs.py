@@ -11,7 +11,7 @@ from dsc.trace import Record
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning import Executive, PlanStep, plot_from_plan
-from planning.ordering.partial_order import deordered
+from planning.ordering.causal_tracing import deordered
 
 
 class Everybody(Component):

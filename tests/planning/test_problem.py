@@ -18,7 +18,7 @@ from knowledge_base.world.computation import computed
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.engines.request import read, written
-from planning.explanation.unsolvability import why_unsolvable
+from planning.explanation import why_unsolvable
 from planning.plan import PlanStep
 from planning.problem.conditions import Grounder
 from planning.problem.construction import ProblemBuilder, build_problem

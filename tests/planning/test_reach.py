@@ -8,9 +8,9 @@ from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.problem.construction import ProblemBuilder
-from planning.problem.operators import OperatorIndex
-from planning.problem.reduction import Task, pruned
+from planning.problem.reduction import pruned
 from planning.problem.relaxed_reachability import reachable
+from planning.problem.task import OperatorIndex, Task
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain boxes) (:types place box)

@@ -6,7 +6,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning.domain import PlanningDomain
-from planning.ordering.purposes import purposes
+from planning.ordering.partial_order import why
 from planning.ordering.timed_links import linked
 from planning.plan import Plan, PlanStep, Timing
 
@@ -53,10 +53,9 @@ def test_what_must_hold_all_the_time_is_provided_by_who_has_begun(cellar):
 
 def test_a_later_step_may_provide_what_an_earlier_one_needs_at_its_end(cellar):
     plan, goal = timed(("air", 0, 4), ("unlatch", 1, 0)), parse_condition("(aired)")
-    assert [str(link) for link in linked(plan, CELLAR, cellar, goal).links if link.provider] == [
-        "2 -(open)-> 1", "1 -(aired)-> 3",
-    ]  # fmt: skip
-    assert list(map(str, purposes(plan, CELLAR, cellar, goal))) == [
+    order = linked(plan, CELLAR, cellar, goal)
+    assert [str(link) for link in order.links if link.provider] == ["2 -(open)-> 1", "1 -(aired)-> 3"]
+    assert [str(why(order, number)) for number in (1, 2)] == [
         "1 (air): (aired) for the goal", "2 (unlatch): (open) for step 1; serves (aired)",
     ]  # fmt: skip
 

@@ -17,7 +17,8 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.expression import And, Not, substitute
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
-from planning.ordering.partial_order import causal_links, standing
+from planning.ordering.causal_tracing import causal_links
+from planning.ordering.partial_order import standing
 from planning.plan import Plan, PlanStep
 
 STATE = re.compile(r"(?:.*/)?(step|after)_(\d+)")

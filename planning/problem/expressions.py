@@ -1,18 +1,28 @@
-"""Substitution: conditions of actions by other conditions, and variables of conditions by terms."""
+"""Expressions of a domain: the names they read and change, and substitution in them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES
-from knowledge_base.language.syntax.effect import AllOf, Effect, ForEach, When
+from knowledge_base.language.syntax.effect import (
+    Add,
+    AllOf,
+    Delete,
+    Effect,
+    ForEach,
+    NumericEffect,
+    When,
+    effect_leaves,
+)
 from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
     Atom,
     Call,
     Comparison,
+    Constant,
     Exists,
     Expression,
     Forall,
@@ -23,12 +33,48 @@ from knowledge_base.language.syntax.expression import (
     TypedVariable,
     Variable,
     free_variables,
+    parts_of,
 )
+from planning.domain import PlanningAction
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
-    from planning.domain import PlanningAction
+def names_of(e: Expression | Term) -> Iterator[str]:
+    """Yield the predicates, types and functions in an expression."""
+    agenda = [e]
+    while agenda:
+        one = agenda.pop()
+        if isinstance(one, Constant | Variable):
+            continue
+        if isinstance(one, Atom):
+            yield one.predicate
+        elif isinstance(one, Call):
+            yield one.function
+        agenda.extend(reversed(parts_of(one)))
+
+
+def name_of(leaf: Add | Delete | NumericEffect) -> str:
+    """Return the predicate or function of a change."""
+    return leaf.call.function if isinstance(leaf, NumericEffect) else leaf.atom.predicate
+
+
+def changed(effect: Effect) -> frozenset[str]:
+    """Return the predicates and functions that an effect changes."""
+    return frozenset(map(name_of, effect_leaves(effect)))
+
+
+def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
+    """Yield the atoms under an odd number of negations; with `wanted` false, under an even number."""
+    match e:
+        case Atom():
+            yield from () if wanted else (e,)
+        case Not(body):
+            yield from denied(body, wanted=not wanted)
+        case Imply(premise, conclusion):
+            yield from denied(premise, wanted=not wanted)
+            yield from denied(conclusion, wanted=wanted)
+        case _:
+            for part in parts_of(e):
+                yield from denied(part, wanted=wanted)
 
 
 def rewritten(action: PlanningAction, rewrite: Callable[[Expression], Expression]) -> PlanningAction:
