@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dsc.components.component import Component
-from dsc.components.parameters import changed, check_relations, known, require_bound
+from dsc.components.parameters import known
 from dsc.model.plot import ActionPlot
 from dsc.model.ranges import refuse_change
 from dsc.text.profiles import Profile
@@ -32,8 +32,7 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
             raise _unknown(profile, "components", "component", name, by_name)
     values = {name: _configured(component, profile) for name, component in by_name.items()}
     for name, component in by_name.items():
-        component.parameters.clear()
-        component.parameters.update(values[name])
+        component.parameters.replace(values[name])
 
 
 def adapted(plots: Iterable[ActionPlot], profile: Profile | None = None) -> tuple[ActionPlot, ...]:
@@ -58,19 +57,16 @@ def _configured(component: Component, profile: Profile | None) -> dict[str, Valu
     for parameter, value in settings.items():
         try:
             declared = known(component.name, parameter, component.declares)
-            declared.check(f"{component.name}.{parameter}", value)
+            declared.range.check(f"{component.name}.{parameter}", value)
             refuse_change(f"{component.name}.{parameter}", "profile", declared.changed_by)
         except InputError as error:
             error.place = None if profile is None else profile.place(("components", component.name, parameter))
             raise
     try:
-        values = changed(component.name, component.declares, component.parameters, settings)
-        require_bound(component.name, component.declares, values)
-        check_relations(component.name, component.relations, values)
+        return component.parameters.after(settings)
     except InputError as error:
         error.place = None if profile is None else profile.place(("components", component.name))
         raise
-    return values
 
 
 def _adapted(plot: ActionPlot, profile: Profile) -> ActionPlot:

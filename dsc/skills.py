@@ -17,7 +17,7 @@ import inspect
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal, Protocol, TypeVar, cast
+from typing import Any, Literal, TypeVar, cast
 
 from dsc.blocking import in_process, in_thread
 from dsc.calls import Outcome, SkillCall
@@ -60,17 +60,7 @@ class SkillSignature:
     after_crash: AfterCrash = "sense"
 
 
-class Skilled(Protocol):
-    """The owner of a skill's body, as decorators see it.
-
-    Attributes:
-        name: how charts address it.
-    """
-
-    name: str
-
-
-CarryOut = Callable[[Skilled, SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
+CarryOut = Callable[[Any, SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
 """How a decorated body is made to act: the component, the bound body, the call, the arguments."""
 
 
@@ -145,18 +135,18 @@ def require_names(declared: object, what: str, example: str) -> None:
         raise InputError(f"{what} are a mapping of names, as in {example}, not {shown(declared)}")
 
 
-async def _awaited(_: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _awaited(_: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     coming = body(call, **arguments)
     if not inspect.isawaitable(coming):
         raise SchemaError("it is no coroutine: write `async def`, or say that it is `blocking`")
     return cast(Outcome, await coming)
 
 
-async def _in_thread(_: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _in_thread(_: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     return await in_thread(body, call, arguments)
 
 
-async def _in_process(component: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _in_process(component: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     return await in_process(body, component.name, call, arguments)
 
 

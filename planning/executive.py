@@ -14,8 +14,7 @@ from typing import Any, Self
 from pydantic import ValidationError
 
 from dsc.components.component import Component
-from dsc.components.robot import require_deployed, require_instances
-from dsc.components.streams import require_wired
+from dsc.components.robot import require_deployed, require_instances, require_wired
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot

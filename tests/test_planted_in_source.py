@@ -17,8 +17,8 @@ import pytest
 from dsc.calls import Outcome, SkillCall, Status
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, LocalTransport, encoded
-from dsc.components.hosted import HostedActions
-from dsc.components.remote import Host, RemoteComponent
+from dsc.components.host import Host, HostedActions
+from dsc.components.remote import RemoteComponent
 from dsc.dynamic.library import Library
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
@@ -236,7 +236,7 @@ BUGS = {
     "a stop does not wait": (
         HostedActions, "_stop", "await asyncio.wait([action.task])", "pass", stopping_is_over_when_things_are_in_order),
     "a host forgets nothing": (
-        RemoteComponent, "forget", 'await self._ask("stop", self._key(action_id))', "pass",
+        RemoteComponent, "forget", 'await self._ask_about(action_id, "stop")', "pass",
         what_is_forgotten_here_is_forgotten_there),
     "an answer is settled before the commit": (
         Sequencer, "_take", "\n    if self.store is None:", SETTLED, an_end_is_forgotten_only_when_it_is_kept),

@@ -25,7 +25,7 @@ from py_trees.decorators import Repeat, Retry
 
 from dsc.calls import Outcome, SkillCall
 from dsc.components.hooks import contained
-from dsc.skills import AfterCrash, Declared, SkillBody, Skilled, require_names
+from dsc.skills import AfterCrash, Declared, SkillBody, require_names
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
 from knowledge_base.language.checking.inputs import shown
@@ -67,7 +67,7 @@ def tree_skill(
     for end in (success, failure):
         _require_bare(end, outcomes)
 
-    async def carry_out(_: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    async def carry_out(_: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
         _observe.set(call.observe)
         root: Behaviour = body(call, **arguments)
         try:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
-from dsc.model.ranges import Range, Who, written
+from dsc.model.ranges import Range, Who, refuse_change, written
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.evaluation.evaluator import evaluate_term, holds
@@ -20,22 +21,24 @@ from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 Type = Literal["number", "text", "boolean"]
+_term = cache(parse_term)
+_NOTHING = Overlay(WorldState(Schema()))
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """What the builder of a component says about one parameter.
+    """The declaration of one parameter by the component's builder.
 
     Attributes:
         type: `number`, `text` (any word) or `boolean`.
-        default: its value as long as nobody says another; without one, a profile has to.
+        default: its value until another one is set; without a default, a profile must set it.
         least, most: the range of a number.
-        among: the values of which it is one; empty means any.
-        changed_by: who may change it, each one also what those after it may: `nobody`; a `profile`, before a run; an
-            `operator`, while it goes on; the `rules` of plots, when something has gone wrong; `plots` anywhere.
-        follows: in place of a default, a term over other parameters, as `(* 0.5 ?cycle)`.
-        depends_on: parameters on whose values this one's relies, besides those that it follows. When one of them is
-            said anew, what was said of this one is void: it has its default again, follows anew, or has no value.
+        among: the permitted values; empty means any.
+        changed_by: the role that may change it, each with the rights of those before it: `nobody`; a `profile`, before
+            a run; an `operator`, during a run; the `rules` of plots, after a failure; `plots` anywhere.
+        follows: instead of a default, a term over other parameters, as `(* 0.5 ?cycle)`.
+        depends_on: parameters that its value depends on, besides those that it follows. A new value of one of them
+            resets it: to its default, to the value of its term, or to no value.
     """
 
     type: Type
@@ -49,11 +52,11 @@ class Parameter:
 
     @property
     def reasons(self) -> frozenset[str]:
-        """The parameters on which its value relies."""
+        """The parameters that its value depends on."""
         return frozenset(self.depends_on) | (free_variables(_term(self.follows)) if self.follows else frozenset())
 
-    def unsaid(self, values: Mapping[str, Value]) -> Value | None:
-        """What it is worth if nobody says it, given the values of others; `None` if it has no value then."""
+    def unset(self, values: Mapping[str, Value]) -> Value | None:
+        """Its value while no role has set one, given the values of others; `None` if it has no value then."""
         if self.follows is None:
             return self.default
         term = _term(self.follows)
@@ -64,128 +67,163 @@ class Parameter:
 
     @property
     def range(self) -> Range:
-        """The values that it may have."""
+        """Its permitted values."""
         return Range(self.type, self.least, self.most, self.among)
 
-    def check(self, name: str, value: object) -> Value:
-        """The value, if it fits; see `Range.check`."""
-        return self.range.check(name, value)
 
-
-def in_order(declared: Mapping[str, Parameter]) -> tuple[str, ...]:
-    """The names, those first on whose values others rely; raises `graphlib.CycleError`."""
-    return tuple(TopologicalSorter({name: one.reasons for name, one in declared.items()}).static_order())
-
-
-def unsaid(declared: Mapping[str, Parameter]) -> dict[str, Value]:
-    """What parameters are worth when nobody has said anything, as far as they have a value then."""
-    values: dict[str, Value] = {}
-    for name in in_order(declared):
-        value = declared[name].unsaid(values)
-        if value is not None:
-            values[name] = value
-    return values
-
-
-def changed(
-    component: str, declared: Mapping[str, Parameter], values: Mapping[str, Value], said: Mapping[str, Value | None]
-) -> dict[str, Value]:
-    """What all parameters are worth after some have been said anew.
-
-    What relies on one of these is unbound, unless it has been said as well (S1.11). That goes for the same value said
-    again, too: so what is so follows from what was said last of each, in order, and is the same after a restart.
+class Parameters(dict[str, Any]):
+    """The present values of one component's parameters.
 
     Args:
         component: its name, for messages.
-        declared: what its builder says.
-        values: what was so.
-        said: what is so now; `None` takes back what was said.
-
-    Raises:
-        InputError: a value does not fit what is declared, or one that follows does not.
+        declared: the declarations; if empty, any name is valid.
+        relations: conditions over the parameters, as `(<= ?speed (* 0.5 ?cycle))`; each holds as soon as its
+            parameters have values.
     """
-    found, others = dict(values), set[str]()
-    for name in in_order(declared):
-        parameter, word = declared[name], said.get(name)
-        if name not in said and others.isdisjoint(parameter.reasons):
-            continue
-        value = parameter.unsaid(found) if word is None else word
-        if value is None:
-            found.pop(name, None)
-        else:
-            found[name] = parameter.check(f"{component}.{name}", value)
-        others.add(name)
-    return found
 
+    def __init__(self, component: str, declared: Mapping[str, Parameter], relations: Iterable[str]) -> None:
+        super().__init__(_changed(component, declared, {}, dict.fromkeys(declared)))
+        self._component = component
+        self._declared = dict(declared)
+        self._relations = tuple(relations)
+        self._as_one_set = False
 
-def require_bound(component: str, declared: Mapping[str, Parameter], values: Mapping[str, Value]) -> None:
-    """Raise `SchemaError` if a parameter has no value; the message says whose it is to say, and why it is missing."""
-    for name, parameter in declared.items():
-        if name not in values:
-            raise SchemaError(f"'{component}.{name}' has no value: {_whose(parameter)}", found=name)
+    def configure(self, name: str, value: Any) -> None:
+        """Set a parameter; `None` resets a declared one.
 
+        Raises:
+            UnknownNameError: the component declares its parameters, and this is not among them.
+            InputError: the value violates its declaration or a relation.
+        """
+        after = self._after(self, {name: value})
+        if not self._as_one_set:
+            self._check_relations(after)
+        self.replace(after)
 
-def _whose(parameter: Parameter) -> str:
-    reasons = ", ".join(f"'{name}'" for name in sorted(parameter.reasons))
-    told = "its builder leaves it to a profile"
-    return told if not reasons else f"{told}, and what is said of it is void when {reasons} is said anew"
+    @contextmanager
+    def as_one_set(self, values: Mapping[str, Any]) -> Iterator[None]:
+        """Validate values as one set; inside, `configure` validates no relations. Raises as `configure`."""
+        after: Mapping[str, Any] = self
+        for name, value in values.items():
+            after = self._after(after, {name: value})
+        self._check_relations(after)
+        self._as_one_set = True
+        try:
+            yield
+        finally:
+            self._as_one_set = False
+
+    def check(self, name: str, value: Any, who: Who) -> None:
+        """Validate a value of a declared parameter without setting it; raises as `configure`, or if `who` may not."""
+        refuse_change(f"{self._component}.{name}", who, known(self._component, name, self._declared).changed_by)
+        self._check_relations(self._after(self, {name: value}))
+
+    def after(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """The values after the settings of a profile.
+
+        Raises:
+            SchemaError: a parameter has no value, a setting violates its declaration, or a relation does not hold.
+        """
+        found = self._after(self, settings)
+        self._require_bound(found)
+        self._check_relations(found)
+        return found
+
+    def replace(self, values: Mapping[str, Any]) -> None:
+        """Set all values without validation."""
+        found = dict(values)
+        self.clear()
+        self.update(found)
+
+    def require_bound(self) -> None:
+        """Raise `SchemaError` if a declared parameter has no value; the message has the reason."""
+        self._require_bound(self)
+
+    def _require_bound(self, values: Mapping[str, Any]) -> None:
+        for name, parameter in self._declared.items():
+            if name not in values:
+                reasons = ", ".join(f"'{reason}'" for reason in sorted(parameter.reasons))
+                reset = f", and a new value of {reasons} resets it" if reasons else ""
+                message = f"'{self._component}.{name}' has no value: its builder leaves it to a profile{reset}"
+                raise SchemaError(message, found=name)
+
+    def _after(self, values: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+        if not self._declared:
+            return {**values, **settings}
+        for name in settings:
+            known(self._component, name, self._declared)
+        return _changed(self._component, self._declared, values, settings)
+
+    def _check_relations(self, values: Mapping[str, Any]) -> None:
+        for text in self._relations:
+            condition = parse_condition(text)
+            read = sorted(free_variables(condition))
+            if all(name in values for name in read) and not holds(condition, _NOTHING, values):
+                found = ", ".join(f"{name} is {written(values[name])}" for name in read)
+                raise SchemaError(f"component '{self._component}' needs {text}, but {found}")
 
 
 def known(component: str, name: str, declared: Mapping[str, Parameter]) -> Parameter:
-    """What is declared about a parameter.
-
-    Raises:
-        UnknownNameError: the component has none of that name.
-    """
+    """The declaration of a parameter; raises `UnknownNameError` if there is none."""
     if name not in declared:
         message = f"component '{component}' has no parameter '{name}'"
         raise UnknownNameError(message, found=name, valid=declared)
     return declared[name]
 
 
-def check_relations(component: str, relations: Iterable[str], values: Mapping[str, Value]) -> None:
-    """Relations between the parameters of a component; those about a parameter without value say nothing yet.
+def _changed(
+    component: str, declared: Mapping[str, Parameter], values: Mapping[str, Value], settings: Mapping[str, Value | None]
+) -> dict[str, Value]:
+    """The values of all parameters after new settings; `None` resets one.
 
-    Args:
-        component: its name, for messages.
-        relations: conditions over its parameters, as `(<= ?speed (* 0.5 ?cycle))`.
-        values: the parameters that have a value.
+    A parameter that depends on one of them is reset, unless it has a new setting, too (S1.11). The same value set again
+    resets dependent ones, too. So the last settings, in order, determine all values, also after a restart.
 
     Raises:
-        SchemaError: one does not hold; the message has the values.
+        InputError: a value violates its declaration, also one that follows.
     """
-    for text in relations:
-        condition = parse_condition(text)
-        read = sorted(free_variables(condition))
-        if all(name in values for name in read) and not holds(condition, _NOTHING, values):
-            said = ", ".join(f"{name} is {written(values[name])}" for name in read)
-            raise SchemaError(f"component '{component}' needs {text}, but {said}")
-
-
-_term = cache(parse_term)
-_NOTHING = Overlay(WorldState(Schema()))
+    found, others = dict(values), set[str]()
+    reasons = {name: parameter.reasons for name, parameter in declared.items()}
+    for name in TopologicalSorter(reasons).static_order():
+        parameter, setting = declared[name], settings.get(name)
+        if name not in settings and others.isdisjoint(reasons[name]):
+            continue
+        value = parameter.unset(found) if setting is None else setting
+        if value is None:
+            found.pop(name, None)
+        else:
+            found[name] = parameter.range.check(f"{component}.{name}", value)
+        others.add(name)
+    return found
 
 
 def check_declarations(
     component: str, declares: Mapping[str, Parameter], relations: Iterable[str], module: str = ""
 ) -> None:
-    """Refuse what cannot be meant.
+    """Validate the declarations of a component class.
 
     Args:
         component: its name, for messages.
         declares: the parameters by name.
         relations: conditions between them.
-        module: where the class is written, for messages.
+        module: the module of the class, for messages.
 
     Raises:
-        InputError: a type, `changed_by` or name in a relation is unknown, a range has no values, a default is not in
-            it, or a relation is no condition. The message has the file, the parameter, what was found and the nearest
-            name.
+        InputError: a type, `changed_by` or name in a relation is unknown, a range has no values, a default is outside
+            it, or a relation is not a condition. The message has the file, the parameter, the value found and the
+            nearest name.
     """
     try:
         for name, parameter in declares.items():
             _check_parameter(f"{component}.{name}", parameter)
-        _check_dependencies(component, declares)
+            _check_dependencies(f"{component}.{name}", parameter, declares)
+        try:
+            _changed(component, declares, {}, dict.fromkeys(declares))
+        except CycleError as error:
+            cycle = ", ".join(f"'{name}'" for name in error.args[1])
+            raise SchemaError(
+                f"parameters of component '{component}' depend on each other in a cycle: {cycle}"
+            ) from error
         _check_relations(component, declares, relations)
     except InputError as error:
         file = getattr(sys.modules.get(module), "__file__", None)
@@ -195,10 +233,10 @@ def check_declarations(
 
 def _check_parameter(name: str, parameter: Parameter) -> None:
     if parameter.type not in get_args(Type):
-        message = f"the type of parameter '{name}' is '{parameter.type}', which is none"
+        message = f"the type of parameter '{name}' is '{parameter.type}', which does not exist"
         raise UnknownNameError(message, found=str(parameter.type), valid=get_args(Type))
     if parameter.changed_by not in get_args(Who):
-        message = f"parameter '{name}' is changed by '{parameter.changed_by}', which is nobody's role"
+        message = f"parameter '{name}' is changed by '{parameter.changed_by}', which is not a role"
         raise UnknownNameError(message, found=str(parameter.changed_by), valid=get_args(Who))
     for problem in parameter.range.problems():
         raise SchemaError(f"parameter '{name}': {problem}")
@@ -206,7 +244,7 @@ def _check_parameter(name: str, parameter: Parameter) -> None:
         raise SchemaError(f"parameter '{name}' has a default and follows from others; only one of both can be")
     if parameter.default is not None:
         try:
-            parameter.check(name, parameter.default)
+            parameter.range.check(name, parameter.default)
         except InputError as error:
             found = written(parameter.default)
             raise SchemaError(
@@ -215,25 +253,17 @@ def _check_parameter(name: str, parameter: Parameter) -> None:
             ) from error  # fmt: skip
 
 
-def _check_dependencies(component: str, declares: Mapping[str, Parameter]) -> None:
-    for name, parameter in declares.items():
-        full = f"{component}.{name}"
-        if isinstance(parameter.depends_on, str):
-            raise SchemaError(f"`depends_on` of parameter '{full}' is a tuple of names, not one text")
-        try:
-            reasons = parameter.reasons
-        except InputError as error:
-            raise SchemaError(f"what parameter '{full}' follows, {parameter.follows}, is no term: {error}") from error
-        for reason in sorted(reasons - set(declares)):
-            message = f"parameter '{full}' relies on '{reason}', which is not declared"
-            raise UnknownNameError(message, found=reason, valid=declares)
+def _check_dependencies(name: str, parameter: Parameter, declares: Mapping[str, Parameter]) -> None:
+    if isinstance(parameter.depends_on, str):
+        raise SchemaError(f"`depends_on` of parameter '{name}' is a tuple of names, not one text")
     try:
-        values = unsaid(declares)
-    except CycleError as error:
-        round_ = ", ".join(f"'{name}'" for name in error.args[1])
-        raise SchemaError(f"parameters of component '{component}' rely on each other in a circle: {round_}") from error
-    for name, value in values.items():
-        declares[name].check(f"{component}.{name}", value)
+        reasons = parameter.reasons
+    except InputError as error:
+        raise SchemaError(f"`follows` of parameter '{name}', {parameter.follows}, is not a term: {error}") from error
+    for reason in sorted(reasons - set(declares)):
+        raise UnknownNameError(
+            f"parameter '{name}' depends on '{reason}', which is not declared", found=reason, valid=declares
+        )
 
 
 def _check_relations(component: str, declares: Mapping[str, Parameter], relations: Iterable[str]) -> None:
@@ -243,7 +273,7 @@ def _check_relations(component: str, declares: Mapping[str, Parameter], relation
         try:
             condition = parse_condition(text)
         except InputError as error:
-            raise SchemaError(f"the relation {text} of component '{component}' is no condition: {error}") from error
+            raise SchemaError(f"the relation {text} of component '{component}' is not a condition: {error}") from error
         for name in sorted(free_variables(condition) - set(declares)):
             message = f"the relation {text} of component '{component}' reads '?{name}', which it does not declare"
             raise UnknownNameError(message, found=name, valid=declares)

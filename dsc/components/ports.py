@@ -1,4 +1,4 @@
-"""Ports of a component besides its skills: events, queries, one-way messages (S1.1). Charts reach all of them.
+"""Ports of a component next to its skills: events, queries and one-way messages, as decorators (S1.1).
 
     class Battery(Component):
         @event({"level": "number"})
@@ -11,30 +11,35 @@
         @takes
         async def calibrate(self, full: float) -> None: ...
 
-`self.update("low", 17.5)` puts a new value before everybody who has activated the event.
+`self.update("low", 17.5)` tests a new value for each activation of the event.
 """
 
 from __future__ import annotations
 
 import asyncio
 import inspect
-from collections.abc import Callable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from dsc.calls import Outcome, SkillCall
-from dsc.components.component import TAKES, Component
 from dsc.components.hooks import contained
-from dsc.skills import Declared, SkillBody, Skilled, require_names
+from dsc.skills import Declared, SkillBody, require_names
 
 ANSWERED = "answered"
 """The outcome of a query; its attributes are the answer."""
+TAKES = "__dsc_takes__"
+"""The attribute in which `takes` notes its declaration."""
 _Body = TypeVar("_Body", bound=Callable[..., Any])
+Test = Callable[..., None]
+"""Receives each new value of an event."""
 
 
 def query(answer: Mapping[str, str | None], types: Mapping[str, str] | None = None) -> Callable[[_Body], _Body]:
-    """Declare a coroutine method that is asked something: `async def lasts(self, watts)` gives the answer's values.
+    """Declare a coroutine method as a query, e.g. `async def lasts(self, watts)`; it returns the answer's values.
 
-    A chart asks with `trigger`, gets the event `answered`, and says `within` which time.
+    A chart starts it with `trigger` and a time `within`; the event `answered` carries the answer.
     """
     require_names(answer, "the values of an answer", "@query({'hours': 'number'})")
     return Declared(dict(types or {}), {ANSWERED: dict(answer)}, _ask, own=1, pattern="query", after_crash="repeat")
@@ -43,21 +48,22 @@ def query(answer: Mapping[str, str | None], types: Mapping[str, str] | None = No
 def event(attributes: Mapping[str, str | None], types: Mapping[str, str] | None = None) -> Callable[[_Body], _Body]:
     """Declare an event that charts activate with parameters, under a name that they choose (S0.6).
 
-    The method below it is the event's test: it is called for each activation whenever the component says `update`,
-    with the values said there and the activation's parameters, and gives the event's attributes or `None`. The event
-    comes each time the test begins to hold. A chart activates it with `trigger`, until it leaves the state; the event
-    has the method's name and can be renamed with `as`. With `within`, the event `timed_out` ends the activation.
+    The decorated method is the event's test. `update` calls it for each activation, with the new values and the
+    activation's parameters; it returns the event's attributes or `None`. The event is posted each time the test
+    becomes true. A chart activates it with `trigger`, until it leaves the state. The event has the method's name, which
+    `as` replaces. With `within`, the event `timed_out` ends the activation.
 
     Args:
         attributes: the event's, with types.
-        types: of the activation's parameters; these stand after those for the value, and have defaults.
+        types: of the activation's parameters; these follow those for the values, and have defaults.
     """
     require_names(attributes, "the attributes of an event", "@event({'level': 'number'})")
 
     def declare(test: _Body) -> _Body:
+        parameters = inspect.signature(test).parameters.values()
         return Declared(
-            dict(types or {}), {test.__name__: dict(attributes)}, _activate,
-            own=_values_of(test), pattern="event", after_crash="repeat",
+            dict(types or {}), {test.__name__: dict(attributes)}, _activate, pattern="event", after_crash="repeat",
+            own=sum(one.default is inspect.Parameter.empty for one in parameters),
         )(test)  # fmt: skip
 
     return declare
@@ -69,15 +75,47 @@ def takes(body: _Body) -> _Body:
     return body
 
 
-async def _ask(_: Skilled, body: SkillBody, __: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+class EventActivations:
+    """Tests of a component's active events, and the last values of each event (S0.6)."""
+
+    def __init__(self) -> None:
+        self._values: dict[str, tuple[Any, ...]] = {}
+        self._tests: defaultdict[str, list[Test]] = defaultdict(list)
+
+    def __getstate__(self) -> dict[str, object]:
+        """The state that is pickled: activations stay in this process."""
+        return {"_values": self._values, "_tests": defaultdict(list)}
+
+    def active(self, event: str) -> bool:
+        """Whether the event has an activation."""
+        return bool(self._tests[event])
+
+    def update(self, event: str, values: tuple[Any, ...]) -> None:
+        """Call all tests of the event."""
+        self._values[event] = values
+        for test in tuple(self._tests[event]):
+            test(*values)
+
+    @contextmanager
+    def tested(self, event: str, test: Test) -> Iterator[None]:
+        """Inside, call the test with the event's present values, if any, and with each update."""
+        self._tests[event].append(test)
+        try:
+            if event in self._values:
+                test(*self._values[event])
+            yield
+        finally:
+            self._tests[event].remove(test)
+
+
+async def _ask(_: Any, body: SkillBody, __: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     return Outcome(ANSWERED, await body(**arguments))
 
 
-async def _activate(component: Skilled, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-    """Test each value until we are cancelled, or the test fails."""
-    assert isinstance(component, Component)  # noqa: S101  # events are methods of components
+async def _activate(component: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    """Test each value until the cancellation, or until the test fails."""
     held = False
-    forever: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
+    failed: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
 
     def test(*values: Any) -> None:
         nonlocal held
@@ -87,14 +125,10 @@ async def _activate(component: Skilled, body: SkillBody, call: SkillCall, argume
             if found is not None and not held:
                 call.report(Outcome(body.__name__, found))
             held = found is not None
-        except Exception as error:  # noqa: BLE001  # our affair, and not that of who has the value
-            if not forever.done():
-                forever.set_exception(error)
+        except Exception as error:  # noqa: BLE001  # it fails this activation, not the caller of `update`
+            if not failed.done():
+                failed.set_exception(error)
 
-    with component.activations.tested(body.__name__, test):
-        return await forever
-
-
-def _values_of(test: Callable[..., Any]) -> int:
-    """How many of the test's first parameters are not the activation's: `self` and those without default."""
-    return sum(p.default is inspect.Parameter.empty for p in inspect.signature(test).parameters.values())
+    activations: EventActivations = component.activations
+    with activations.tested(body.__name__, test):
+        return await failed

@@ -1,7 +1,7 @@
-"""Pushing over a transport: one component hands values on to many, none older than the last (S1.1).
+"""Push ports over a transport: one component publishes values to many, and none is older than the last (S1.1).
 
-A subscriber asks for the value again and again, so that it has the newest even if a push was lost, and a publisher
-that came late or came back finds its subscribers; a publisher forgets who has not asked for a while.
+A subscriber renews its subscription periodically. So it gets the newest value also after a lost push, and a publisher
+that starts late or restarts finds its subscribers. The publisher forgets subscribers that do not renew.
 """
 
 from __future__ import annotations
@@ -13,29 +13,29 @@ from typing import Any
 
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
-from dsc.components.streams import Hears, Push, Values, require_fitting
+from dsc.components.streams import Push, Receiver, Values, require_fitting
 from knowledge_base.errors import InputError, described
 
 RENEWED = 1.0
-"""Seconds after which a subscriber asks again."""
+"""Seconds after which a subscriber renews its subscription."""
 FORGOTTEN = 5.0
-"""Seconds after which a publisher forgets a subscriber that does not."""
+"""Seconds after which a publisher forgets a subscriber without renewal."""
 MOST_SUBSCRIBERS = 1_000
 """Subscribers of one port; more are refused."""
 MOST_LIVES = 100
-"""Lives of a publisher that are told from its present one."""
+"""Earlier lives of a publisher that a subscriber remembers."""
 
 
 class Publisher:
-    """Pushes at an endpoint.
+    """Publishes values at an endpoint.
 
     Args:
-        endpoint: whose port it is.
-        port: its name.
-        values: what is pushed, by name with types; if it is said, who wants something else is refused.
+        endpoint: the publisher's address.
+        port: the port's name.
+        values: names and types of the values; subscribers of other ones are refused.
 
     Attributes:
-        newest: the newest value as subscribers `take` it, with its number.
+        newest: the newest value with its number, as subscribers `take` it.
     """
 
     def __init__(self, endpoint: Endpoint, port: str, values: Values | None = None) -> None:
@@ -47,41 +47,40 @@ class Publisher:
         endpoint.answer(f"subscribe {port}", self._subscribe)
 
     def put(self, value: Any) -> None:
-        """A new value, pushed to all who have subscribed; raises `InputError` if it is no plain data."""
+        """Push a new value to all subscribers; raises `InputError` if it is not plain data."""
         self.newest = {"life": self._endpoint.life, "n": self.newest["n"] + 1, "value": value}
-        self._push()
+        self._forget()
+        for subscriber in self._subscribers:
+            self._endpoint.push(subscriber, _kind(self._endpoint.address, self._port), self.newest)
 
-    def _push(self) -> None:
+    def _forget(self) -> None:
         now = asyncio.get_running_loop().time()
-        self._subscribers = {who: until for who, until in self._subscribers.items() if until > now}
-        for who in self._subscribers:
-            self._endpoint.push(who, _kind(self._endpoint.address, self._port), self.newest)
+        self._subscribers = {name: until for name, until in self._subscribers.items() if until > now}
 
     async def _subscribe(self, sender: str, wanted: Values | None) -> dict[str, Any]:
         if self._values is not None and wanted is not None:
             require_fitting(f"{self._endpoint.address}.{self._port}", wanted, self._values)
-        now = asyncio.get_running_loop().time()
         if len(self._subscribers) >= MOST_SUBSCRIBERS and sender not in self._subscribers:
-            self._subscribers = {who: until for who, until in self._subscribers.items() if until > now}
+            self._forget()
             if len(self._subscribers) >= MOST_SUBSCRIBERS:
-                raise InputError(f"{MOST_SUBSCRIBERS} have subscribed already, and no more are told")
-        self._subscribers[sender] = now + FORGOTTEN
+                raise InputError(f"the port has {MOST_SUBSCRIBERS} subscribers, and takes no more")
+        self._subscribers[sender] = asyncio.get_running_loop().time() + FORGOTTEN
         return self.newest
 
 
 class Subscription:
-    """The newest value of another component's push port; `run` keeps it so.
+    """The newest value of another component's push port; `run` renews it.
 
     Args:
-        endpoint: who subscribes.
-        publisher: whose port it is.
-        port: its name.
-        heard: is told each value that is newer than those known.
-        wanted: what it has to push at least, and of which types.
+        endpoint: the subscriber's address.
+        publisher: the publisher's address.
+        port: the port's name.
+        receive: called with each value that is newer than the known ones.
+        wanted: names and types of the required values.
 
     Attributes:
-        value: the newest one that is known; `None` before the first.
-        problem: why the publisher has refused, if it has.
+        value: the newest known value; `None` before the first.
+        problem: the reason for the publisher's refusal, if any.
     """
 
     def __init__(
@@ -89,67 +88,52 @@ class Subscription:
         endpoint: Endpoint,
         publisher: str,
         port: str,
-        heard: Callable[[Any], None] | None = None,
+        receive: Callable[[Any], None] | None = None,
         wanted: Values | None = None,
     ) -> None:
         self.value: Any = None
         self.problem: str | None = None
-        self._tell = heard
+        self._receive = receive
         self._wanted = wanted
         self._endpoint = endpoint
         self._publisher = publisher
         self._port = port
         self._numbers: dict[str, int] = {}  # the newest number of each life of the publisher, the present one last
         self._at = -math.inf
-        self._news = asyncio.Event()
-        endpoint.hear(_kind(publisher, port), self._heard)
+        endpoint.hear(_kind(publisher, port), self._pushed)
 
     @property
     def age(self) -> float:
-        """Seconds since anything was heard from the publisher; infinite before the first time."""
+        """Seconds since the last message of the publisher; infinite before the first."""
         return asyncio.get_running_loop().time() - self._at
 
-    async def next(self, within: float) -> Any:
-        """Wait for a value that is newer than those known.
-
-        Raises:
-            NoAnswerError: none has come within so many seconds.
-        """
-        self._news.clear()
-        try:
-            async with asyncio.timeout(within):
-                await self._news.wait()
-        except TimeoutError:
-            raise NoAnswerError(f"'{self._publisher}' has pushed no '{self._port}' within {within:g} s") from None
-        return self.value
-
     async def run(self) -> None:
-        """Subscribe, and again whenever the publisher may have forgotten, until cancelled."""
+        """Subscribe, and renew the subscription, until cancelled."""
         while True:
             try:
                 kind = f"subscribe {self._port}"
                 newest = await self._endpoint.call(self._publisher, kind, self._wanted, FORGOTTEN)
             except NoAnswerError:
-                pass  # not there yet, or not there any more: it may come
-            except RefusedError as refused:  # so may another one
+                pass  # it may start later
+            except RefusedError as refused:  # its successor may accept
                 self.problem = str(refused)
             else:
                 try:
                     self.take(newest)
                     self.problem = None
-                except Exception as error:  # noqa: BLE001  # whatever it pushes, we go on to listen
+                except Exception as error:  # noqa: BLE001  # a faulty value must not end the subscription
                     self.problem = described(error, named=not isinstance(error, InputError))
             await asyncio.sleep(RENEWED)
 
-    def _heard(self, sender: str, newest: Any) -> None:
+    def _pushed(self, sender: str, newest: Any) -> None:
         if sender == self._publisher:
             self.take(newest)
 
     def take(self, newest: Any) -> None:
-        """Hear what the publisher has said, `Publisher.newest`, on whatever way; nothing older than known is taken.
+        """Take a `Publisher.newest` that came by any way, unless it is older than a known one.
 
         Raises:
-            InputError: it is not what a publisher says; nothing is taken.
+            InputError: it has another form; nothing is taken.
         """
         match newest:
             case {"life": str(life), "n": int(number), "value": value}:
@@ -160,24 +144,23 @@ class Subscription:
         if present and number > self._numbers.get(life, 0):
             before, self.value = self.value, value
             try:
-                if self._tell is not None:
-                    self._tell(value)
+                if self._receive is not None:
+                    self._receive(value)
             except BaseException:
                 self.value = before
                 raise
             self._numbers[life] = number
             if len(self._numbers) > MOST_LIVES:
                 del self._numbers[next(iter(self._numbers))]
-            self._news.set()
 
 
 def _kind(publisher: str, port: str) -> str:
-    """Ports of two publishers may have one name."""
+    """The kind of pushes; ports of two publishers may have one name."""
     return f"push {publisher}.{port}"
 
 
 class HostedStreams:
-    """Publishes a hosted component's push ports, and subscribes for its streams, at its host's endpoint."""
+    """Publishes a hosted component's push ports, and subscribes to its streams, at its host's endpoint."""
 
     def __init__(self, component: Component, endpoint: Endpoint) -> None:
         self._publishing = [(port, Publisher(endpoint, name, port.values)) for name, port in component.pushes.items()]
@@ -185,43 +168,33 @@ class HostedStreams:
             port.listen(publisher.put)
         self._tasks: list[asyncio.Task[None]] = []
         for stream in component.streams.values():
-            subscription = Subscription(endpoint, stream.publisher, stream.port, stream.hear, stream.values)
+            subscription = Subscription(endpoint, stream.publisher, stream.port, stream.receive, stream.values)
             stream.problem = lambda subscription=subscription: subscription.problem  # type: ignore[misc]
             self._tasks.append(asyncio.get_running_loop().create_task(subscription.run()))
 
     def close(self) -> list[asyncio.Task[None]]:
-        """Publish nothing more; what is left is to be cancelled."""
+        """Stop publishing; return the tasks to cancel."""
         for port, publisher in self._publishing:
             port.leave(publisher.put)
         return self._tasks
 
 
-def ports_form(component: Component) -> dict[str, Any]:
-    """A component's push ports as plain data."""
-    return {name: {"values": dict(port.values)} for name, port in component.pushes.items()}
+class RemotePush(Push):
+    """A push port of a component elsewhere, with a subscription while it has listeners; its host keeps the period."""
 
-
-def ports_of(form: Mapping[str, Any], component: Component, endpoint: Endpoint) -> dict[str, Push]:
-    """The push ports that `ports_form` was made from, as seen from here."""
-    return {name: _PushElsewhere(component, endpoint, name, port["values"]) for name, port in form.items()}
-
-
-class _PushElsewhere(Push):
-    """A push port of a component elsewhere, subscribed to while somebody listens here; its period is kept there."""
-
-    def __init__(self, component: Component, endpoint: Endpoint, name: str, values: Mapping[str, str | None]) -> None:
-        super().__init__(values, None, component, name)
-        self._subscription = Subscription(endpoint, component.name, name, lambda value: self.put(**value))
+    def __init__(self, endpoint: Endpoint, component: str, port: str, values: Mapping[str, str | None]) -> None:
+        super().__init__(values, name=f"{component}.{port}")
+        self._subscription = Subscription(endpoint, component, port, lambda value: self.put(**value))
         self._running: asyncio.Task[None] | None = None
 
-    def listen(self, listener: Hears) -> None:
-        """Tell the listener what arrives."""
+    def listen(self, listener: Receiver) -> None:
+        """Pass all values to the listener."""
         super().listen(listener)
         if self._running is None:
             self._running = asyncio.get_running_loop().create_task(self._subscription.run())
 
-    def leave(self, listener: Hears) -> None:
-        """Tell it no more."""
+    def leave(self, listener: Receiver) -> None:
+        """Stop calling the listener."""
         super().leave(listener)
         if self._running is not None and not self._listeners:
             self._running.cancel()

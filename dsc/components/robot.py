@@ -1,4 +1,4 @@
-"""Components of a robot: made of plain functions, found by `module:name`, and checked before a run."""
+"""Components of a robot: made of plain functions, found by `module:name`, checked before a run, and connected."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from dsc.components.component import ALWAYS, Component
 from dsc.components.hooks import contained
 from dsc.components.life_cycle import NEUTRAL
+from dsc.components.streams import Push, Stream, require_fitting
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
 from knowledge_base.language.checking.inputs import require_several, shown
@@ -25,41 +26,38 @@ def component_of(name: str, *functions: SkillBody) -> Component:
     for function in functions:
         if not hasattr(function, DECLARED):
             what = f"'{function.__name__}'" if hasattr(function, "__name__") else shown(function)
-            raise InputError(f"{what} is no skill: decorate a function with `skill`", found=what)
+            raise InputError(f"{what} is not a skill: decorate a function with `skill`", found=what)
     return _OfFunctions(name, {function.__name__: function for function in functions})
 
 
 class _OfFunctions(Component):
-    """Has functions for skills."""
+    """A component with functions as skills."""
 
     def __init__(self, name: str, functions: Mapping[str, SkillBody]) -> None:
         super().__init__(name)
         self._functions = functions
-        self._signatures = {skill: _signature(self.name, skill, function) for skill, function in functions.items()}
+        self._signatures: dict[str, SkillSignature] = {}
+        for skill, function in functions.items():
+            declared: Declared = getattr(function, DECLARED)
+            without_self = replace(declared, own=declared.own - 1)
+            self._signatures[skill] = signature_of(self.name, skill, function, without_self)
 
     def skills(self) -> dict[str, SkillSignature]:
         """The signatures of the functions."""
         return dict(self._signatures)
 
-    def body(self, skill_name: str) -> SkillBody:
-        """The function."""
+    def _body(self, skill_name: str) -> SkillBody:
         return self._functions[skill_name]
 
 
-def _signature(component: str, name: str, function: SkillBody) -> SkillSignature:
-    """As of a method, but for `self`, which a function has not."""
-    declared: Declared = getattr(function, DECLARED)
-    return signature_of(component, name, function, replace(declared, own=declared.own - 1))
-
-
 def robot_of(named: str) -> tuple[Component, ...]:
-    """The components that a function without arguments gives, or that a name stands for.
+    """The components of a robot, or those that its function without arguments returns.
 
     Args:
-        named: `module:name`; the module is found as `python -m` would, also in the present folder.
+        named: `module:name`; the module is found as by `python -m`, also in the present folder, and executed.
 
     Raises:
-        InputError: there is no such module, nothing of that name in it, or it is no components. The module is run.
+        InputError: the module or the name does not exist, or its value is not components.
     """
     module_name, colon, name = named.partition(":")
     if not (module_name and colon and name):
@@ -70,7 +68,7 @@ def robot_of(named: str) -> tuple[Component, ...]:
     try:
         with contained():
             module = import_module(module_name)
-    except Exception as error:  # whatever somebody's module does wrong
+    except Exception as error:  # any error of a user's module
         raise InputError(f"the module '{module_name}' cannot be imported: {described(error)}") from error
     if not hasattr(module, name):
         valid = [one for one in vars(module) if not one.startswith("_")]
@@ -111,11 +109,11 @@ def _require_needs(component: Component) -> None:
 
     Raises:
         InputError: the needs in a mode are not a tuple of names, e.g. one name without the comma.
-        UnknownNameError: the component says which modes it has, and one is none.
+        UnknownNameError: the component declares its modes, and one is not among them.
     """
     name, needs = component.name, component.needs
     if not isinstance(needs, Mapping):
-        raise InputError(f"what component '{name}' needs is said for each mode, as in {_EXAMPLE}, not {shown(needs)}")
+        raise InputError(f"`needs` of component '{name}' is a mapping of modes, as in {_EXAMPLE}, not {shown(needs)}")
     modes = (NEUTRAL, *component.modes)
     for mode, needed in needs.items():
         if not isinstance(needed, tuple) or not all(isinstance(one, str) for one in needed):
@@ -130,7 +128,7 @@ def require_deployed(components: Collection[Component], besides: Iterable[str] =
     """Raise `UnknownNameError` for a component that another needs, in any mode, and that is not deployed.
 
     Args:
-        components: all components; those that reach others elsewhere are not validated.
+        components: all components; those that reach others elsewhere are skipped.
         besides: names of further components.
     """
     deployed = {*(component.name for component in components), *besides}
@@ -144,3 +142,61 @@ def require_deployed(components: Collection[Component], besides: Iterable[str] =
 
 
 _EXAMPLE = "needs = {'scanning': ('power',)}"
+
+
+class Wiring:
+    """Connections between the streams and push ports of deployed components, also of those deployed late.
+
+    Raises:
+        UnknownNameError: a stream names a port, or a value of it, that its component does not have.
+        SchemaError: a value is of another type than in the stream.
+    """
+
+    def __init__(self, components: Mapping[str, Component]) -> None:
+        self._components = components
+        self._connected: dict[Stream, Push] = {}
+        self._connect()
+
+    def deployed(self, component: Component) -> None:
+        """Connect a component, which may replace another one."""
+        self._disconnect(component.name)
+        self._connect()
+
+    def close(self) -> None:
+        """Disconnect all streams."""
+        self._disconnect()
+
+    def _disconnect(self, publisher: str | None = None) -> None:
+        for stream in [one for one in self._connected if publisher in {None, one.publisher}]:
+            self._connected.pop(stream).leave(stream.receive)
+
+    def _connect(self) -> None:
+        for stream in [stream for component in self._components.values() for stream in component.streams.values()]:
+            publisher = self._components.get(stream.publisher)
+            if publisher is not None and stream not in self._connected:
+                self._connected[stream] = port = _port_for(stream, publisher)
+                port.listen(stream.receive)
+
+
+def require_wired(components: Iterable[Component]) -> None:
+    """Raise an error unless all streams of these components have the ports that they name.
+
+    Raises:
+        UnknownNameError: there is no such component, port or value.
+        SchemaError: a value is of another type.
+    """
+    deployed = {component.name: component for component in components}
+    for component in deployed.values():
+        for stream in component.streams.values():
+            if stream.publisher not in deployed:
+                message = f"component '{component.name}' takes '{stream.source}', and there is no such component"
+                raise UnknownNameError(message, found=stream.publisher, valid=deployed)
+            _port_for(stream, deployed[stream.publisher])
+
+
+def _port_for(stream: Stream, publisher: Component) -> Push:
+    if stream.port not in publisher.pushes:
+        message = f"component '{publisher.name}' has no push port '{stream.port}'"
+        raise UnknownNameError(message, found=stream.port, valid=publisher.pushes)
+    require_fitting(stream.source, stream.values, publisher.pushes[stream.port].values)
+    return publisher.pushes[stream.port]

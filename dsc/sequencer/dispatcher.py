@@ -20,8 +20,7 @@ from dsc.calls import Clock, Ended, Outcome, Reports, SkillCall, Status
 from dsc.components.component import Component
 from dsc.components.hooks import GRACE, contained, give_up, is_own
 from dsc.components.life_cycle import Life
-from dsc.components.robot import require_instances
-from dsc.components.streams import Wiring
+from dsc.components.robot import Wiring, require_instances
 from dsc.engine.steps import (
     Cancel,
     Output,

@@ -72,7 +72,7 @@ def parameter(
     require_text(owner, "the name of a component or plot")
     require_text(name, "a parameter's name")
     if owner in components:
-        components[owner].check_parameter(name, value, "operator")
+        components[owner].parameters.check(name, value, "operator")
     elif owner in library:
         library.plot(owner).with_default(name, value, "operator")
     else:

@@ -23,11 +23,13 @@ from dsc.calls import Outcome, SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError, Transport
 from dsc.components.heartbeat import BEAT, SILENCE, Heartbeat
+from dsc.components.host import Host
 from dsc.components.life_cycle import Life
 from dsc.components.ports import event, query, takes
 from dsc.components.publication import Publisher, Subscription
-from dsc.components.remote import Host, RemoteComponent
-from dsc.components.streams import Push, Stream, Wiring
+from dsc.components.remote import RemoteComponent
+from dsc.components.robot import Wiring
+from dsc.components.streams import Push, Stream
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
 from dsc.supervision.activation import ComponentActivation
@@ -248,15 +250,11 @@ class TransportSuite:
         """*Push newest*: values may be lost, never go back, and the last one arrives."""
 
         async def main() -> None:
-            transport, seen = self.transport(), []
+            transport = self.transport()
+            seen: list[int] = []
             mine, theirs = Endpoint("user", transport), Endpoint("laser", transport)
-            subscription, publisher = Subscription(mine, "laser", "scan"), Publisher(theirs, "scan")
-
-            async def watch() -> None:
-                while True:
-                    seen.append(await subscription.next(PATIENCE))
-
-            async with running(subscription.run(), watch()):
+            subscription, publisher = Subscription(mine, "laser", "scan", seen.append), Publisher(theirs, "scan")
+            async with running(subscription.run()):
                 for n in range(50):
                     publisher.put(n)
                     await asyncio.sleep(0.1)

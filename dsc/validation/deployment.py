@@ -44,7 +44,7 @@ def _setting(
     try:
         declared = known(component, parameter, components[component])
         if isinstance(action.to, Constant):
-            declared.check(action.set, action.to.value)
+            declared.range.check(action.set, action.to.value)
     except InputError as error:
         error.place = plot.place((*path, "to" if not isinstance(error, UnknownNameError) else "set"))
         yield Finding(error, "component parameter")

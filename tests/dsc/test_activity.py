@@ -11,8 +11,9 @@ from dsc_runs import ran
 from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component
 from dsc.components.endpoint import LocalTransport
+from dsc.components.host import Host
 from dsc.components.life_cycle import Life
-from dsc.components.remote import Host, RemoteComponent
+from dsc.components.remote import RemoteComponent
 from dsc.dynamic.library import Library
 from dsc.engine.steps import SwitchMode
 from dsc.sequencer.clock import LoopClock, run_simulated

@@ -347,5 +347,5 @@ def test_a_function_that_is_no_skill_is_refused():
     async def plain(call):
         return None
 
-    with pytest.raises(InputError, match="'plain' is no skill: decorate a function with `skill`"):
+    with pytest.raises(InputError, match="'plain' is not a skill: decorate a function with `skill`"):
         component_of("voice", plain)

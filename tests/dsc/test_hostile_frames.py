@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 from dsc import calls
 from dsc.calls import Outcome, SkillCall
 from dsc.components import endpoint as endpoints
-from dsc.components import hosted
+from dsc.components import host as hosts
 from dsc.components.component import Component
 from dsc.components.endpoint import EVERYBODY, Endpoint, LocalTransport, NoAnswerError, RefusedError
+from dsc.components.host import CONDITION, Host
 from dsc.components.publication import Subscription
-from dsc.components.remote import CONDITION, Host, RemoteComponent
+from dsc.components.remote import RemoteComponent
 from dsc.components.streams import Push, Stream
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
@@ -213,7 +214,7 @@ def test_answers_to_one_peer_are_bounded(monkeypatch):
 
 
 def test_unclaimed_actions_are_bounded_and_those_going_on_too(monkeypatch):
-    monkeypatch.setattr(hosted, "MOST_ACTIONS", 20)
+    monkeypatch.setattr(hosts, "MOST_ACTIONS", 20)
 
     async def main():
         transport = LocalTransport()
@@ -231,7 +232,7 @@ def test_unclaimed_actions_are_bounded_and_those_going_on_too(monkeypatch):
         assert await user.call("robot", "how", {"run": "r", "id": "a99", "heard": 0})
         for n in range(100, 120):
             await start(n, "waits")
-        with pytest.raises(RefusedError, match="20 actions are going on here"):
+        with pytest.raises(RefusedError, match="20 actions are running here"):
             await start(120, "waits")
         await host.close()
 
@@ -344,7 +345,7 @@ def test_conflated_observations_come_to_the_same_knowledge(monkeypatch):
 
 def test_a_host_bounds_what_it_keeps_of_one_action(monkeypatch):
     monkeypatch.setattr(calls, "MOST_WAITING", 50)
-    monkeypatch.setattr(hosted, "MOST_KEPT", 100)
+    monkeypatch.setattr(hosts, "MOST_KEPT", 100)
 
     async def main():
         transport, clock, heard = LocalTransport(), LoopClock(), []

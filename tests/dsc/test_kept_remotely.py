@@ -12,8 +12,9 @@ from dsc_runs import SCHEMA
 from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.components.endpoint import LocalTransport
+from dsc.components.host import Host
 from dsc.components.ports import event
-from dsc.components.remote import Host, RemoteComponent
+from dsc.components.remote import RemoteComponent
 from dsc.dynamic.library import Library
 from dsc.runs.archive import archive
 from dsc.runs.store import RunStore

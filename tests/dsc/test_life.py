@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import re
+from pathlib import Path
 from typing import ClassVar
 
 import pytest
@@ -10,7 +12,7 @@ from dsc_charts import plot
 from dsc_runs import ran
 
 from dsc.calls import Outcome
-from dsc.components.component import ALWAYS, Component
+from dsc.components.component import ALWAYS, Component, ComponentHooks
 from dsc.components.life_cycle import Life, LifeCycle
 from dsc.dynamic.library import Library
 from dsc.events import Event
@@ -20,6 +22,18 @@ from dsc.skills import skill
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
+
+
+def test_the_surface_for_builders_is_small_and_documented():
+    surface = {name for name in vars(ComponentHooks) if not name.startswith("_")}
+    table = (
+        Path(__file__).parents[2].joinpath("docs", "skills.md").read_text("utf-8").split("### The class `Component`")[1]
+    )
+    rows = [
+        line.split("|")[1] for line in table.partition("`self.parameters`")[0].splitlines() if line.startswith("| `")
+    ]
+    assert set(re.findall(r"`(\w+)`", " ".join(rows))) == surface
+    assert len(surface) <= 12
 
 
 class Base(Component):
@@ -253,7 +267,7 @@ def test_a_start_that_was_broken_off_is_begun_by_who_waits_for_it():
     [
         ({"scanning": "base"}, "in its mode 'scanning' is a tuple, as in needs = {'scanning': ('power',)}, not 'base'"),
         ({ALWAYS: [1]}, "needs always is a tuple"),
-        (("base",), "is said for each mode, as in needs = {'scanning': ('power',)}, not"),
+        (("base",), "is a mapping of modes, as in needs = {'scanning': ('power',)}, not"),
         ({"scaning": ("base",)}, "in its mode 'scaning', which it does not have; did you mean 'scanning'?"),
     ],
 )

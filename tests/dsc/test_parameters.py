@@ -147,11 +147,11 @@ def a_class(relations=(), **declares):
         (Parameter("text", least=1), "`least` and `most` are about numbers, and this is a text"),
         (
             Parameter("nmber", default=5),
-            "the type of parameter 'crane.lift' is 'nmber', which is none; did you mean 'number'?",
+            "the type of parameter 'crane.lift' is 'nmber', which does not exist; did you mean 'number'?",
         ),
         (
             Parameter("number", default=5, changed_by="operater"),
-            "'operater', which is nobody's role; did you mean 'operator'?",
+            "'operater', which is not a role; did you mean 'operator'?",
         ),
     ],
 )
@@ -169,7 +169,7 @@ def test_a_parameter_that_cannot_be_meant_is_refused_with_its_file(declared, sai
             ("(< ?lft 3)",),
             "the relation (< ?lft 3) of component 'crane' reads '?lft', which it does not declare; did you mean 'lift'?",
         ),
-        (("(< ?lift 3",), "the relation (< ?lift 3 of component 'crane' is no condition"),
+        (("(< ?lift 3",), "the relation (< ?lift 3 of component 'crane' is not a condition"),
         ("(< ?lift 3)", "`relations` of component 'crane' is a tuple of conditions, not one text"),
     ],
 )
@@ -231,9 +231,7 @@ def test_what_follows_is_in_its_range_or_nothing_changes():
 
 def test_a_profile_binds_what_relies_on_each_other_at_once():
     made = axle()
-    with pytest.raises(
-        InputError, match=r"'axle\.label' has no value: .* what is said of it is void when 'period' is said anew"
-    ):
+    with pytest.raises(InputError, match=r"'axle\.label' has no value: .* a new value of 'period' resets it"):
         configure([made])
     configure([made], parse_profile("profile: p\ncomponents: {axle: {label: x, worst: 9, processor: b}}"))
     assert made.parameters == {"period": 18, "processor": "b", "worst": 9, "label": "x"}
@@ -244,15 +242,15 @@ def test_a_profile_binds_what_relies_on_each_other_at_once():
     [
         (
             Parameter("number", follows="(* 2 ?lft)"),
-            "parameter 'crane.lift' relies on 'lft', which is not declared; did you mean 'lift'?",
+            "parameter 'crane.lift' depends on 'lft', which is not declared; did you mean 'lift'?",
         ),
-        (Parameter("number", default=1, depends_on=("lft",)), "relies on 'lft', which is not declared"),
+        (Parameter("number", default=1, depends_on=("lft",)), "depends on 'lft', which is not declared"),
         (
             Parameter("number", follows="(* 2 ?lift)"),
-            "parameters of component 'crane' rely on each other in a circle: 'lift', 'lift'",
+            "parameters of component 'crane' depend on each other in a cycle: 'lift', 'lift'",
         ),
         (Parameter("number", default=1, follows="2"), "has a default and follows from others"),
-        (Parameter("number", follows="(* 2"), "is no term"),
+        (Parameter("number", follows="(* 2"), "is not a term"),
         (Parameter("number", follows="2", most=1), "'crane.lift' is 1 or less; found 2"),
         (Parameter("number", default=1, depends_on="lift"), "is a tuple of names, not one text"),
     ],

@@ -12,9 +12,10 @@ from dsc_charts import plot
 from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component
 from dsc.components.endpoint import LocalTransport, NoAnswerError
+from dsc.components.host import Host
 from dsc.components.life_cycle import Life
-from dsc.components.remote import Host
-from dsc.components.streams import Push, Stream, Wiring
+from dsc.components.robot import Wiring
+from dsc.components.streams import Push, Stream
 from dsc.dynamic.library import Library
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer

@@ -6,8 +6,8 @@ import pytest
 
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, LocalTransport
+from dsc.components.host import Host
 from dsc.components.publication import Publisher
-from dsc.components.remote import Host
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.testing.faults import LossyTransport
 from dsc.testing.transport_suite import TransportSuite

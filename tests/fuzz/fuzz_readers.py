@@ -19,7 +19,7 @@ from domains.clean_up_table.deployment import deploy, domain, library
 from domains.clean_up_table.scenario import Scenario
 from dsc.components.component import Component
 from dsc.components.endpoint import LocalTransport
-from dsc.components.remote import Host
+from dsc.components.host import Host
 from dsc.drawing import draw
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library

@@ -1,0 +1,232 @@
+"""Host: offers a component on a transport, and executes its actions for clients, each once for its id.
+
+An action's reports and end are kept until its client lets them be forgotten, within the bounds `MOST_ACTIONS` and
+`MOST_KEPT`. The host publishes the component's life, mode and needs after each change, as on a push port.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from dsc.calls import OBSERVED, Clock, Outcome, Reports, SkillCall
+from dsc.components.component import Component
+from dsc.components.endpoint import Endpoint, Transport, encoded
+from dsc.components.heartbeat import Heartbeat
+from dsc.components.hooks import contained
+from dsc.components.life_cycle import Life
+from dsc.components.publication import HostedStreams, Publisher
+from knowledge_base.errors import InputError, described
+from knowledge_base.exchange import delta_form, delta_of
+from knowledge_base.language.checking.inputs import require_delta, require_time, shown
+
+MOST_ACTIONS = 1_000
+"""Running actions of a host; also the ended ones that were not forgotten, of which the latest are kept."""
+MOST_KEPT = 10_000
+"""Reports of an action that are kept for a resumed client; older ones become empty observations."""
+CONDITION = "its condition"
+"""The port of a component's life, mode and needs; no declared port has a blank in its name."""
+
+
+class Host:
+    """Offers a component on a transport, as a part of the activation tree there, until it is closed.
+
+    Attributes:
+        endpoint: the component's address; all its services there share it.
+    """
+
+    def __init__(self, component: Component, transport: Transport, clock: Clock) -> None:
+        self._component = component
+        self.endpoint = Endpoint(component.name, transport)
+        self._condition = Publisher(self.endpoint, CONDITION)
+        self._actions = HostedActions(component, self.endpoint, clock)
+        self._streams = HostedStreams(component, self.endpoint)
+        self.endpoint.answer("hull", self._hull)
+        self.endpoint.answer("come alive", self._come_alive)
+        self.endpoint.answer("be active", self._be_active)
+        self.endpoint.answer("switch", self._switch)
+        self.endpoint.answer("set", lambda _, said: component.configure(said["parameter"], said["value"]))
+        self.endpoint.answer("set all", lambda _, said: component.configure_all(said))
+        self.endpoint.answer("take", lambda _, said: component.take(said["port"], said["message"]))
+        self.endpoint.answer("diagnose", lambda _, __: component.diagnose())
+        self._is_active = asyncio.Event()
+        self._heart = Heartbeat(self.endpoint, component.needed, self._activated)
+        self._beating = asyncio.get_running_loop().create_task(self._heart.run())
+        self._changed()
+        component.life.listen(self._changed)
+
+    async def close(self) -> None:
+        """Stop all services without a message: for the clients, the component has died."""
+        self._component.life.leave(self._changed)
+        await self.endpoint.close()
+        tasks = [self._beating, *self._actions.tasks(), *self._streams.close()]
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
+
+    def _changed(self) -> None:
+        life = self._component.life
+        needs = list(self._component.needed())
+        self._condition.put({"life": life.state, "reason": life.reason, "mode": life.mode, "needs": needs})
+        self._heart.stir()
+
+    async def _hull(self, _: str, __: Any) -> dict[str, Any]:
+        skills = [asdict(signature) for signature in self._component.skills().values()]
+        pushes = {name: {"values": dict(port.values)} for name, port in self._component.pushes.items()}
+        return {"skills": skills, "pushes": pushes, "condition": self._condition.newest}
+
+    async def _come_alive(self, _: str, __: Any) -> dict[str, Any]:
+        life = self._component.life
+        before = life.state
+        await life.come_alive(self._component.start)
+        if before is not Life.ALIVE and self._is_active.is_set():  # it was restarted
+            await life.become_active(id(self), self._component.activate, active=True)
+        return self._condition.newest
+
+    async def _be_active(self, sender: str, _: Any) -> dict[str, Any]:
+        """Take the call as a heartbeat with a need, and answer when the component is active."""
+        self._heart.need(sender)
+        await self._is_active.wait()
+        return self._condition.newest
+
+    async def _activated(self, active: bool) -> None:  # noqa: FBT001
+        component = self._component
+        if active:
+            await component.life.come_alive(component.start)
+        await component.life.become_active(id(self), component.activate, active=active)
+        (self._is_active.set if active else self._is_active.clear)()
+
+    async def _switch(self, _: str, said: dict[str, Any]) -> dict[str, Any]:
+        await self._component.change_mode(said["mode"])
+        return self._condition.newest
+
+
+def outcome_form(outcome: Outcome) -> dict[str, Any]:
+    """An outcome as plain data."""
+    return {"event": outcome.event, "attributes": dict(outcome.attributes), "observed": delta_form(outcome.observed)}
+
+
+def outcome_of(form: Mapping[str, Any]) -> Outcome:
+    """The inverse of `outcome_form`."""
+    return Outcome(form["event"], form["attributes"], delta_of(form["observed"]))
+
+
+_NO_REPORT = {"report": outcome_form(Outcome(OBSERVED))}
+"""Replaces an old report that its client has received."""
+
+
+@dataclass(slots=True)
+class _Action:
+    """An action of a client, with its reports and its end as messages."""
+
+    client: str
+    task: asyncio.Task[None] | None = None
+    reports: Reports | None = None
+    messages: list[dict[str, Any]] = field(default_factory=list)
+    received: int = 0
+
+    @property
+    def over(self) -> bool:
+        """Whether its task has ended."""
+        return self.task is None or self.task.done()
+
+    def take(self, received: int) -> None:
+        """Note that the client has received that many messages: further reports may come, old ones are dropped."""
+        assert self.reports is not None  # noqa: S101
+        for number in range(self.received, min(received, len(self.messages))):
+            if number >= MOST_KEPT:
+                self.messages[number - MOST_KEPT] = _NO_REPORT
+            self.received = number + 1
+            self.reports.taken()
+
+
+class HostedActions:
+    """Answers `start`, `how` and `stop` at an endpoint for a component's skills."""
+
+    def __init__(self, component: Component, endpoint: Endpoint, clock: Clock) -> None:
+        self._component = component
+        self._endpoint = endpoint
+        self._clock = clock
+        self._actions: dict[tuple[str, str], _Action] = {}
+        endpoint.answer("start", self._start)
+        endpoint.answer("how", self._how)
+        endpoint.answer("stop", self._stop)
+
+    def tasks(self) -> list[asyncio.Task[None]]:
+        """The tasks of all actions that were not forgotten."""
+        return [action.task for action in self._actions.values() if action.task is not None]
+
+    async def _start(self, sender: str, said: dict[str, Any]) -> None:
+        action = self._actions.get(_key(said))
+        if action is not None:  # its client has restarted
+            action.client = sender
+            return
+        self._make_room()
+        action = self._actions[_key(said)] = _Action(sender)
+        action.reports = Reports(lambda report, _: self._tell(said["id"], action, {"report": outcome_form(report)}))
+        action.task = asyncio.get_running_loop().create_task(self._execute(said, action, action.reports))
+
+    def _make_room(self) -> None:
+        """Forget the first unclaimed end; refuse a new action while too many are running."""
+        over = [key for key, action in self._actions.items() if action.over]
+        if len(self._actions) - len(over) >= MOST_ACTIONS:
+            raise InputError(f"{MOST_ACTIONS} actions are running here, and no more are accepted")
+        for key in over[: max(0, len(over) + 1 - MOST_ACTIONS)]:
+            del self._actions[key]
+
+    def _tell(self, action_id: str, action: _Action, form: dict[str, Any]) -> None:
+        action.messages.append(form)
+        self._endpoint.push(action.client, f"news {action_id}", len(action.messages))
+
+    async def _execute(self, said: dict[str, Any], action: _Action, reports: Reports) -> None:
+        end: dict[str, Any]
+        try:
+            seconds = {}
+            if said["seconds"] is not None:
+                require_time(said["seconds"])
+                seconds["deadline"] = self._clock.now() + said["seconds"]
+            call = SkillCall(said["id"], self._clock, lambda outcome: reports.put(_plain(outcome)), **seconds)
+            async with asyncio.timeout(said["seconds"]):
+                with contained():
+                    outcome = await self._component.execute(said["skill"], call, said["arguments"])
+            end = {"ended": outcome_form(_plain(outcome))}
+        except Exception as error:  # noqa: BLE001  # any error reaches the client as text
+            end = {"failed": described(error)}
+        reports.flush()
+        self._tell(said["id"], action, end)
+
+    async def _how(self, _: str, said: dict[str, Any]) -> list[dict[str, Any]] | None:
+        """The messages that the client has not received; `None` for an unknown action."""
+        action = self._actions.get(_key(said))
+        if action is None:
+            return None
+        action.take(said["heard"])
+        if action.over and not (action.messages and "report" not in action.messages[-1]):
+            self._tell(said["id"], action, {"failed": "its task was cancelled"})
+        return action.messages[said["heard"] :]
+
+    async def _stop(self, _: str, said: dict[str, Any]) -> None:
+        """Cancel a running action, and forget it."""
+        action = self._actions.get(_key(said))
+        if action is not None and action.task is not None and not action.over:
+            action.task.cancel()
+            await asyncio.wait([action.task])
+        self._actions.pop(_key(said), None)
+
+
+def _plain(outcome: Outcome) -> Outcome:
+    """The outcome, if it can be sent; raises `InputError`."""
+    if not isinstance(outcome, Outcome) or not isinstance(outcome.event, str):
+        raise InputError(f"it ended with {shown(outcome)}, which is not an outcome")
+    require_delta(outcome.observed)
+    encoded(outcome_form(outcome))
+    return outcome
+
+
+def _key(said: Mapping[str, Any]) -> tuple[str, str]:
+    run, action_id = said["run"], said["id"]
+    if not (isinstance(run, str) and isinstance(action_id, str)):
+        raise InputError("an action is named by the texts 'run' and 'id'")
+    return run, action_id
