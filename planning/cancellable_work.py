@@ -11,12 +11,13 @@ import contextlib
 import math
 import threading
 import time
-from typing import TYPE_CHECKING, TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from knowledge_base.errors import described
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 T = TypeVar("T")
 
@@ -71,6 +72,19 @@ class WorkLimit:
             raise WorkLimitError(self.doing)
 
 
+@contextlib.contextmanager
+def alarm(seconds: float, ring: Callable[[], object]) -> Iterator[None]:
+    """Call `ring` in the event loop after `seconds` of real time, unless the block ends before."""
+    watch = threading.Timer(min(seconds, threading.TIMEOUT_MAX), _in_loop(ring))
+    watch.daemon = True
+    if math.isfinite(seconds):
+        watch.start()
+    try:
+        yield
+    finally:
+        watch.cancel()
+
+
 async def aside(work: Callable[[], T], patience: WorkLimit | None = None) -> T:
     """Run the work in a thread and return its result; the thread is abandoned when the limit expires.
 
@@ -82,33 +96,39 @@ async def aside(work: Callable[[], T], patience: WorkLimit | None = None) -> T:
         WorkLimitError: the time is up.
     """
     patience = patience or WorkLimit()
-    loop = asyncio.get_running_loop()
-    result: asyncio.Future[T] = loop.create_future()
+    result: asyncio.Future[T] = asyncio.get_running_loop().create_future()
 
-    def settle(value: Callable[[], None]) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop is closed, so that no task waits
-            loop.call_soon_threadsafe(lambda: None if result.done() else value())
+    def settle(settling: Callable[[Any], None], value: object) -> None:
+        if not result.done():
+            settling(value)
+
+    def expire() -> None:
+        settle(result.set_exception, WorkLimitError(patience.doing))
+
+    answered, failed = _in_loop(partial(settle, result.set_result)), _in_loop(partial(settle, result.set_exception))
 
     def run() -> None:
         try:
             done = work()
         except BaseException as error:  # noqa: BLE001  passed to the waiting task
-            failure = error if isinstance(error, Exception) else RuntimeError(described(error))
-            settle(lambda: result.set_exception(failure))
+            failed(error if isinstance(error, Exception) else RuntimeError(described(error)))
         else:
-            settle(lambda: result.set_result(done))
+            answered(done)
 
-    def expire() -> None:
-        settle(lambda: result.set_exception(WorkLimitError(patience.doing)))
-
-    watch = None if math.isinf(patience.left) else threading.Timer(patience.left, expire)
     threading.Thread(target=run, daemon=True).start()
-    if watch is not None:
-        watch.daemon = True
-        watch.start()
-    try:
-        return await result
-    finally:
-        patience.cancel()
-        if watch is not None:
-            watch.cancel()
+    with alarm(patience.left, expire):
+        try:
+            return await result
+        finally:
+            patience.cancel()
+
+
+def _in_loop(call: Callable[..., object]) -> Callable[..., None]:
+    """Return a function for other threads that calls `call` in this thread's event loop."""
+    loop = asyncio.get_running_loop()
+
+    def called(*values: object) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop is closed, so that no task waits
+            loop.call_soon_threadsafe(call, *values)
+
+    return called

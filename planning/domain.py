@@ -184,7 +184,7 @@ class PlanningDomain:
 
     def applicable(self, step: PlanStep, world: World) -> bool:
         """Return whether the arguments fit the parameters' types and the precondition holds."""
-        action, bindings = self.action(step), self.bindings(step)
+        action, bindings = self._filled(step)
         fitting, type_of = world.schema.fitting, world.type_of
         for parameter in action.parameters:
             if type_of(bindings[parameter.name]) not in fitting(parameter.types):
@@ -193,7 +193,8 @@ class PlanningDomain:
 
     def effects(self, step: PlanStep, world: World) -> Delta:
         """Return the changes of the step, applicable or not."""
-        return apply_effect(self.action(step).effect, world, self.bindings(step))
+        action, bindings = self._filled(step)
+        return apply_effect(action.effect, world, bindings)
 
     def precondition(self, step: PlanStep) -> Expression:
         """Return the step's precondition with its arguments as one conjunction, types first."""
@@ -209,7 +210,7 @@ class PlanningDomain:
         return known
 
     def _grounded(self, step: PlanStep) -> GroundStep:
-        action, bindings = self.action(step), self.bindings(step)
+        action, bindings = self._filled(step)
         types = [_type_test(p, bindings[p.name], self.schema) for p in action.parameters]
         condition = substitute(action.precondition, bindings)
         typed = And((*types, *(condition.parts if isinstance(condition, And) else (condition,))))
@@ -230,10 +231,13 @@ class PlanningDomain:
 
     def bindings(self, step: PlanStep) -> dict[str, str]:
         """Return the action's parameters with the step's arguments."""
-        parameters = self.action(step).parameters
-        if len(parameters) != len(step.args):
-            raise InputError(f"'{step.action}' takes {len(parameters)} arguments, {step} has {len(step.args)}")
-        return {p.name: arg for p, arg in zip(parameters, step.args, strict=True)}
+        return self._filled(step)[1]
+
+    def _filled(self, step: PlanStep) -> tuple[PlanningAction, dict[str, str]]:
+        action = self.action(step)
+        if len(action.parameters) != len(step.args):
+            raise InputError(f"'{step.action}' takes {len(action.parameters)} arguments, {step} has {len(step.args)}")
+        return action, {p.name: arg for p, arg in zip(action.parameters, step.args, strict=True)}
 
 
 def _merged(texts: Sequence[DomainText]) -> DomainText:

@@ -6,6 +6,7 @@ next step begins, and changes by other authors immediately (S4.2).
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -212,13 +213,12 @@ class Monitor:
         progress, world = self._progress, self._knowledge.snapshot()
         self._is_broken = True
         now, later = progress.needed() or {}, progress.needed_later() or {}
-        needed = {**now, **{one: user for one, user in later.items() if one not in now}}
         if fallen is None:
-            fallen = next((one for one in needed if not is_true(one, world)), None)
+            fallen = next((one for one in itertools.chain(now, later) if not is_true(one, world)), None)
         why = validate(Plan(progress.remaining_steps), self._domain, world, progress.goal).why
         if fallen is None:
             return Broken(why, "", len(progress.steps) + 1, author, version)
-        return Broken(why, to_text(fallen), needed[fallen], author, version)
+        return Broken(why, to_text(fallen), now.get(fallen) or later[fallen], author, version)
 
 
 def _brought(step: PlanStep, domain: PlanningDomain) -> list[Expression]:

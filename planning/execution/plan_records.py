@@ -45,6 +45,9 @@ class PlanRecords:
         A link has a provider, a fact and a user; steps count from 1. Provider 0 is the present world, and the user
         after the last step is the goal. Links from 0 to the goal are omitted, since a goal may have many parts.
         """
+        if not self._trace.heard:  # the texts of all links take a while
+            self._trace.record("plan.ordered")
+            return
         goal = len(order.steps) + 1
         kept = [link for link in order.links if (link.provider, link.user) != (PRESENT, goal)]
         links = sorted([link.user, link.provider, _text(link.fact)] for link in kept)

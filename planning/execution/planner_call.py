@@ -5,21 +5,19 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import threading
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from dsc.components.hooks import contained
 from knowledge_base.errors import described, text_of
+from planning.cancellable_work import alarm
 from planning.engines.planner import Improving
 from planning.plan import EngineFailed, PlanFound, PlanningOutcome, TimedOut
 
 if TYPE_CHECKING:
-    import asyncio
     from collections.abc import AsyncGenerator, Awaitable
 
     from dsc.sequencer.clock import LoopClock
     from planning.engines.planner import Planner
-    from planning.plan import PlanningOutcome
     from planning.strips import Problem
 
 
@@ -73,17 +71,12 @@ async def _contained(work: Awaitable[_Result]) -> _Result:
 
 
 async def _ends(task: asyncio.Future[Any], seconds: float) -> bool:
-    loop = asyncio.get_running_loop()
-    over = loop.create_future()
-    timer = threading.Timer(min(seconds, threading.TIMEOUT_MAX), lambda: loop.call_soon_threadsafe(over.cancel))
-    timer.daemon = True
-    if math.isfinite(seconds):
-        timer.start()
-    try:
-        await asyncio.wait((task, over), return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        timer.cancel()
-        over.cancel()
+    over = asyncio.get_running_loop().create_future()
+    with alarm(seconds, over.cancel):
+        try:
+            await asyncio.wait((task, over), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            over.cancel()
     return task.done()
 
 

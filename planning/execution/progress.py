@@ -9,7 +9,6 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any
 
 from knowledge_base.errors import InputError
@@ -121,6 +120,8 @@ class PlanProgress:
             sequence by default.
 
     Attributes:
+        running: the steps that have begun, without those that are certainly done.
+        remaining: the steps that are not done, with the running ones, in an executable order.
         early: whether another author has caused an effect of a later step, so that steps may be useless.
     """
 
@@ -138,6 +139,8 @@ class PlanProgress:
         self._before = before
         self._begun: set[int] = set()
         self._done: set[int] = set()
+        self.running: tuple[int, ...] = ()
+        self.remaining = tuple(range(1, len(self.steps) + 1))
         self.early = False
 
     def to_json(self) -> dict[str, Any]:
@@ -159,7 +162,8 @@ class PlanProgress:
     def renewed(self, domain: PlanningDomain, goal: Expression) -> PlanProgress:
         """The same progress, with conditions written for another state of the world."""
         progress = PlanProgress(self.steps, domain, goal, self._before)
-        progress._begun, progress._done = set(self._begun), set(self._done)
+        for number in self._begun:
+            progress.begin(number)
         return progress
 
     def take_order(self, before: AbstractSet[tuple[int, int]]) -> None:
@@ -175,21 +179,13 @@ class PlanProgress:
             earlier = self._earlier(later) - self._done
             self._done |= earlier
             agenda += earlier
+        self.running = tuple(sorted(self._begun - self._done))
+        self.remaining = self._after(self._done)
 
     def _earlier(self, later: int) -> set[int]:
         if self._before is None:
             return set(range(1, later))
         return {first for first, second in self._before if second == later}
-
-    @property
-    def running(self) -> tuple[int, ...]:
-        """The steps that have begun, without those that are certainly done."""
-        return tuple(sorted(self._begun - self._done))
-
-    @property
-    def remaining(self) -> tuple[int, ...]:
-        """The steps that are not done, with the running ones, in an executable order."""
-        return tuple(number for number in range(1, len(self.steps) + 1) if number not in self._done)
 
     @property
     def remaining_steps(self) -> tuple[PlanStep, ...]:
@@ -209,7 +205,7 @@ class PlanProgress:
 
     def steps_of(self, numbers: Iterable[int]) -> tuple[PlanStep, ...]:
         """The steps with these numbers."""
-        return tuple(self.steps[number - 1] for number in numbers)
+        return tuple([self.steps[number - 1] for number in numbers])
 
     def needed_later(self) -> Mapping[Expression, int] | None:
         """As `needed`, if all running steps were done."""
@@ -237,7 +233,7 @@ class PlanProgress:
 
     def _after(self, done: Iterable[int]) -> tuple[int, ...]:
         gone = set(done)
-        return tuple(number for number in self.remaining if number not in gone)
+        return tuple([number for number in self.remaining if number not in gone])
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,10 +280,13 @@ def local_repair(
     if derived.recursive:  # its conditions belong to another state of the world
         before = before.renewed(derived.domain, derived.expand(goal))
     ends = (left[first:] for first in range(min(_MOST_LEFT_OUT + 1, len(left))))
-    known = ((before.steps_of(end), before.needed_by(end)) for end in ends)
-    allowed = [(end, needed) for end, needed in known if excluded.isdisjoint(end)]
-    truths = _Truths(closed)
-    gaps = [(end, needed, truths.unmet(needed)) for end, needed in allowed if needed is not None]
+    needs = [(before.steps_of(end), before.needed_by(end)) for end in ends]
+    truths: dict[int, bool] = {}
+    gaps = [
+        (end, needed, _unmet(needed, closed, truths))
+        for end, needed in needs
+        if needed is not None and excluded.isdisjoint(end)
+    ]
     near = [(end, needed, gap) for end, needed, gap in gaps if len(gap) <= _MOST_UNMET]
     if not near:
         return None
@@ -301,22 +300,20 @@ def local_repair(
     return None if problem.unreachable else LocalRepair(end, problem)
 
 
-class _Truths:
-    """Truth values of conditions, each evaluated once: the ends of a plan share most of their conditions."""
+def _unmet(needed: Iterable[Expression], world: World, known: dict[int, bool]) -> list[Expression]:
+    """Return the conditions that do not hold, at most one more than `_MOST_UNMET`.
 
-    def __init__(self, world: World) -> None:
-        self._world = world
-        self._known: dict[int, bool] = {}  # by identity: conditions live as long as the plan that they are about
-
-    def unmet(self, needed: Iterable[Expression]) -> list[Expression]:
-        """The conditions that do not hold, at most one more than `_MOST_UNMET`."""
-        return list(islice((one for one in needed if not self._holds(one)), _MOST_UNMET + 1))
-
-    def _holds(self, condition: Expression) -> bool:
-        found = self._known.get(id(condition))
-        if found is None:
-            found = self._known[id(condition)] = _true(condition, self._world)
-        return found
+    `known` keeps truth values by identity: the ends of a plan share most of their conditions.
+    """
+    unmet: list[Expression] = []
+    for one in needed:
+        if id(one) not in known:
+            known[id(one)] = _true(one, world)
+        if not known[id(one)]:
+            unmet.append(one)
+            if len(unmet) > _MOST_UNMET:
+                break
+    return unmet
 
 
 def _true(condition: Expression, world: World) -> bool:
