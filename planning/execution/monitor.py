@@ -14,12 +14,12 @@ from typing import Any
 from knowledge_base.conditions.condition import Condition, Firing
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Change
+from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.expression import Atom, Expression
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.execution.progress import PlanProgress, is_true, shortest_end, thinned
-from planning.execution.regression import conjuncts
 from planning.generation.carried_steps import expectation
 from planning.plan import Plan, PlanStep
 from planning.validation import validate

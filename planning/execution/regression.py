@@ -11,6 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from knowledge_base.language.evaluation.lookups import conjuncts
+from knowledge_base.language.syntax.durative import FALSE
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
 from knowledge_base.language.syntax.expression import (
     TRUE,
@@ -38,7 +40,6 @@ from planning.domain import GroundStep, PlanningDomain
 from planning.plan import PlanStep
 from planning.problem.expressions import changed, names_of
 
-FALSE = Or(())
 _CHANGING = {"increase": "+", "decrease": "-", "scale-up": "*", "scale-down": "/"}
 
 
@@ -82,11 +83,6 @@ def regressed(e: Expression, changes: Sequence[Leaf]) -> Expression:
             return empty if within == empty else replace(e, body=within)
         case Comparison():
             return _comparison(e, changes)
-
-
-def conjuncts(e: Expression) -> tuple[Expression, ...]:
-    """The parts of a conjunction, nested ones flattened; of `(and)` none."""
-    return tuple(inner for part in e.parts for inner in conjuncts(part)) if isinstance(e, And) else (e,)
 
 
 def conjunction(parts: Iterable[Expression]) -> Expression:

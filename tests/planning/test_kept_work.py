@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 
 from dsc import ActionPlot, Component, Library, Outcome, SkillCall, skill
 from knowledge_base import Delta, KnowledgeBase, fact
+from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.text import parse_condition, parse_term
 from knowledge_base.pddl.problem_text import Metric
 from planning import Executive, Plan, PlanningDomain, PlanStep, build_problem, plot_from_plan
-from planning.execution.regression import CausalNeeds, conjuncts, leaves, regressed
+from planning.execution.regression import CausalNeeds, leaves, regressed
 
 TEXT = """
 (define (domain shelves) (:types shelf box)
