@@ -36,7 +36,7 @@ from planning.bundles import Bundle, components_of, domain_of, gathered, plots_o
 from planning.domain import PlanningDomain
 from planning.engines.planner import Planner, PlannerProcess
 from planning.engines.race import CachingPlanner, PlannerRace
-from planning.execution.component import PlanningComponent
+from planning.execution.planning_component import PlanningComponent
 from planning.execution.search import Foresight
 from planning.problem.construction import check_goal
 from planning.soundness import require_parts, require_sound

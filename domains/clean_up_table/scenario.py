@@ -56,11 +56,11 @@ PlaceOf = Callable[[tuple[str | int, ...]], Place | None]
 Count = Annotated[int, Field(strict=True, ge=0, le=MAX_ITEMS)]
 
 
-class _Form(Form):
+class _ScenarioForm(Form):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class NamedItem(_Form):
+class NamedItem(_ScenarioForm):
     """One item by name; `red_cup: cup` is short for `red_cup: {kind: cup}`."""
 
     kind: str
@@ -73,7 +73,7 @@ class NamedItem(_Form):
         return {"kind": data} if isinstance(data, str) else data
 
 
-class Table(_Form):
+class Table(_ScenarioForm):
     """The items on the table."""
 
     cups: Count = 0
@@ -82,7 +82,7 @@ class Table(_Form):
     items: dict[str, NamedItem] = Field(default_factory=dict)
 
 
-class Scenario(_Form):
+class Scenario(_ScenarioForm):
     """The start of a run: the items on the table, the robot's place, and the faults."""
 
     table: Table

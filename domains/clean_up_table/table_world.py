@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar
 
 from domains.clean_up_table.items import DESTINATIONS, PLACES, SURFACES
 from domains.clean_up_table.observations import Result, not_possible
-from domains.clean_up_table.robot import RobotBody
+from domains.clean_up_table.robot_body import RobotBody
 from domains.clean_up_table.world_faults import ITEM_SLIPPED, NOTHING_FOUND
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from knowledge_base.language.syntax.expression import Atom, Expression
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
-from planning.execution.progress import PlanProgress, is_true, shortest_end, thinned
+from planning.execution.plan_progress import PlanProgress, is_true, shortest_end, thinned
 from planning.generation.carried_steps import expectation
 from planning.plan import Plan, PlanStep
 from planning.validation import validate

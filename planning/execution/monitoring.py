@@ -14,8 +14,8 @@ from knowledge_base.errors import described
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.execution.monitor import Broken, GoalReached, Monitor, News, Shorter
+from planning.execution.plan_progress import cost_of, shortest_end
 from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, StepEnded, Successor
-from planning.execution.progress import cost_of, shortest_end
 from planning.execution.search import Found, NotFound
 from planning.plan import PlanFound
 

@@ -13,7 +13,7 @@ from planning.ordering.partial_order import PRESENT
 if TYPE_CHECKING:
     from dsc.trace import Trace
     from planning.execution.monitor import Broken
-    from planning.execution.progress import PlanProgress
+    from planning.execution.plan_progress import PlanProgress
     from planning.ordering.partial_order import PartialOrder
     from planning.plan import PlanFound, PlanStep
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning.execution.monitor import Broken, GoalReached, News, Shorter, news_form, news_from
-from planning.execution.progress import PlanProgress
+from planning.execution.plan_progress import PlanProgress
 from planning.execution.search import Found, NotFound
 from planning.plan import PlanStep
 

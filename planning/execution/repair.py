@@ -11,8 +11,8 @@ from dsc.calls import Outcome
 from knowledge_base.language.syntax.effect import effect_conditions
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.identity_cache import IdentityCache
+from planning.execution.plan_progress import PlanProgress, is_true, shortest_end
 from planning.execution.plan_run import EscalationStep, Failure, PlanRun, PlanRuns, PlanState
-from planning.execution.progress import PlanProgress, is_true, shortest_end
 from planning.generation.carried_steps import expectation, implementing
 from planning.generation.plan_to_plot import laid_out, plot_of
 from planning.ordering.causal_tracing import deordered

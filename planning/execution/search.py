@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 from knowledge_base.errors import InputError
 from planning.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.engines.registry import timing
+from planning.execution.plan_progress import local_repair
 from planning.execution.planner_call import Answer, PlannerCalls
-from planning.execution.progress import local_repair
 from planning.explanation import why_unsolvable
 from planning.ordering.causal_tracing import deordered
 from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from knowledge_base.world.state import WorldState
     from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
+    from planning.execution.plan_progress import PlanProgress
     from planning.execution.plan_records import PlanRecords
     from planning.execution.planner_call import Improvements
-    from planning.execution.progress import PlanProgress
     from planning.ordering.partial_order import PartialOrder
     from planning.plan import Plan
     from planning.strips import Problem

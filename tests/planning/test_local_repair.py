@@ -6,7 +6,7 @@ from breadth_first import BreadthFirst
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import Plan, PlanningDomain, PlanStep, validate
-from planning.execution.progress import PlanProgress, local_repair
+from planning.execution.plan_progress import PlanProgress, local_repair
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain shopping)

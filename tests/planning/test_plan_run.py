@@ -10,8 +10,8 @@ from knowledge_base import Delta, KnowledgeBase, UnknownNameError, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanStep
 from planning.execution.monitor import Broken, GoalReached, Shorter
+from planning.execution.plan_progress import PlanProgress
 from planning.execution.plan_run import Attempt, PlanRun, PlanRuns, PlanState, StepEnded, Successor
-from planning.execution.progress import PlanProgress
 from planning.problem.derived import derivation
 
 GOAL = parse_condition("(at c)")

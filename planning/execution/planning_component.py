@@ -15,9 +15,9 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.syntax.text import parse_condition
 from planning.execution.monitoring import Monitoring
+from planning.execution.plan_progress import PlanProgress
 from planning.execution.plan_records import PlanRecords
 from planning.execution.plan_run import Attempt, PlanRun, PlanRuns
-from planning.execution.progress import PlanProgress
 from planning.execution.repair import Choices, Escalation, Plotting
 from planning.execution.search import NotFound, Search
 from planning.problem.derived import derivation
