@@ -12,7 +12,7 @@ import math
 import selectors
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from contextvars import Context, copy_context
+from contextvars import Context, ContextVar, copy_context
 from functools import partial
 from typing import Any, NamedTuple, TypeVar, TypeVarTuple, Unpack
 
@@ -79,6 +79,37 @@ class LoopClock:
 @contextmanager
 def _no_hold() -> Iterator[None]:
     yield
+
+
+class PastClock:
+    """An action's clock after a restart: it begins at the start of the action, and passes the past without waiting.
+
+    Each task of an action passes through the past on its own.
+
+    Args:
+        clock: run time.
+        began: second of run time at which the action began.
+    """
+
+    def __init__(self, clock: LoopClock, began: float) -> None:
+        self._clock = clock
+        self._restart = clock.now()
+        self._own: ContextVar[float] = ContextVar("own", default=began)
+
+    def now(self) -> float:
+        """Seconds of run time, as the action sees it."""
+        own = self._own.get()
+        return own if own < self._restart else self._clock.now()
+
+    async def sleep(self, seconds: float) -> None:
+        """Let `seconds` of the action's time pass."""
+        due = self.now() + seconds
+        self._own.set(due)
+        await self._clock.sleep_until(due)
+
+    def hold(self) -> AbstractContextManager[None]:
+        """Simulated time stands still inside."""
+        return self._clock.hold()
 
 
 def released() -> AbstractContextManager[None]:

@@ -11,14 +11,12 @@ import asyncio
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import replace
 from typing import Any
 
-from dsc.blocking import DeadlineError
-from dsc.calls import Clock, Ended, Outcome, Reports, SkillCall, Status
+from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
 from dsc.components.component import Component
-from dsc.components.hooks import GRACE, contained, give_up, is_own
+from dsc.components.hooks import contained, give_up
 from dsc.components.life_cycle import Life
 from dsc.components.robot import Wiring, require_instances
 from dsc.engine.steps import (
@@ -32,14 +30,13 @@ from dsc.engine.steps import (
     StartTimer,
     SwitchMode,
 )
-from dsc.events import SKILL_ERROR
-from dsc.messages import SkillMessage, TimerMessage
-from dsc.sequencer.cancellation import PendingCleanups, TimeLimit
-from dsc.sequencer.clock import LoopClock
+from dsc.errors import UncertainActionError
+from dsc.messages import LateMessage, SkillMessage, TimerMessage
+from dsc.sequencer.clock import LoopClock, PastClock
+from dsc.sequencer.inbox import Timers
+from dsc.sequencer.message_checks import encoded, late, validated
 from dsc.sequencer.outbox import CLOSING, Outbox, failure
-from dsc.sequencer.outcome_checks import broken, encoded, late, validated
-from dsc.sequencer.resumed_skills import InterruptedSkill, PastClock, required_status
-from dsc.sequencer.timers import Timers
+from dsc.sequencer.running_skills import InterruptedSkill, PendingCleanups, RunningSkill
 from dsc.skills import SkillSignature
 from dsc.supervision.activation import ComponentActivation
 from dsc.supervision.component_registry import ComponentRegistry
@@ -66,14 +63,14 @@ class Dispatcher:
     Attributes:
         activation: keeps required components alive and active.
         outbox: one-way outputs to components.
-        timers: timeouts, periods and delayed events.
+        timers: timeouts, periods, delayed events and later input.
     """
 
     def __init__(
         self,
         components: Iterable[Component],
         clock: LoopClock,
-        post: Callable[[SkillMessage | TimerMessage | SendLater], None],
+        post: Callable[[SkillMessage | TimerMessage | SendLater | LateMessage], None],
         part_of: str = "",
     ) -> None:
         self._part_of = part_of
@@ -84,7 +81,7 @@ class Dispatcher:
         self._faults: list[str] = []
         self._clock = clock
         self._post = post
-        self._running: dict[str, _Running] = {}
+        self._running: dict[str, RunningSkill] = {}
         self._cleanups = PendingCleanups(self.activation.changed)
         self._forget_tasks: set[asyncio.Task[None]] = set()
         self.outbox = Outbox()
@@ -97,7 +94,7 @@ class Dispatcher:
         self._wiring.deployed(component)
 
     def started(self) -> tuple[Start, ...]:
-        """The skills that run, or whose answer was not taken yet."""
+        """Return the skills that run, or have an answer that was not taken yet."""
         return tuple([one.start for one in self._running.values()])
 
     @property
@@ -128,16 +125,16 @@ class Dispatcher:
         elif isinstance(output, Cancel):
             self._cancel(output.activation)
         elif isinstance(output, StartTimer):
-            self.timers.start(output, self._clock.now() + output.seconds)
+            self.timers.schedule(TimerMessage(output), self._clock.now() + output.seconds)
         elif isinstance(output, SendLater):
-            self.timers.send(output, self._clock.now() + output.seconds)
+            self.timers.schedule(output, self._clock.now() + output.seconds)
         elif isinstance(output, Revoke):
             self.timers.revoke(output)
         elif isinstance(output, SetParameter | SwitchMode | SendMessage):
             self.outbox.send(self.component(output.component), output)
             if isinstance(output, SwitchMode):
                 self.activation.switched(output.component, output.mode)
-        # The rest are notes, which the trace has.
+        # The rest are notes for the trace.
 
     @property
     def components(self) -> Mapping[str, Component]:
@@ -145,20 +142,20 @@ class Dispatcher:
         return self._components
 
     def component(self, name: str) -> Component:
-        """The component of that name; raises `UnknownNameError`."""
+        """Return the component of that name; raise `UnknownNameError`."""
         if name not in self._components:
             raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
         return self._components[name]
 
     def memories(self) -> Iterator[tuple[str, Any]]:
-        """Memories of components by their names; a component that fails keeps its last one."""
+        """Yield the memories of components by their names; a component that fails keeps its last one."""
         for component in self._components.values():
             if type(component).remember is not Component.remember:
                 try:
                     with contained():
                         memory = component.remember()
                 except Exception as error:  # noqa: BLE001  # the others remember
-                    self._fault(f"component '{component.name}' cannot say what it remembers: {described(error)}")
+                    self._fault(f"component '{component.name}' cannot return its memory: {described(error)}")
                 else:
                     yield component.name, memory
 
@@ -168,7 +165,7 @@ class Dispatcher:
             self._faults.append(what)
 
     def settle(self, start: Start) -> None:
-        """The final answer of a skill was taken; until then its component counts as in use."""
+        """Take the final answer of a skill; until then its component counts as in use."""
         self._running.pop(start.action_id, None)
         if start.component in self.activation.concerned:
             self.activation.look()
@@ -179,7 +176,7 @@ class Dispatcher:
             task.add_done_callback(self._forget_tasks.discard)
 
     def report_taken(self, start: Start) -> None:
-        """A report of a skill was taken, so that there is room for another."""
+        """Take a report of a skill, so that there is room for another."""
         running = self._running.get(start.action_id)
         if running is not None and running.reports is not None:
             running.reports.taken()
@@ -196,9 +193,10 @@ class Dispatcher:
         if start.action_id not in self._running:
             return
         stopped = self._running.pop(start.action_id)
-        stopped.limit.end()
+        stopped.stopped = True
+        stopped.end_limit()
         stopped.task.cancel()
-        self._cleanups.add(start.component, stopped.task, partial(self._not_stopped, start))
+        self._cleanups.add(start.component, stopped.task, stopped.given_up)
 
     def restore(self, component: str, effective: Sequence[SetParameter | SwitchMode]) -> None:
         """Restore the effective settings of before a restart; raises `UnknownNameError`."""
@@ -225,7 +223,7 @@ class Dispatcher:
                 with contained():
                     ended = await component.abandon(action_id, start.skill, encoded(start.arguments))
         except Exception as error:  # an error of a component must not end the program
-            raise InputError(f"{start.component}.{start.skill} may still go on: {described(error)}") from error
+            raise InputError(f"{start.component}.{start.skill} may continue: {described(error)}") from error
         if ended is not None:
             signature = component.skills().get(start.skill, UNKNOWN_SKILL)
             outcome = validated(ended.outcome, start, signature)
@@ -257,92 +255,66 @@ class Dispatcher:
         signature = component.skills().get(start.skill, UNKNOWN_SKILL)
         within = start.within or (math.inf if signature.pattern == "event" else DEFAULT_WITHIN)
         due = within + (self._clock.now() if interrupted is None else interrupted.began)
-        running = _Running(start, signature, within, due)
+        running = RunningSkill(start, signature, within, due, self._clock, self._post, self._fault)
         running.task = asyncio.get_running_loop().create_task(self._execute(component, running, interrupted))
-        running.over = partial(self._over, running)
-        running.task.add_done_callback(running.over)
+        running.task.add_done_callback(running.ended)
         self._running[start.action_id] = running
         if start.component in self.activation.concerned:
             self.activation.look()
-        running.limit = TimeLimit(running.task, partial(self._overdue, start), self._clock, due)
+        running.begin_limit()
 
     def _id(self, start: Start) -> str:
         return self._part_of + start.action_id
 
-    def _report(self, running: _Running, report: Outcome, conflated: int) -> None:
-        if report.event == SKILL_ERROR:
-            self._post(SkillMessage(running.start, report, final=True, goes_on=True, conflated=conflated))
-            return
-        declared = running.signature.outcomes.get(report.event)
-        self._post(SkillMessage(running.start, report, final=False, conflated=conflated, declared=declared))
+    async def _execute(self, component: Component, running: RunningSkill, interrupted: InterruptedSkill | None) -> None:
+        dependencies = SkillDependencies(self._registry, self.activation, component)
+        try:
+            outcome = await self._outcome(component, running, dependencies, interrupted)
+        except BaseException as error:
+            failed = running.failed(error, dependencies.missing)
+            if failed is None:
+                raise
+            outcome = failed
+        running.answer(outcome)
+        running.task.remove_done_callback(running.ended)  # each takes a turn of the loop
 
-    def _overdue(self, start: Start) -> None:
-        """A skill ignored its time limit; the chart need not wait for it."""
-        running = self._running.get(start.action_id)
-        if running is not None and not running.answered:
-            self._not_stopped(start)
-            self._answer(running, late(start, running.within))
-
-    def _not_stopped(self, start: Start) -> None:
-        skill = f"{start.component}.{start.skill}"
-        self._fault(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
-
-    def _answer(self, running: _Running, outcome: Outcome) -> None:
-        """Post the end of a skill, one time; its time limit ends only after that."""
-        if not running.answered:
-            if running.reports is not None:
-                running.reports.flush()
-            declared = running.signature.outcomes.get(outcome.event) if outcome.attributes else None
-            self._post(SkillMessage(running.start, outcome, final=True, declared=declared))
-            running.answered = True
-            running.limit.end()
-
-    def _over(self, running: _Running, task: asyncio.Task[None]) -> None:
-        """The task of a skill has ended: without an answer the skill has failed, unless it was stopped."""
-        why = asyncio.CancelledError("its task was cancelled") if task.cancelled() else task.exception()
-        if why is not None and self._running.get(running.start.action_id) is running:
-            self._answer(running, broken(running.start, described(why)))
-
-    async def _execute(self, component: Component, running: _Running, interrupted: InterruptedSkill | None) -> None:
-        self._answer(running, await self._outcome(component, running, interrupted))
-        running.task.remove_done_callback(running.over)  # each takes a turn of the loop
-
-    async def _outcome(self, component: Component, running: _Running, interrupted: InterruptedSkill | None) -> Outcome:
-        start, signature, taken = running.start, running.signature, 0
+    async def _outcome(
+        self,
+        component: Component,
+        running: RunningSkill,
+        dependencies: SkillDependencies,
+        interrupted: InterruptedSkill | None,
+    ) -> Outcome:
+        start, signature = running.start, running.signature
+        taken = 0  # reports before the restart that are repeated
 
         def report(outcome: Outcome) -> None:
             nonlocal taken
-            if taken:  # before the restart
+            if taken:
                 taken -= 1
-            elif start.action_id in self._running:
-                running.reports = running.reports or Reports(partial(self._report, running))
-                running.reports.put(validated(outcome, start, signature))
+            else:
+                running.report(outcome)
 
-        dependencies = SkillDependencies(self._registry, self.activation, component)
         clock: Clock = PastClock(self._clock, interrupted.began) if interrupted else self._clock
-        call = SkillCall(self._part_of + start.action_id, clock, report, running.due, self._fault)
-        try:
-            if component.name in self._cleanups.pending and not component.concurrent and signature.pattern == "skill":
-                await self._cleanups.over(component.name)
-            if component.name in self.outbox.untaken:
-                await self.outbox.taken(component)
-            if dependencies.concerned or component.life.state is not Life.ALIVE:
-                await dependencies.ready()
-            if interrupted is not None:
-                status = await required_status(component, signature, start, call.action_id)
-                if isinstance(status, Ended):
-                    return validated(status.outcome, start, signature)
-                if status is Status.RUNNING or signature.pattern != "event":  # else it is activated again
-                    taken = interrupted.reports
-            work = component.execute(start.skill, call, encoded(start.arguments) if start.arguments else {})
-            outcome = validated(await dependencies.carrying(work), start, signature)
-        except BaseException as error:
-            failed = _failed(error, running, dependencies)
-            if failed is None:
-                raise
-            return failed
+        call = SkillCall(self._id(start), clock, report, running.due, self._fault)
+        if component.name in self._cleanups.pending and not component.concurrent and signature.pattern == "skill":
+            await self._cleanups.over(component.name)
+        if component.name in self.outbox.untaken:
+            await self.outbox.taken(component)
+        if dependencies.concerned or component.life.state is not Life.ALIVE:
+            await dependencies.ready()
+        if interrupted is not None:
+            status = await component.status(call.action_id, start.skill, start.arguments)
+            if isinstance(status, Ended):
+                return validated(status.outcome, start, signature)
+            if status is Status.UNKNOWN and signature.after_crash == "sense":
+                raise UncertainActionError(f"the run was interrupted, and the effect of {call.action_id} is unknown")
+            if status is Status.RUNNING or signature.pattern != "event":  # else it is activated again
+                taken = interrupted.reports
+        work = component.execute(start.skill, call, encoded(start.arguments) if start.arguments else {})
+        outcome = validated(await dependencies.carrying(work), start, signature)
         # Its observations are true, however late they arrive.
-        return replace(late(start, running.within), observed=outcome.observed) if running.limit.passed else outcome
+        return replace(late(start, running.within), observed=outcome.observed) if running.is_late else outcome
 
     def _cancel(self, activation: int) -> None:
         for running in tuple(self._running.values()):
@@ -351,45 +323,6 @@ class Dispatcher:
         self.timers.cancel(activation)
 
 
-@dataclass(slots=True)
-class _Running:
-    """A skill that runs.
-
-    Attributes:
-        start, signature: of the skill.
-        within, due: seconds that it may take, and the second of run time at which they are over.
-        task, limit: its execution, and the bound of that.
-        over: the callback at the end of the task.
-        reports: its intermediate events.
-        answered: whether its end was posted.
-    """
-
-    start: Start
-    signature: SkillSignature
-    within: float
-    due: float
-    task: asyncio.Task[None] = field(init=False)
-    limit: TimeLimit = field(init=False)
-    over: Callable[[asyncio.Task[None]], None] = field(init=False)
-    reports: Reports | None = None
-    answered: bool = False
-
-
 async def _forgotten(component: Component, action_id: str) -> None:
     with suppress(Exception), contained():  # the action is over: an error now must not end the run
         await component.forget(action_id)
-
-
-def _failed(error: BaseException, running: _Running, dependencies: SkillDependencies) -> Outcome | None:
-    """The outcome of a skill that raised; `None` if its task was cancelled from outside."""
-    start, limit = running.start, running.limit
-    cancelled = issubclass(type(error), asyncio.CancelledError)
-    if cancelled and limit.has_cancelled():
-        return late(start, running.within, dependencies.missing)
-    if not is_own(error, running.task):
-        return None
-    if cancelled:
-        return broken(start, "CancelledError: it cancelled itself")
-    if limit.passed or issubclass(type(error), DeadlineError):
-        return late(start, running.within)
-    return broken(start, described(error))

@@ -1,4 +1,4 @@
-"""Inbox holds messages until the sequencer takes them, now or at a later time."""
+"""Inbox holds messages until the sequencer takes them; timers post messages that are due later."""
 
 from __future__ import annotations
 
@@ -6,9 +6,18 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 
-from dsc.engine.steps import Start
-from dsc.messages import LateMessage, Message, SkillMessage
+from dsc.engine.steps import Revoke, SendLater, Start
+from dsc.events import EVERY
+from dsc.messages import LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.clock import LoopClock
+
+MOST_AT_ONCE = 10_000
+"""Upper bound of answers, timers and own events that a run takes at one moment of simulated time.
+
+A long plan of skills that take no time needs a few thousand.
+"""
+_SHOWN = 8
+"""Number of events that the message about a livelock lists."""
 
 
 class Inbox:
@@ -31,7 +40,7 @@ class Inbox:
             self._arrival.set_result(None)
 
     def arrival(self) -> asyncio.Future[None]:
-        """Resolves when the next message arrives."""
+        """Return a future that resolves when the next message arrives."""
         self._arrival = asyncio.get_running_loop().create_future()
         return self._arrival
 
@@ -44,37 +53,92 @@ class Inbox:
         self.waiting = deque(m for m in self.waiting if not (isinstance(m, SkillMessage) and m.start == start))
 
 
-class ScheduledInput:
-    """Messages of later moments.
+class Timers:
+    """Messages that are due later: timeouts and periods of states, delayed events, and input from outside.
 
     Args:
         clock: run time.
         post: receives each message when it is due.
     """
 
-    def __init__(self, clock: LoopClock, post: Callable[[LateMessage], None]) -> None:
+    def __init__(self, clock: LoopClock, post: Callable[[TimerMessage | SendLater | LateMessage], None]) -> None:
         self._clock = clock
         self._post = post
-        self._scheduled: dict[int, tuple[LateMessage, float, asyncio.TimerHandle]] = {}
+        self._pending: dict[int, tuple[TimerMessage | SendLater | LateMessage, float, asyncio.TimerHandle]] = {}
+        self._last = 0
 
-    def __bool__(self) -> bool:
-        """Whether there are any."""
-        return bool(self._scheduled)
+    @property
+    def waiting(self) -> bool:
+        """Whether a message is pending; periods, which are always pending, do not count."""
+        return any(not (isinstance(one, TimerMessage) and one.timer.event == EVERY) for one, _, _ in self)
 
-    def __iter__(self) -> Iterator[tuple[LateMessage, float]]:
-        """Each message with the second of run time at which it is due."""
-        return ((late, due) for late, due, _ in self._scheduled.values())
+    @property
+    def periods(self) -> frozenset[tuple[int, int]]:
+        """Activation and number of every pending period."""
+        timers = [one.timer for one, _, _ in self if isinstance(one, TimerMessage)]
+        return frozenset((timer.activation, timer.index) for timer in timers if timer.event == EVERY)
 
-    def schedule(self, late: LateMessage, due: float) -> None:
-        """Post the message at that second of run time."""
+    def __iter__(self) -> Iterator[tuple[TimerMessage | SendLater | LateMessage, float, asyncio.TimerHandle]]:
+        """Yield each pending message with the second of run time at which it is due, and its handle."""
+        return iter(self._pending.values())
+
+    def schedule(self, message: TimerMessage | SendLater | LateMessage, due: float) -> None:
+        """Post the message at that second of run time, unless it is cancelled or revoked before."""
+        number = self._last = self._last + 1
 
         def arrive() -> None:
-            del self._scheduled[late.number]
-            self._post(late)
+            del self._pending[number]
+            self._post(message)
 
-        self._scheduled[late.number] = late, due, self._clock.call_at(due, arrive)
+        self._pending[number] = message, due, self._clock.call_at(due, arrive)
+
+    def cancel(self, activation: int) -> None:
+        """Cancel the timers of a state that was exited."""
+        self._drop(lambda one: isinstance(one, TimerMessage) and one.timer.activation == activation)
+
+    def revoke(self, revoke: Revoke) -> None:
+        """Cancel the events of that id."""
+        which = revoke.frame, revoke.id
+        self._drop(lambda one: isinstance(one, SendLater) and (one.event.frame, one.id) == which)
 
     def close(self) -> None:
         """Cancel all messages."""
-        for _, _, handle in self._scheduled.values():
-            handle.cancel()
+        self._drop(lambda _: True)
+
+    def _drop(self, wanted: Callable[[Message], bool]) -> None:
+        for number, (message, _, handle) in tuple(self._pending.items()):
+            if wanted(message):
+                handle.cancel()
+                del self._pending[number]
+
+
+class LivelockGuard:
+    """Counts the messages that a run causes itself at one moment of simulated time.
+
+    Real time always passes, and an operator can stop a robot in a livelock.
+    """
+
+    def __init__(self, clock: LoopClock) -> None:
+        self._clock = clock
+        self._moment = clock.now()
+        self._count = 0
+        self._latest: deque[str] = deque(maxlen=_SHOWN)
+
+    def problem(self, message: Message) -> str | None:
+        """Return the reason to end the run at this message, or `None`."""
+        match message:
+            case SkillMessage():
+                event = message.outcome.event
+            case TimerMessage():
+                event = message.timer.event
+            case SendLater():
+                event = message.event.name
+            case _:  # from outside
+                return None
+        if (now := self._clock.now()) != self._moment:
+            self._moment, self._count = now, 0
+        self._count += 1
+        self._latest.append(event)
+        if self._count <= MOST_AT_ONCE:
+            return None
+        return f"no time has passed for {MOST_AT_ONCE} macrosteps; the plot goes round: {' -> '.join(self._latest)}"

@@ -12,7 +12,7 @@ from dsc.components.hooks import GRACE, contained
 from dsc.components.life_cycle import Life
 from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
 from dsc.messages import Told
-from dsc.sequencer.outcome_checks import encoded
+from dsc.sequencer.message_checks import encoded
 from knowledge_base.errors import described
 
 CLOSING = GRACE

@@ -6,11 +6,10 @@ import asyncio
 from collections.abc import Iterable
 
 from dsc.engine.steps import SendLater, SetParameter, Start, StartTimer, SwitchMode
-from dsc.messages import LateMessage
+from dsc.messages import LateMessage, TimerMessage
 from dsc.runs.encoding import Kept, Pending
 from dsc.sequencer.dispatcher import Dispatcher
-from dsc.sequencer.inbox import ScheduledInput
-from dsc.sequencer.resumed_skills import InterruptedSkill
+from dsc.sequencer.running_skills import InterruptedSkill
 
 
 def require_components(kept: Kept, dispatcher: Dispatcher) -> None:
@@ -20,7 +19,7 @@ def require_components(kept: Kept, dispatcher: Dispatcher) -> None:
         dispatcher.component(needed)
 
 
-async def recover(kept: Kept, dispatcher: Dispatcher, scheduled: ScheduledInput) -> None:
+async def recover(kept: Kept, dispatcher: Dispatcher) -> None:
     """Restore components, and re-arm the pending actions, timers and inputs.
 
     Outputs of the last macrostep may never have left, so they leave (again) after everything else is restored.
@@ -40,10 +39,10 @@ async def recover(kept: Kept, dispatcher: Dispatcher, scheduled: ScheduledInput)
         dispatcher.restore(component, settings)
     await dispatcher.outbox.all_taken()
     for one in others:
-        _rearm(one, dispatcher, scheduled)
+        _rearm(one, dispatcher)
     await asyncio.sleep(0)  # until these have begun
     for one in pending[len(older) :]:
-        _rearm(one, dispatcher, scheduled)
+        _rearm(one, dispatcher)
 
 
 def _divided(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | SwitchMode]], list[Pending]]:
@@ -58,15 +57,13 @@ def _divided(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | Sw
     return effective, others
 
 
-def _rearm(one: Pending, dispatcher: Dispatcher, scheduled: ScheduledInput) -> None:
+def _rearm(one: Pending, dispatcher: Dispatcher) -> None:
     match one.what:
         case Start():
             dispatcher.resume(one.what, InterruptedSkill(one.at, one.reports))
         case StartTimer():
-            dispatcher.timers.start(one.what, one.at)
-        case SendLater():
-            dispatcher.timers.send(one.what, one.at)
-        case LateMessage():
-            scheduled.schedule(one.what, one.at)
+            dispatcher.timers.schedule(TimerMessage(one.what), one.at)
+        case SendLater() | LateMessage():
+            dispatcher.timers.schedule(one.what, one.at)
         case _:
             dispatcher.dispatch(one.what)

@@ -15,12 +15,10 @@ from dsc.events import GAVE_UP, NO_PLAN, Event
 from dsc.messages import FromOutside, LateMessage, Message, SkillMessage
 from dsc.runs.encoding import Kept
 from dsc.runs.store import RunStore
-from dsc.sequencer import input_checks
+from dsc.sequencer import message_checks
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.dispatcher import Dispatcher
-from dsc.sequencer.inbox import Inbox, ScheduledInput
-from dsc.sequencer.livelock import LivelockGuard
-from dsc.sequencer.outcome_checks import validated_in_world
+from dsc.sequencer.inbox import Inbox, LivelockGuard
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.recovery import recover, require_components
 from dsc.trace import Trace
@@ -83,7 +81,7 @@ class Sequencer:
         store: RunStore | None = None,
         part_of: str = "",
     ) -> None:
-        input_checks.require_parts(library, knowledge, clock, trace, store)
+        message_checks.require_parts(library, knowledge, clock, trace, store)
         self.library = library
         self.knowledge = knowledge
         self.trace = trace or Trace(clock.now)
@@ -95,7 +93,6 @@ class Sequencer:
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, part_of)
         self._open_ended = open_ended
-        self._scheduled = ScheduledInput(clock, self._inbox.put)
         self._last_late = store.last_late if store is not None else 0
         self._before_events: list[Callable[[], Awaitable[None]]] = []
 
@@ -149,7 +146,7 @@ class Sequencer:
             InputError: only the executive itself fires the event, e.g. `done`, or an attribute is not plain data.
             StoreError: it could not be kept.
         """
-        self._hand_in(input_checks.event(event), after)
+        self._hand_in(message_checks.checked_event(event), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
         """Hand in a change of knowledge from outside; from the loop's own thread.
@@ -163,7 +160,7 @@ class Sequencer:
             InputError: the change contradicts the schema; nothing was changed.
             StoreError: it could not be kept.
         """
-        self._hand_in(input_checks.change(delta, author, self.knowledge), after)
+        self._hand_in(message_checks.checked_change(delta, author, self.knowledge), after)
 
     def set_parameter(self, owner: str, name: str, value: object, *, after: float = 0.0) -> None:
         """Hand in an operator's setting of a parameter; from the loop's own thread.
@@ -182,7 +179,8 @@ class Sequencer:
             InputError: the value is out of range, breaks a relation, or is not for operators to say.
             StoreError: it could not be kept.
         """
-        self._hand_in(input_checks.parameter(owner, name, value, self.dispatcher.components, self.library), after)
+        setting = message_checks.checked_setting(owner, name, value, self.dispatcher.components, self.library)
+        self._hand_in(setting, after)
 
     async def run(self, plot: str, arguments: Mapping[str, Any] | None = None) -> RunEnd:
         """Run the plot until it ends, or until a deadlock.
@@ -191,7 +189,7 @@ class Sequencer:
             InputError: the plot is unknown, or a parameter is missing or unknown.
             StoreError: the store cannot be written; the run can resume from its last commit.
         """
-        given = input_checks.arguments(self.library.plot(plot), {} if arguments is None else arguments)
+        given = message_checks.checked_arguments(self.library.plot(plot), {} if arguments is None else arguments)
 
         async def begin() -> None:
             self._start(plot, given)
@@ -221,7 +219,7 @@ class Sequencer:
             while not machine.state.finished and reactor.problem is None:
                 if not inbox.waiting:
                     if self._is_deadlock():
-                        reactor.problem = "nothing is going on and nothing can happen any more"
+                        reactor.problem = "deadlock: no skill, timer or event is pending"
                         break
                     await inbox.arrival()
                 for wait in self._before_events:
@@ -237,7 +235,6 @@ class Sequencer:
             self._keep_end()
             raise
         finally:
-            self._scheduled.close()
             try:
                 self._leave()
             finally:
@@ -258,7 +255,7 @@ class Sequencer:
     async def _recover(self, kept: Kept) -> None:
         self._reactor.restore(kept)
         try:
-            await recover(kept, self.dispatcher, self._scheduled)
+            await recover(kept, self.dispatcher)
         except InputError as error:
             self._reactor.problem = str(error)
 
@@ -273,15 +270,16 @@ class Sequencer:
         with store.writing:
             serials = store.begin(plot, arguments, self.library)
             reactor.tracer.world(self.knowledge)
-            for late, due in self._scheduled:
-                store.late(late, due)
+            for late, due, _ in self.dispatcher.timers:
+                if isinstance(late, LateMessage):
+                    store.late(late, due)
             output = reactor.start(plot, arguments, serials)
             self._keep_step(None, output)
         self._carry_out(output)
 
     def _take(self, message: Message) -> None:
         if isinstance(message, SkillMessage):
-            message = validated_in_world(message, self.knowledge)
+            message = message_checks.validated_in_world(message, self.knowledge)
         if self.store is None:
             output = self._reactor.react(message)
         else:
@@ -348,7 +346,7 @@ class Sequencer:
     # -- from outside ------------------------------------------------------------------------------------
 
     def _hand_in(self, message: FromOutside, after: float) -> None:
-        input_checks.require_seconds(after)
+        message_checks.require_seconds(after)
         if after <= 0:
             self._inbox.put(message)
             return
@@ -357,10 +355,10 @@ class Sequencer:
         if self.store is not None and self.store.begun:
             with self.store.writing:
                 self.store.late(late, due)
-        self._scheduled.schedule(late, due)
+        self.dispatcher.timers.schedule(late, due)
 
     def _is_deadlock(self) -> bool:
-        """Whether no message can come: periods that all have changed nothing will never change anything."""
-        if self._open_ended or self._scheduled or self.dispatcher.waiting:
+        """Return whether no message can come: periods that all have changed nothing will never change anything."""
+        if self._open_ended or self.dispatcher.waiting:
             return False
         return self.dispatcher.timers.periods <= self._reactor.in_vain

@@ -13,7 +13,7 @@ from dsc.engine.steps import Cancel, Output, Revoke, SendLater, Start, StartTime
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN
-from dsc.sequencer.outcome_checks import late
+from dsc.sequencer.message_checks import late
 from dsc.sequencer.reactor import CHART
 from dsc.testing.fixtures import change_of, world
 from knowledge_base.errors import InputError, UnknownNameError

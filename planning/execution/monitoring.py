@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dsc.calls import Outcome
-from dsc.sequencer.resumed_skills import PastClock
+from dsc.sequencer.clock import PastClock
 from knowledge_base.errors import described
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay

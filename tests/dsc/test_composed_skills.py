@@ -275,7 +275,7 @@ def test_a_plot_that_is_a_skill_and_gets_stuck_is_a_skill_error():
         "{plot: p, states: {a: {entry: {trigger: helper.stuck}, on: {completed: e}}, e: {final: true}}}",
         arm=helper(Arm(), stuck),
     )
-    assert "nothing can happen" in ran.end.problem
+    assert "no skill, timer or event is pending" in ran.end.problem
 
 
 def test_a_plot_as_a_skill_has_its_interface():

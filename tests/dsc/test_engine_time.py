@@ -110,7 +110,7 @@ def test_a_run_in_which_only_periods_pass_in_vain_ends_with_a_problem():
         "{plot: p, states: {a: {every: [{seconds: 1, when: (p), to: b}, {seconds: 3, emit: x}]}, b: {final: true}}}"
     )
     assert not ran.end.finished
-    assert "nothing can happen any more" in ran.end.problem
+    assert "no skill, timer or event is pending" in ran.end.problem
     assert ran.at == 3.0
 
 

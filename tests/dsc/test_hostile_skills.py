@@ -17,7 +17,7 @@ from dsc.components.behaviour_trees import action, condition, sequence, tree_ski
 from dsc.components.component import Component
 from dsc.components.ports import takes
 from dsc.dynamic.library import Library
-from dsc.sequencer import dispatcher, outcome_checks
+from dsc.sequencer import dispatcher, message_checks, running_skills
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.sequencer.plot_skill import PlotComponent
 from dsc.sequencer.sequencer import Sequencer
@@ -246,8 +246,8 @@ def test_the_time_limit_holds_even_if_the_handler_of_ends_fails(broken_part, mon
     def fails(*_):
         raise RuntimeError("a fault of our own")
 
-    for module in (dispatcher, outcome_checks):
-        monkeypatch.setattr(module, broken_part, fails)
+    for module in (dispatcher, running_skills, message_checks):
+        monkeypatch.setattr(module, broken_part, fails, raising=module is not dispatcher)
     ran = Ran(
         ANSWERS.replace("SKILL", "awaited"),
         arm=Hostile(raising(NoTextError) if broken_part == "broken" else lambda: Outcome("ok")),

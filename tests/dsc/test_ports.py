@@ -126,7 +126,7 @@ def test_an_event_may_never_come_and_does_not_keep_the_run():
     text = "{plot: p, states: {a: {entry: {trigger: battery.low}, on: {low: e}}, e: {final: true}}}"
     end = ran(text).end
     assert not end.finished
-    assert "nothing can happen" in end.problem
+    assert "no skill, timer or event is pending" in end.problem
 
 
 def test_an_event_is_waited_for_within_a_bound():

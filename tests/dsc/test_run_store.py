@@ -554,4 +554,4 @@ def test_what_an_action_observed_that_had_ended_when_it_was_cancelled_is_known_a
 
 def test_a_component_that_cannot_stop_it_ends_the_run_with_that(tmp_path):
     end, _, _ = run_with(cancelled(tmp_path)[1], CANCELLING, Stubborn(fails=True), resume=True)
-    assert end == RunEnd(finished=False, problem="robot.fetch may still go on: RuntimeError: no contact")
+    assert end == RunEnd(finished=False, problem="robot.fetch may continue: RuntimeError: no contact")

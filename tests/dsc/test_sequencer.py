@@ -121,14 +121,14 @@ def test_an_outcome_whose_guards_do_not_hold_ends_the_run_with_a_problem():
 def test_nothing_to_wait_for_ends_the_run_with_a_problem():
     ran = Ran("{plot: p, states: {a: {on: {stop: e}}, e: {final: true}}}")
     assert not ran.end.finished
-    assert ran.end.problem == "nothing is going on and nothing can happen any more"
+    assert ran.end.problem == "deadlock: no skill, timer or event is pending"
 
 
 def test_a_timeout_that_leads_nowhere_does_not_keep_the_run_alive():
     ran = Ran(
         "{plot: p, states: {a: {after: [{seconds: 0.1, to: e, when: (p)}, {seconds: 0.3, to: e, when: (p)}]}, e: {final: true}}}"
     )
-    assert "nothing is going on" in ran.end.problem
+    assert "deadlock: no skill, timer or event is pending" in ran.end.problem
     assert ran.at == pytest.approx(0.3)
 
 
@@ -434,7 +434,7 @@ def test_a_run_waits_for_what_is_still_to_come_and_for_no_longer():
 
     text = "{plot: p, receives: {go: }, states: {a: {on: {go: e}, always: {to: b, when: (q)}}, b: {on: {go: e}}, e: {final: true}}}"
     ran = Ran(text, prepare=prepare)
-    assert ran.end.problem == "nothing is going on and nothing can happen any more"
+    assert ran.end.problem == "deadlock: no skill, timer or event is pending"
     assert ran.at == pytest.approx(20)
     assert any("b" in micro["entered"] for step in ran.of_type("step") for micro in step["microsteps"])
 

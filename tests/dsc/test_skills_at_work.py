@@ -246,9 +246,9 @@ SAYS = BREAKS.replace("arm.breaks, with: {how: HOW}", "arm.SKILL").replace("ok: 
     ({"why": None}, "the attribute 'why' of 'said' is text, not None"),
     ({"what": 7}, "the attribute 'what' of 'said' is a name, not 7"),
     ({"item": "ghost"}, "the attribute 'item' of 'said' is of type item, and there is no object 'ghost'; valid: cup1, cup2"),
-    ({"item": 3}, "the attribute 'item' of 'said' is of type item, and 3 is no name"),
+    ({"item": 3}, "the attribute 'item' of 'said' is of type item, and 3 is not a name"),
     ({"item": "fork"}, "the attribute 'item' of 'said' is of type item, and 'fork' is of type object"),
-    ({"any": [math.nan]}, "the attributes of 'said' are no plain data: Out of range float values"),
+    ({"any": [math.nan]}, "the attributes of 'said': not plain data: Out of range float values"),
     ({"whi": "so"}, "the outcome 'said' has no attribute 'whi'; did you mean 'why'?"),
 ])  # fmt: skip
 @pytest.mark.parametrize("skill_name", ["says", "reports"])

@@ -173,7 +173,7 @@ def test_a_run_waits_for_events_that_are_still_to_come():
     assert run.finished
     assert run.seconds == pytest.approx(100)
     too_few = rehearse([waiting], "p", events=[(5, Event("go", {"n": 1}))])
-    assert too_few.problem == "nothing is going on and nothing can happen any more"
+    assert too_few.problem == "deadlock: no skill, timer or event is pending"
     assert too_few.seconds == pytest.approx(5)
 
 

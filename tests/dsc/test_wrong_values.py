@@ -91,7 +91,7 @@ def sequencer_of(**other):
         (at_work(lambda run: run.run(None)), "there is no plot 'None'"),
         (at_work(lambda run: run.run("p", ["n"])), "arguments are a mapping of parameters' names to values, not ['n']"),
         (at_work(lambda run: run.run("p", {"n": "three"})), "'p.n' is a number; found three"),
-        (at_work(lambda run: run.run("p", {"n": 1, "why": {2}})), "the argument 'why' is no plain data"),
+        (at_work(lambda run: run.run("p", {"n": 1, "why": {2}})), "the argument 'why': not plain data"),
         (at_work(lambda _: sequencer([Arm]) and None), "an instance is made by Arm()"),
         (at_work(lambda _: sequencer([Arm(), Arm()]) and None), "two components are named 'arm'"),
         (sequencer_of(library=[PLOT]), "the plots are given as a Library, made by Library(plots), not [ActionPlot(name='p'"),

@@ -264,8 +264,8 @@ def test_a_skill_that_works_for_another_state_is_somebody_else_to_the_monitor():
     ("hand_in", "said"),
     [
         (lambda sequencer: sequencer.change(Delta(added=(fact("onn", "a"),)), "me"), "did you mean 'on'"),
-        (lambda sequencer: sequencer.post(Event("stop", {"at": float("nan")})), "no plain data"),
-        (lambda sequencer: sequencer.post(Event("stop", {"who": object()})), "no plain data"),
+        (lambda sequencer: sequencer.post(Event("stop", {"at": float("nan")})), "not plain data"),
+        (lambda sequencer: sequencer.post(Event("stop", {"who": object()})), "not plain data"),
     ],
     ids=["change", "not_a_number", "no_data"],
 )
@@ -484,7 +484,7 @@ def stuck(_):
 MISBEHAVIOUR = [
     (stuck, "lamps.light: RuntimeError: the switch is stuck"),
     (lambda _: Outcome("dark"), "lamps.light: it ended with 'dark', which it does not declare"),
-    (lambda _: "lit", "lamps.light: it ended with 'lit', which is no outcome"),
+    (lambda _: "lit", "lamps.light: it ended with 'lit', which is not an Outcome"),
     (
         lambda lamp: Outcome("lit", observed=Delta(added=(fact("onn", lamp),))),
         "lamps.light: there is no predicate 'onn'",

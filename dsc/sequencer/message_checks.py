@@ -1,0 +1,263 @@
+"""Checks of messages: skills' outcomes against signature and world, and untyped input to a run."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dsc.calls import OBSERVED, Outcome
+from dsc.components.component import Component
+from dsc.components.hooks import is_own, running_task
+from dsc.dynamic.library import Library
+from dsc.engine.steps import NO_CHANGE, Start
+from dsc.events import NO_ATTRIBUTES, RESERVED, SKILL_ERROR, TIMED_OUT, Event
+from dsc.messages import KnowledgeMessage, ParameterMessage, SkillMessage
+from dsc.model.plot import ActionPlot
+from dsc.runs.store import RunStore
+from dsc.sequencer.clock import LoopClock
+from dsc.skills import SkillSignature
+from dsc.trace import Trace
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
+from knowledge_base.facts import Delta
+from knowledge_base.language.checking.inputs import require, require_delta, require_text, shown
+from knowledge_base.language.evaluation.world import World
+from knowledge_base.store import KnowledgeBase
+
+Declared = Mapping[str, str | None]
+"""Names of attributes -> types; `None` accepts any type."""
+
+
+def encoded(value: Any) -> Any:
+    """Copy plain data, so that nothing is shared by accident."""
+    if isinstance(value, dict) and not value:  # most skills have neither arguments nor attributes
+        return {}
+    return json.loads(json.dumps(value, allow_nan=False))
+
+
+def _copied(value: Any, name: str) -> Any:
+    """Copy plain data from outside; raise `InputError`."""
+    try:
+        return encoded(value)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: not plain data: {described(error, named=False)}") from None
+
+
+# -- outcomes of skills ------------------------------------------------------------------------------------
+
+
+def broken(start: Start, reason: str) -> Outcome:
+    """Return the `skill_error` of a skill that broke a rule; the reason becomes one line."""
+    skill = f"{start.component}.{start.skill}"
+    return Outcome(SKILL_ERROR, {"skill": skill, "reason": f"{skill}: {' '.join(reason.split())}"})
+
+
+def late(start: Start, seconds: float, missing: str = "") -> Outcome:
+    """Return the `timed_out` of a skill; if a component was `missing`, the skill has not begun."""
+    skill = f"{start.component}.{start.skill}"
+    reason = f"{skill}: no outcome within {seconds:g} s" + (f", it waited for {missing}" if missing else "")
+    return Outcome(TIMED_OUT, {"skill": skill, "seconds": seconds, "reason": reason})
+
+
+def validated(outcome: object, start: Start, signature: SkillSignature) -> Outcome:
+    """Return the outcome with encoded attributes, or a `skill_error` if it violates the signature."""
+    try:
+        return _conforming(outcome, signature.outcomes)
+    except InputError as error:
+        return broken(start, str(error))
+    except BaseException as error:
+        if not is_own(error, running_task()):
+            raise
+        return broken(start, f"its outcome cannot be read: {described(error)}")
+
+
+def _conforming(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
+    if not isinstance(outcome, Outcome):
+        raise InputError(f"it ended with {shown(outcome)}, which is not an Outcome")
+    event, attributes, observed = outcome.event, outcome.attributes, outcome.observed
+    if not isinstance(event, str):
+        raise InputError(f"it ended with the event {shown(event)}, which is not text")
+    event = str.__str__(event)  # a subclass, e.g. an `Enum`, may compare differently
+    declared = NO_ATTRIBUTES if event == OBSERVED else outcomes.get(event)
+    if declared is None:
+        raise InputError(f"it ended with '{event}', which it does not declare")
+    if not isinstance(attributes, Mapping):
+        raise InputError(f"the attributes of '{event}' are a mapping, not {shown(attributes)}")
+    if type(observed) is Delta and observed == NO_CHANGE:  # the common case
+        observed = NO_CHANGE
+    else:
+        try:
+            require_delta(observed)
+        except InputError as error:
+            raise InputError(f"the observation of '{event}': {error}") from None
+    return Outcome(event, _plain(event, attributes, declared) if attributes or declared else {}, observed)
+
+
+def _plain(event: str, attributes: Mapping[str, Any], declared: Declared) -> dict[str, Any]:
+    """Return a copy of the attributes as plain data.
+
+    Raises:
+        UnknownNameError: one is not declared.
+        InputError: one is missing, is of another type, or is not plain data.
+    """
+    for name in attributes:
+        if name not in declared:
+            message = f"the outcome '{event}' has no attribute {shown(name)}"
+            raise UnknownNameError(message, found=str(name), valid=declared)
+    for name, kind in declared.items():
+        if name not in attributes:
+            of_type = f" of type {kind}" if kind else ""
+            raise InputError(f"the outcome '{event}' needs its attribute '{name}'{of_type}")
+        wanted = _FITS.get(kind)
+        if wanted is not None and not wanted[1](attributes[name]):
+            raise InputError(f"the attribute '{name}' of '{event}' is {wanted[0]}, not {shown(attributes[name])}")
+    plain: dict[str, Any] = _copied(dict(attributes), f"the attributes of '{event}'")
+    return plain
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+_FITS: Mapping[str | None, tuple[str, Callable[[object], bool]]] = {
+    "number": ("a finite number", _is_number),
+    "boolean": ("a truth value", lambda value: isinstance(value, bool)),
+    "text": ("text", _is_text),
+    "symbol": ("a name", _is_text),
+}
+"""Types without objects, in words, with their tests."""
+
+
+def validated_in_world(message: SkillMessage, knowledge: KnowledgeBase) -> SkillMessage:
+    """Return the message, or a `skill_error` if its outcome contradicts the schema or names unknown objects.
+
+    Args:
+        message: its outcome conforms to the skill's signature.
+        knowledge: the world before the observations of the outcome.
+    """
+    said = message.outcome
+    if said.observed is NO_CHANGE and not message.declared:
+        return message
+    try:
+        worlds: list[World] = [knowledge]
+        if said.observed:
+            worlds.insert(0, after := knowledge.overlay())
+            after.apply(said.observed)
+        _require_objects(said.event, said.attributes, message.declared or {}, *worlds)
+    except Exception as error:  # noqa: BLE001  # an outcome may contain anything, e.g. unhashable values
+        outcome = broken(message.start, described(error, named=not isinstance(error, InputError)))
+        return SkillMessage(message.start, outcome, final=True, goes_on=not message.final)
+    return message
+
+
+def _require_objects(event: str, attributes: Mapping[str, Any], declared: Declared, *worlds: World) -> None:
+    """Require that each attribute of an object type names an object of one of these worlds.
+
+    Raises:
+        InputError: it is not a name, there is no such object, or it is of another type.
+    """
+    schema = worlds[0].schema
+    for name, wanted in declared.items():
+        if wanted is None or wanted not in schema.types:
+            continue
+        value = attributes.get(name)
+        known = [world.type_of(value) for world in worlds] if isinstance(value, str) else []
+        found = next((type_ for type_ in known if type_ is not None), None)
+        if found is not None and schema.is_a(found, wanted):
+            continue
+        said = f"the attribute '{name}' of '{event}' is of type {wanted}, and"
+        if not isinstance(value, str):
+            raise InputError(f"{said} {shown(value)} is not a name")
+        if found is not None:
+            raise SchemaError(f"{said} '{value}' is of type {found}", found=value)
+        valid = {thing for world in worlds for thing in world.objects(wanted)}
+        raise UnknownNameError(f"{said} there is no object '{value}'", found=value, valid=valid)
+
+
+# -- input from outside ------------------------------------------------------------------------------------
+
+
+def require_parts(library: object, knowledge: object, clock: object, trace: object, store: object) -> None:
+    """Raise `InputError` unless a sequencer can use these parts; the last two may be missing."""
+    require(library, Library, "the plots are given as a Library, made by Library(plots)")
+    require(knowledge, KnowledgeBase, "the knowledge is a KnowledgeBase")
+    require(clock, LoopClock, "the clock is a LoopClock, made inside the loop that runs the sequencer")
+    if trace is not None:
+        require(trace, Trace, "a trace is a Trace")
+    if store is not None:
+        require(store, RunStore, "a store is a RunStore")
+
+
+def require_seconds(after: object) -> None:
+    """Raise `InputError` unless the value is a finite number of seconds."""
+    if isinstance(after, bool) or not isinstance(after, int | float) or not math.isfinite(after):
+        raise InputError(f"a delay is a finite number of seconds, not {shown(after)}")
+
+
+def checked_event(said: object) -> Event:
+    """Return the event with copied attributes.
+
+    Raises:
+        InputError: it is not an event, only the executive fires it, or an attribute is not plain data.
+    """
+    plain = isinstance(said, Event) and said.attributes is NO_ATTRIBUTES  # the common case
+    if not isinstance(said, Event) or not (plain or isinstance(said.attributes, Mapping)):
+        raise InputError(f'an event is an Event with its attributes, as Event("stop", {{}}), not {shown(said)}')
+    if said.name in RESERVED:
+        raise InputError(f"the event '{said.name}' is fired by the executive itself", found=said.name)
+    if plain:
+        return said
+    attributes = dict(said.attributes)
+    copied = _copied(attributes, f"the attributes of '{said.name}'") if attributes else NO_ATTRIBUTES
+    return said._replace(attributes=copied)
+
+
+def checked_change(delta: Delta, author: str, knowledge: KnowledgeBase) -> KnowledgeMessage:
+    """Return a message for a change of knowledge that fits the schema; raise `InputError`."""
+    require_delta(delta)
+    require_text(author, "an author")
+    knowledge.overlay().apply(delta)
+    return KnowledgeMessage(delta, author)
+
+
+def checked_setting(
+    owner: str, name: str, value: object, components: Mapping[str, Component], library: Library
+) -> ParameterMessage:
+    """Return a message for an operator's setting of a parameter.
+
+    Raises:
+        UnknownNameError: there is no such component or plot, or it declares no such parameter.
+        InputError: the value is out of range, breaks a relation, or operators may not set it.
+    """
+    require_text(owner, "the name of a component or plot")
+    require_text(name, "a parameter's name")
+    if owner in components:
+        components[owner].parameters.check(name, value, "operator")
+    elif owner in library:
+        library.plot(owner).with_default(name, value, "operator")
+    else:
+        valid = [*components, *(plot.name for plot in library)]
+        raise UnknownNameError(f"there is no component or plot '{owner}'", found=owner, valid=valid)
+    assert value is None or isinstance(value, str | int | float | bool)  # noqa: S101  # every value of a range is one
+    return ParameterMessage(owner, name, value, of_plot=owner not in components)
+
+
+def checked_arguments(plot: ActionPlot, given: object) -> Mapping[str, Any]:
+    """Return the validated arguments of a plot.
+
+    Raises:
+        InputError: it is not a mapping, a value is not plain data, or a number or truth value is of another type.
+    """
+    if not isinstance(given, Mapping):
+        raise InputError(f"arguments are a mapping of parameters' names to values, not {shown(given)}")
+    for name, value in given.items():
+        declared = plot.parameters.get(name)
+        if declared is not None and declared.type in {"number", "boolean"}:
+            declared.range.check(f"{plot.name}.{name}", value)
+        _copied(value, f"the argument '{name}'")
+    return given

@@ -1,0 +1,204 @@
+"""Running skills: their answers, their time limits, and the clean-up of cancelled ones."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from dsc.blocking import DeadlineError
+from dsc.calls import Outcome, Reports
+from dsc.components.hooks import GRACE, give_up, give_up_after, is_own
+from dsc.engine.steps import Start
+from dsc.events import SKILL_ERROR
+from dsc.messages import SkillMessage
+from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.message_checks import broken, late, validated
+from dsc.skills import SkillSignature
+from knowledge_base.errors import described
+
+
+@dataclass(frozen=True, slots=True)
+class InterruptedSkill:
+    """The record of an action from before the restart.
+
+    Attributes:
+        began: second of run time at which it was started.
+        reports: the number of its intermediate events that were taken.
+    """
+
+    began: float
+    reports: int
+
+
+class RunningSkill:
+    """A skill that runs: posts its reports and, one time, its end.
+
+    A single timer bounds it. The timer cancels the task at the second `due`, and abandons it after `GRACE` more.
+
+    Args:
+        start, signature: of the skill.
+        within: seconds that it may take.
+        due: second of run time at which they are over; `math.inf` means never.
+        clock: tells the time.
+        post: receives its messages.
+        fault: receives a fault of the run.
+
+    Attributes:
+        task: its execution.
+        reports: its intermediate events.
+        stopped: whether the chart has cancelled it.
+        answered: whether its end was posted.
+    """
+
+    task: asyncio.Task[None]
+
+    def __init__(
+        self,
+        start: Start,
+        signature: SkillSignature,
+        within: float,
+        due: float,
+        clock: LoopClock,
+        post: Callable[[SkillMessage], None],
+        fault: Callable[[str], None],
+    ) -> None:
+        self.start = start
+        self.signature = signature
+        self.within = within
+        self.due = due
+        self.reports: Reports | None = None
+        self.stopped = False
+        self.answered = False
+        self._clock = clock
+        self._post = post
+        self._fault = fault
+        self._expired = False
+        self._timer: asyncio.TimerHandle | None = None
+
+    # -- answers -----------------------------------------------------------------------------------------
+
+    def report(self, outcome: Outcome) -> None:
+        """Post an intermediate event, unless the skill has ended."""
+        if not self.stopped and not self.answered:
+            self.reports = self.reports or Reports(self._post_report)
+            self.reports.put(validated(outcome, self.start, self.signature))
+
+    def _post_report(self, report: Outcome, conflated: int) -> None:
+        failed = report.event == SKILL_ERROR
+        declared = None if failed else self.signature.outcomes.get(report.event)
+        self._post(SkillMessage(self.start, report, failed, goes_on=failed, conflated=conflated, declared=declared))
+
+    def answer(self, outcome: Outcome) -> None:
+        """Post the end, one time; the time limit ends only after that."""
+        if not self.answered:
+            if self.reports is not None:
+                self.reports.flush()
+            declared = self.signature.outcomes.get(outcome.event) if outcome.attributes else None
+            self._post(SkillMessage(self.start, outcome, final=True, declared=declared))
+            self.answered = True
+            self.end_limit()
+
+    def ended(self, task: asyncio.Task[None]) -> None:
+        """Answer for a task that has ended without an answer: the skill has failed, unless it was stopped."""
+        why = asyncio.CancelledError("its task was cancelled") if task.cancelled() else task.exception()
+        if why is not None and not self.stopped:
+            self.answer(broken(self.start, described(why)))
+
+    def failed(self, error: BaseException, missing: str) -> Outcome | None:
+        """Return the outcome of a skill that raised; `None` if its task was cancelled from outside."""
+        cancelled = issubclass(type(error), asyncio.CancelledError)
+        if cancelled and self._expired and self.task.uncancel() <= 0:  # the limit alone has cancelled it
+            return late(self.start, self.within, missing)
+        if not is_own(error, self.task):
+            return None
+        if cancelled:
+            return broken(self.start, "CancelledError: it cancelled itself")
+        if self.is_late or issubclass(type(error), DeadlineError):
+            return late(self.start, self.within)
+        return broken(self.start, described(error))
+
+    # -- time --------------------------------------------------------------------------------------------
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the time is over. A task that blocks its loop is late without notice, except in simulated time."""
+        return self._expired or (not self._clock.simulated and self._clock.now() > self.due)
+
+    def begin_limit(self) -> None:
+        """Cancel the task at its due second."""
+        if math.isfinite(self.due):
+            self._timer = self._clock.call_at(self.due, self._expire)
+
+    def end_limit(self) -> None:
+        """Stop the timer: the task has ended, or its clean-up is bounded elsewhere."""
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def _expire(self) -> None:
+        self._expired = True
+        if self.task.done():
+            self._abandon()
+            return
+        self.task.cancel()
+        self._timer = asyncio.get_running_loop().call_later(GRACE, self._overdue)
+
+    def _overdue(self) -> None:
+        give_up(self.task)
+        self._abandon()
+
+    def _abandon(self) -> None:
+        """Answer for a task that ignored its time limit, so that the chart need not wait for it."""
+        if not self.answered:
+            self.given_up()
+            self.answer(late(self.start, self.within))
+
+    def given_up(self) -> None:
+        """Report as a fault that the skill ignored its cancellation."""
+        skill = f"{self.start.component}.{self.start.skill}"
+        self._fault(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
+
+
+class PendingCleanups:
+    """Cancelled tasks until they have stopped; a task that ignores its cancellation is abandoned after `GRACE` seconds.
+
+    Args:
+        say: receives the component of a task that has stopped, or was abandoned.
+
+    Attributes:
+        pending: components with cancelled tasks that have not stopped.
+    """
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self.pending: dict[str, dict[asyncio.Task[None], asyncio.Future[None]]] = {}
+
+    def add(self, component: str, task: asyncio.Task[None], say: Callable[[], None]) -> None:
+        """Bound a cancelled task of a component; call `say` if it is abandoned."""
+        over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        of_component = self.pending.setdefault(component, {})
+        of_component[task] = over
+
+        def end(_: asyncio.Task[None]) -> None:
+            if of_component.pop(task, None) is not None:
+                if not of_component:
+                    del self.pending[component]
+                over.set_result(None)
+                self._say(component)
+
+        def abandon() -> None:
+            end(task)
+            say()
+
+        task.add_done_callback(end)
+        give_up_after(task, GRACE, abandon)
+
+    async def over(self, component: str) -> None:
+        """Wait until no cancelled task of the component is left."""
+        while ending := self.pending.get(component):
+            await asyncio.wait(ending.values())
+
+    def tasks(self) -> Iterable[asyncio.Task[None]]:
+        """The tasks that have not stopped."""
+        return [task for of_component in self.pending.values() for task in of_component]
