@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Awaitable, Callable
 from enum import StrEnum
 
 from dsc.components.hooks import contained
@@ -30,8 +29,39 @@ _NEXT = {
 }
 
 
-class LifeCycle:
-    """The life of one component; used inside the loop's own thread.
+class Announcer:
+    """Calls its listeners after each change; used inside the loop's own thread."""
+
+    def __init__(self) -> None:
+        self._listeners: set[Callable[[], None]] = set()
+
+    def announce(self) -> None:
+        """Call the listeners."""
+        for listener in tuple(self._listeners):
+            listener()
+
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Call the listener after each change from now on."""
+        self._listeners.add(listener)
+
+    def leave(self, listener: Callable[[], None]) -> None:
+        """Stop calling the listener."""
+        self._listeners.discard(listener)
+
+    async def until(self, holds: Callable[[], bool]) -> None:
+        """Wait until `holds` is true; evaluate it after each change."""
+        changed = asyncio.Event()
+        self.listen(changed.set)
+        try:
+            while not holds():
+                changed.clear()
+                await changed.wait()
+        finally:
+            self.leave(changed.set)
+
+
+class LifeCycle(Announcer):
+    """The life of one component; it announces changes of life, mode and needs.
 
     Attributes:
         state: one of `Life`.
@@ -40,12 +70,12 @@ class LifeCycle:
     """
 
     def __init__(self) -> None:
+        super().__init__()
         self.state = Life.INIT
         self.reason = ""
         self.starting = False
         self._activators: set[int] = set()
         self._mode = NEUTRAL
-        self._listeners: set[Callable[[], None]] = set()
 
     def __getstate__(self) -> dict[str, object]:
         """The state that is pickled: listeners stay in this process."""
@@ -73,7 +103,7 @@ class LifeCycle:
             start: the component's hook; its error leads to FatalError.
         """
         while self.starting:  # if that start is cancelled, another caller begins it
-            await self.until(lambda _: not self.starting)
+            await self.until(lambda: not self.starting)
             if self.state is not Life.INIT:
                 return
         if self.state is Life.FATAL_ERROR:
@@ -126,34 +156,3 @@ class LifeCycle:
         self.reason = reason if state is Life.FATAL_ERROR else ""
         self.state = state
         self.announce()
-
-    def announce(self) -> None:
-        """Call the listeners: the life, the mode or the needs have changed."""
-        for listener in tuple(self._listeners):
-            listener()
-
-    def listen(self, listener: Callable[[], None]) -> None:
-        """Call the listener after each change from now on."""
-        self._listeners.add(listener)
-
-    def leave(self, listener: Callable[[], None]) -> None:
-        """Stop calling the listener."""
-        self._listeners.discard(listener)
-
-    @contextmanager
-    def heard(self, listener: Callable[[], None]) -> Iterator[None]:
-        """Inside the block, call the listener after each change."""
-        self.listen(listener)
-        try:
-            yield
-        finally:
-            self.leave(listener)
-
-    async def until(self, holds: Callable[[Life], bool]) -> Life:
-        """Wait for a state in which `holds` is true; returns it."""
-        changed = asyncio.Event()
-        with self.heard(changed.set):
-            while not holds(self.state):
-                changed.clear()
-                await changed.wait()
-        return self.state

@@ -75,8 +75,7 @@ class Dispatcher:
     ) -> None:
         self._part_of = part_of
         self._components = {component.name: component for component in require_instances(components)}
-        self._registry = ComponentRegistry(self._components)
-        self.activation = ComponentActivation(self._registry, self._in_use)
+        self.activation = ComponentActivation(ComponentRegistry(self._components), self._in_use)
         self._wiring = Wiring(self._components)
         self._faults: list[str] = []
         self._clock = clock
@@ -89,8 +88,7 @@ class Dispatcher:
 
     def deploy(self, component: Component) -> None:
         """Add a component; it replaces one of the same name, and skills that need it begin."""
-        self.activation.deployed(component)
-        self._registry.deploy(component)
+        self.activation.deploy(component)
         self._wiring.deployed(component)
 
     def started(self) -> tuple[Start, ...]:
@@ -267,7 +265,7 @@ class Dispatcher:
         return self._part_of + start.action_id
 
     async def _execute(self, component: Component, running: RunningSkill, interrupted: InterruptedSkill | None) -> None:
-        dependencies = SkillDependencies(self._registry, self.activation, component)
+        dependencies = SkillDependencies(self.activation, component)
         try:
             outcome = await self._outcome(component, running, dependencies, interrupted)
         except BaseException as error:

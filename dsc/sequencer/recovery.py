@@ -5,11 +5,13 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 
+from dsc.components.hooks import contained
 from dsc.engine.steps import SendLater, SetParameter, Start, StartTimer, SwitchMode
 from dsc.messages import LateMessage, TimerMessage
 from dsc.runs.encoding import Kept, Pending
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.running_skills import InterruptedSkill
+from knowledge_base.errors import InputError, described
 
 
 def require_components(kept: Kept, dispatcher: Dispatcher) -> None:
@@ -25,10 +27,14 @@ async def recover(kept: Kept, dispatcher: Dispatcher) -> None:
     Outputs of the last macrostep may never have left, so they leave (again) after everything else is restored.
 
     Raises:
-        InputError: a component cannot stop a cancelled skill, or one is not deployed.
+        InputError: a component cannot recall its data or stop a cancelled skill, or one is not deployed.
     """
     for name, memory in kept.memory.items():
-        dispatcher.component(name).recall(memory)
+        try:
+            with contained():
+                dispatcher.component(name).recall(memory)
+        except Exception as error:
+            raise InputError(f"component '{name}' cannot recall its data: {described(error)}") from error
     for one in kept.pending:
         if one.cancelled and isinstance(one.what, Start):
             await dispatcher.abandon(one.what)

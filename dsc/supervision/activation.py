@@ -1,20 +1,25 @@
-"""Activation trees: a component is active while a state or an active component needs it (S1.9, S4.1)."""
+"""Activation trees: supervisors keep components active while a state or an active component needs them (S1.9, S4.1)."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import suppress
 
 from dsc.components.component import Component
-from dsc.components.hooks import GRACE, give_up
-from dsc.components.life_cycle import NEUTRAL, Life
+from dsc.components.hooks import GRACE, contained, give_up
+from dsc.components.life_cycle import NEUTRAL, Announcer, Life
 from dsc.supervision.component_registry import ComponentRegistry
-from dsc.supervision.supervisor import Supervisor
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, described
+
+PAUSE = 1.0
+"""Seconds before a failed component is restarted; doubled after each failure."""
+LONGEST = 30.0
+"""The most seconds between two attempts."""
 
 
-class ComponentActivation:
-    """Gives each required component a supervisor, and releases the others.
+class ComponentActivation(Announcer):
+    """Gives each required component a supervisor, and releases the others; announces changes of components.
 
     A component without resources and without needs takes part only if another one needs it.
 
@@ -23,36 +28,42 @@ class ComponentActivation:
         used: names of the components whose skills run or clean up.
 
     Attributes:
+        registry: as given.
         concerned: names of the components that take part.
     """
 
     def __init__(self, registry: ComponentRegistry, used: Callable[[], Iterable[str]]) -> None:
-        self._registry = registry
+        super().__init__()
+        self.registry = registry
         self._used = used
         self.concerned: set[str] = set()
         self._in_mode: dict[str, None] = {}
         self._supervisors: dict[str, Supervisor] = {}
         self._released: dict[str, asyncio.Task[None]] = {}
-        self._listeners: set[Callable[[], None]] = set()
         self._looking = False
         self._closed = False
         for component in registry.components.values():
-            self.deployed(component)
+            self._join(component)
 
     @property
     def on(self) -> frozenset[str]:
         """Names of the components that are alive and active."""
         return frozenset(supervisor.name for supervisor in self._supervisors.values() if supervisor.on)
 
-    def deployed(self, component: Component) -> None:
-        """Add a component before the registry has it; it may replace another one."""
-        before = self._registry.components.get(component.name, component)
+    def deploy(self, component: Component) -> None:
+        """Add a component to the registry; it replaces one of the same name."""
+        before = self.registry.components.get(component.name, component)
         if before is not component:
             before.life.leave(self.look)
             if component.name in self._supervisors:
                 self._end(self._supervisors[component.name], ())
                 self.look()
-        if _is_concerned(component):
+        self._join(component)
+        self.registry.deploy(component)
+
+    def _join(self, component: Component) -> None:
+        kind = type(component)
+        if component.needs or kind.needed is not Component.needed or kind.activate is not Component.activate:
             self.concerned.add(component.name)
             component.life.listen(self.look)
         else:
@@ -80,7 +91,7 @@ class ComponentActivation:
     async def close(self) -> None:
         """Release all supervisors, and wait for them within bounds."""
         self._closed = True
-        for component in self._registry.components.values():
+        for component in self.registry.components.values():
             component.life.leave(self.look)
         self._keep_only({})
         if self._released:
@@ -101,44 +112,25 @@ class ComponentActivation:
         """The supervisors of the components that one needs in its mode, dependencies first; then its own.
 
         Raises:
-            InputError: components need each other in a cycle.
+            InputError: components need each other in a cycle, or the hook `needed` of one fails.
         """
         for name in self._closure(component.name, {}, ()):
             if name in self._supervisors:
                 yield self._supervisors[name]
 
-    def listen(self, listener: Callable[[], None]) -> None:
-        """Call the listener after each change of a component."""
-        self._listeners.add(listener)
-
-    def leave(self, listener: Callable[[], None]) -> None:
-        """Stop calling the listener."""
-        self._listeners.discard(listener)
+    def needed(self, component: Component | None) -> tuple[str, ...]:
+        """Names of the components that one needs in its mode; raises `InputError` if its hook fails."""
+        try:
+            with contained():
+                return () if component is None else tuple(component.needed())
+        except Exception as error:
+            name = "" if component is None else component.name
+            raise InputError(f"`needed` of component '{name}' has failed: {described(error)}") from error
 
     def announce(self) -> None:
         """A component has changed: update the supervisors, then call the listeners."""
         self.look()
-        for listener in tuple(self._listeners):
-            listener()
-
-    async def until(self, holds: Callable[[], bool]) -> None:
-        """Wait until `holds` is true; evaluate it after each change of a component."""
-        changed = asyncio.Event()
-        self.listen(changed.set)
-        try:
-            while not holds():
-                changed.clear()
-                await changed.wait()
-        finally:
-            self.leave(changed.set)
-
-    async def find(self, name: str, needing: Component | None) -> Component:
-        """The component of that name, which may be deployed late."""
-        return self._registry.components[name] if needing is None else await self._registry.find(name, needing)
-
-    async def supported(self, component: Component) -> None:
-        """Wait until the dependencies of a component in its present mode are active."""
-        await self.until(lambda: self.on.issuperset(component.needed()))
+        super().announce()
 
     # -- required components ------------------------------------------------------------------------------------
 
@@ -146,53 +138,160 @@ class ComponentActivation:
         self._looking = False
         if self._closed:
             return
-        needed: dict[str, Component | None] = {}
-        in_mode = [name for name in self._in_mode if self._registry.components[name].mode != NEUTRAL]
+        required: dict[str, Component | None] = {}
+        in_mode = [name for name in self._in_mode if self.registry.components[name].mode != NEUTRAL]
         for name in (*sorted(self._used()), *in_mode):
             if name in self.concerned:
-                self._add_needed(name, None, needed)
-        self._keep_only(needed)
+                self._require(name, None, required)
+        self._keep_only(required)
 
-    def _add_needed(self, name: str, needing: Component | None, needed: dict[str, Component | None]) -> None:
+    def _require(self, name: str, needing: Component | None, required: dict[str, Component | None]) -> None:
         """Add a component with the one that needs it, then its own dependencies."""
-        if name not in needed:
-            needed[name] = needing
-            component = self._registry.known(name)
-            for other in () if component is None else component.needed():
-                self._add_needed(other, component, needed)
+        if name not in required:
+            required[name] = needing
+            with suppress(InputError):  # the component's skill fails with it
+                component = self.registry.known(name)
+                for other in self.needed(component):
+                    self._require(other, component, required)
 
     def _closure(self, name: str, found: dict[str, None], above: tuple[str, ...]) -> dict[str, None]:
         if name in above:
             raise InputError(f"components need each other in a cycle: {' -> '.join((*above, name))}")
-        component = self._registry.known(name)
-        for other in () if component is None else component.needed():
+        for other in self.needed(self.registry.known(name)):
             self._closure(other, found, (*above, name))
         found[name] = None
         return found
 
-    def _keep_only(self, needed: dict[str, Component | None]) -> None:
+    def _keep_only(self, required: dict[str, Component | None]) -> None:
         ended: list[asyncio.Task[None]] = []
-        for supervisor in [one for one in self._supervisors.values() if one.name not in needed]:
+        for supervisor in [one for one in self._supervisors.values() if one.name not in required]:
             ended.append(self._end(supervisor, tuple(ended)))
-        for name, needing in needed.items():
+        for name, needing in required.items():
             if name not in self._supervisors:
-                self._supervisors[name] = Supervisor(name, needing, self)
-                self._supervisors[name].begin(self._released.get(name))
+                self._supervisors[name] = Supervisor(name, needing, self, self._released.get(name))
 
     def _end(self, supervisor: Supervisor, after: Collection[asyncio.Task[None]]) -> asyncio.Task[None]:
+        def over(task: asyncio.Task[None]) -> None:
+            if self._released.get(supervisor.name) is task:
+                del self._released[supervisor.name]
+
         del self._supervisors[supervisor.name]
         supervisor.release(after)
-        assert supervisor.task is not None  # noqa: S101
         self._released[supervisor.name] = supervisor.task
-        supervisor.task.add_done_callback(lambda task: self._over(supervisor.name, task))
+        supervisor.task.add_done_callback(over)
         return supervisor.task
 
-    def _over(self, name: str, task: asyncio.Task[None]) -> None:
-        if self._released.get(name) is task:
-            del self._released[name]
+
+class Supervisor:
+    """Keeps one component alive and active until it is released; restarts it after a crash (S2.12).
+
+    Args:
+        name: of the component.
+        needing: the component that needs it, if any.
+        activation: announces its changes.
+        after: the task of an earlier supervisor.
+
+    Attributes:
+        name: of the component.
+        task: runs until the component is inactive again.
+        failures: the number of failed attempts to start or activate it.
+        problem: the error of the search for it, or of its needs.
+    """
+
+    def __init__(
+        self, name: str, needing: Component | None, activation: ComponentActivation, after: asyncio.Task[None] | None
+    ) -> None:
+        self.name = name
+        self.failures = 0
+        self.problem: Exception | None = None
+        self._component: Component | None = None
+        self._needing = needing
+        self._activation = activation
+        self._on = False
+        self._was_active = False
+        self._activated = False
+        self._before_end: Collection[asyncio.Task[None]] = ()
+        self.task = asyncio.get_running_loop().create_task(self._run(after))
+
+    def release(self, after: Collection[asyncio.Task[None]]) -> None:
+        """End supervision: the component becomes inactive, after those that have needed it."""
+        self._before_end = after
+        self.task.cancel()
+
+    @property
+    def on(self) -> bool:
+        """Whether it is alive and active."""
+        return self._on and self._component is not None and self._component.life.state is Life.ALIVE
+
+    @property
+    def lost(self) -> bool:
+        """Whether it has failed, was shut down, or has gone back to Init."""
+        life = None if self._component is None else self._component.life.state
+        return life in {Life.FATAL_ERROR, Life.SHUTDOWN} or (life is Life.INIT and self._was_active)
+
+    async def _run(self, after: asyncio.Task[None] | None) -> None:
+        try:
+            if after is not None:
+                await asyncio.wait([after], timeout=GRACE)
+            await self._supervise()
+        except Exception as error:  # noqa: BLE001  # an error of `reach` or `needed`; skills that need it raise it
+            self.problem = error
+            self._activation.announce()
+        finally:
+            await self._deactivate()
+
+    async def _supervise(self) -> None:
+        self._component = component = await self._activation.registry.find(self.name, self._needing)
+        component.life.listen(self._activation.announce)
+        self._activation.announce()
+        pause = PAUSE
+        while True:
+            await self._activation.until(lambda: self._activation.on.issuperset(self._activation.needed(component)))
+            lasted = await self._once(component)
+            pause = PAUSE if lasted > PAUSE else await _rested(component, pause)
+
+    async def _once(self, component: Component) -> float:
+        """Start and activate it; return the seconds for which it was active."""
+        await component.life.come_alive(component.start)
+        if component.life.state is Life.ALIVE:
+            self._activated = True
+            await component.life.become_active(id(self), component.activate, active=True)
+        if component.life.state is not Life.ALIVE:
+            self.failures += 1
+            self._activation.announce()
+            return 0.0
+        began = asyncio.get_running_loop().time()
+        self._on = self._was_active = True
+        self._activation.announce()
+        await component.life.until(lambda: component.life.state is not Life.ALIVE)
+        self._on = False
+        return asyncio.get_running_loop().time() - began
+
+    async def _deactivate(self) -> None:
+        self._on = False
+        if self._component is None:
+            return
+        life = self._component.life
+        life.leave(self._activation.announce)
+        if not self._activated:
+            return
+        if self._before_end:
+            await asyncio.wait(self._before_end, timeout=GRACE)
+        try:
+            async with asyncio.timeout(GRACE):
+                await life.become_active(id(self), self._component.activate, active=False)
+        except TimeoutError:
+            if life.state is Life.ALIVE:
+                life.become(Life.FATAL_ERROR, f"it could not be switched off within {GRACE:g} s")
 
 
-def _is_concerned(component: Component) -> bool:
-    """Whether the component needs others, or takes resources while it is active."""
-    kind = type(component)
-    return bool(component.needs) or kind.needed is not Component.needed or kind.activate is not Component.activate
+async def _rested(component: Component, pause: float) -> float:
+    """Wait before a failed component restarts, unless it recovers earlier; return the next pause.
+
+    A component in Shutdown stays there until it is switched to `init`.
+    """
+    before = component.life.state
+    with suppress(TimeoutError):
+        async with asyncio.timeout(None if before is Life.SHUTDOWN else pause):
+            await component.life.until(lambda: component.life.state is not before)
+    return min(2 * pause, LONGEST)

@@ -35,11 +35,11 @@ class ComponentRegistry:
         """The component of that name, if it is here or has been reached."""
         return self.components.get(name) or self._reached.get(name)
 
-    async def find(self, name: str, needing: Component) -> Component:
-        """The component of that name: deployed here, maybe late, or where the one who needs it can reach it."""
+    async def find(self, name: str, needing: Component | None) -> Component:
+        """The component of that name: deployed here, maybe late, or reached by the component that needs it."""
         found = self.known(name)
-        if found is not None:
-            return found
+        if found is not None or needing is None:
+            return found or self.components[name]
         loop = asyncio.get_running_loop()
         here, there = loop.create_task(self._until_deployed(name)), loop.create_task(_reached(needing, name))
         try:

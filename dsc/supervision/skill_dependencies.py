@@ -10,7 +10,7 @@ from typing import TypeVar
 from dsc.components.component import Component
 from dsc.components.life_cycle import Life
 from dsc.supervision.activation import ComponentActivation
-from dsc.supervision.component_registry import ComponentRegistry, NotAliveError
+from dsc.supervision.component_registry import NotAliveError
 from knowledge_base.errors import InputError
 
 _Result = TypeVar("_Result")
@@ -23,8 +23,7 @@ class SkillDependencies:
         concerned: whether the skill's component takes part in activation; if not, only its own life counts.
     """
 
-    def __init__(self, registry: ComponentRegistry, activation: ComponentActivation, component: Component) -> None:
-        self._registry = registry
+    def __init__(self, activation: ComponentActivation, component: Component) -> None:
         self._activation = activation
         self._component = component
         self.concerned = component.name in activation.concerned
@@ -33,10 +32,11 @@ class SkillDependencies:
     @property
     def missing(self) -> str:
         """The dependency that the skill waits for, in words; else empty."""
-        if not self._waits:
-            return ""
-        name = next((one.name for one in self._activation.supervisors_of(self._component) if not one.on), "")
-        return name and self._registry.state_of(name)
+        if self._waits:
+            with suppress(InputError):  # then that is the reason
+                name = next((one.name for one in self._activation.supervisors_of(self._component) if not one.on), "")
+                return name and self._activation.registry.state_of(name)
+        return ""
 
     async def ready(self) -> None:
         """Wait until the component and its dependencies in its present mode are alive and active.
@@ -45,14 +45,14 @@ class SkillDependencies:
 
         Raises:
             NotAliveError: the component itself cannot start, or is in Shutdown.
-            InputError: components need each other in a cycle.
+            InputError: components need each other in a cycle, or the hook `needed` of one fails.
         """
         if self.concerned:
             await self._supervised()
         elif self._component.life.state is not Life.ALIVE:
             await self._component.life.come_alive(self._component.start)
         if self._component.life.state is not Life.ALIVE:
-            raise NotAliveError(self._registry.state_of(self._component.name))
+            raise NotAliveError(self._activation.registry.state_of(self._component.name))
 
     async def _supervised(self) -> None:
         supervisor = self._activation.supervisor(self._component)
@@ -81,7 +81,7 @@ class SkillDependencies:
         def look() -> None:
             name = self._lost()
             if name is not None and not lost and me is not None:
-                said = self._registry.state_of(name)  # now: it may restart before the cancellation arrives
+                said = self._activation.registry.state_of(name)  # now: it may restart before the cancellation arrives
                 lost.append(said if name == self._component.name else f"it needs {said}")
                 me.cancel()
 
@@ -106,6 +106,6 @@ class SkillDependencies:
             return self._component.name
         if not self.concerned:
             return None
-        with suppress(InputError):  # a cycle of needs in this mode fails the next skill
+        with suppress(InputError):  # it fails the next skill
             return next((one.name for one in self._activation.supervisors_of(self._component) if one.lost), None)
         return None

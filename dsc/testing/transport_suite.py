@@ -458,7 +458,7 @@ class TransportSuite:
             remote = await RemoteComponent.connect("robot", transport, PATIENCE)
             registry = ComponentRegistry({"robot": remote, "light": Component("light")})
             activity = ComponentActivation(registry, lambda: {"robot"})
-            support = SkillDependencies(registry, activity, remote)
+            support = SkillDependencies(activity, remote)
             waiting = asyncio.ensure_future(support.ready())
             await asyncio.sleep(2.0)
             assert not waiting.done()
@@ -474,7 +474,7 @@ class TransportSuite:
                     await asyncio.wait_for(working, PATIENCE)
                 assert robot.log[-1] == "cancelled"
                 assert remote.life.state == "alive"
-                support = SkillDependencies(registry, activity, remote)
+                support = SkillDependencies(activity, remote)
                 waiting = asyncio.ensure_future(support.ready())
             waiting.cancel()
             await host.close()

@@ -354,6 +354,37 @@ def test_a_hook_that_exits_fails_and_the_run_goes_on(hook, kind):
     assert ("did not take" in (ran.end.problem or "")) == (hook == "stop")
 
 
+class Needy(Hooked):
+    """A component whose needs cannot be read."""
+
+    name = "needy"
+
+    def needed(self):
+        raise self.make()
+
+
+@pytest.mark.parametrize("kind", EXITS)
+def test_needs_that_cannot_be_read_fail_the_skills_of_their_component_only(kind):
+    reasons = []
+
+    def prepare(sequencer):
+        sequencer.dispatcher.deploy(Needy("none", EXITS[kind]))
+        sequencer.listen(lambda step: reasons.extend(m.event for m in step.microsteps if m.event))
+
+    both = """
+        plot: p
+        states:
+          a: {entry: [{trigger: needy.goes, within: 100}, {trigger: arm.goes, within: 100}], on: {skill_error: {}, ok: e}}
+          e: {final: true}
+    """
+    ran = Ran(both, arm=Hooked("none", EXITS[kind]), prepare=prepare)
+    assert (ran.end.finished, ran.end.problem) == (True, None)
+    failed, ok = reasons
+    assert ok.name == "ok"
+    assert failed.attributes["skill"] == "needy.goes"
+    assert "`needed` of component 'needy' has failed" in failed.attributes["reason"]
+
+
 @pytest.mark.parametrize("where", ["listener", "subscriber"])
 def test_an_observer_that_exits_fails_in_its_own_name(where):
     def exits(_):

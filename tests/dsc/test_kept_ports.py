@@ -274,6 +274,19 @@ def test_a_plot_that_is_a_skill_is_done_again_if_it_says_so(tmp_path):
         assert (run.end, run.robot.done) == (whole.whole.end, whole.whole.robot.done), what
 
 
+@pytest.mark.parametrize("error", [ValueError("no such data"), SystemExit("no such data")])
+def test_data_that_a_component_cannot_recall_end_the_run_with_that(tmp_path, error):
+    class Forgetful(Station):
+        def recall(self, memory):
+            raise error
+
+    whole = Crashes(tmp_path, MESSAGES, make=Forgetful)
+    what, run = list(whole.resumed())[-1]
+    assert not run.end.finished, what
+    assert "component 'robot' cannot recall its data" in run.end.problem
+    assert "no such data" in run.end.problem
+
+
 def test_a_skill_that_was_not_believed_is_stopped_even_if_the_crash_came_first(tmp_path):
     whole = crashes(
         tmp_path,
