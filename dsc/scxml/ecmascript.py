@@ -8,11 +8,12 @@ knows the kinds of values.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 from dsc.engine.situation import IN_STATE
 from dsc.errors import NotExpressibleError
-from dsc.scxml.tokens import Token, tokens
 from dsc.scxml.value_kinds import ANY, BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, WHOLE, Scope
 from knowledge_base.errors import Place, UnknownNameError
 from knowledge_base.language.syntax.expression import (
@@ -41,6 +42,24 @@ MAX_EXPONENT = 8
 MAX_NESTING = 50
 MAX_OPERATIONS = 100
 """Upper bound of a term, counted after the expansion of `Math.pow`: `a + b - c` nests, and later stages recurse."""
+_WORDS = re.compile(
+    r"""\s*(?:
+    (?P<number>\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)
+    |(?P<text>'(?:[^'\\\n]|\\.)*'|"(?:[^"\\\n]|\\.)*")
+    |(?P<name>[A-Za-z_$][\w$]*(?:\.[A-Za-z_$][\w$]*)*)
+    |(?P<sign>\+\+|--|===|!==|==|!=|<=|>=|&&|\|\||[-+*/<>!(),])
+    )""",
+    re.VERBOSE,
+)
+_ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "v": "\v"}
+_ESCAPE = re.compile(r"\\(u[0-9a-fA-F]{4}|x[0-9a-fA-F]{2}|[^0-9ux])")
+
+
+class Token(NamedTuple):
+    """A token: its kind (`number`, `text`, `name`, `sign`, `end`) and its text or value."""
+
+    kind: str
+    text: str
 
 
 def condition(text: str, names: Names, place: Place | None = None) -> Expression:
@@ -55,12 +74,14 @@ def condition(text: str, names: Names, place: Place | None = None) -> Expression
         NotExpressibleError: it has a part without counterpart in conditions, or relies on a conversion.
         UnknownNameError: it uses data that the chart does not declare.
     """
-    return _Parser(text, names, place).whole_condition()
+    parser = _Parser(text, names, place)
+    return parser.as_condition(parser.whole())
 
 
 def term(text: str, names: Names, place: Place | None = None) -> Term:
     """Return an `expr` as a term; see `condition`."""
-    return _Parser(text, names, place).whole_term()
+    parser = _Parser(text, names, place)
+    return parser.as_term(parser.whole())
 
 
 def joined(text: str, names: Names, place: Place | None = None) -> list[Term]:
@@ -76,21 +97,17 @@ class _Parser:
         self._at = 0
         self._depth = 0
 
-    def whole_condition(self) -> Expression:
-        found = self._condition(self._or())
-        self._end()
-        return found
-
-    def whole_term(self) -> Term:
-        found = self._as_term(self._or())
+    def whole(self) -> Expression | Term:
+        found = self._or()
         self._end()
         return found
 
     def whole_join(self) -> list[Term]:
-        parts = [self._as_term(self._product())]
+        parts = [self.as_term(self._product())]
         while sign := self._take("+", "-"):
-            following = self._as_term(self._product())
-            if sign == "+" and (len(parts) > 1 or self._is_text(parts[0]) or self._is_text(following)):
+            following = self.as_term(self._product())
+            joins = len(parts) > 1 or any(self._scope.kinds_of(one) == {TEXT} for one in (parts[0], following))
+            if sign == "+" and joins:
                 parts.append(following)
             elif len(parts) > 1:
                 raise self._refused("text cannot be computed with")
@@ -123,36 +140,36 @@ class _Parser:
     # -- grammar, loosest first ------------------------------------------------------------------------------
 
     def _or(self) -> Expression | Term:
-        parts = [self._and()]
-        while self._take("||"):
-            parts.append(self._and())
-        return parts[0] if len(parts) == 1 else Or(tuple(map(self._condition, parts)))
+        return self._connected("||", Or, self._and)
 
     def _and(self) -> Expression | Term:
-        parts = [self._comparison()]
-        while self._take("&&"):
-            parts.append(self._comparison())
-        return parts[0] if len(parts) == 1 else And(tuple(map(self._condition, parts)))
+        return self._connected("&&", And, self._comparison)
+
+    def _connected(self, sign: str, kind: type[And | Or], part: Callable[[], Expression | Term]) -> Expression | Term:
+        parts = [part()]
+        while self._take(sign):
+            parts.append(part())
+        return parts[0] if len(parts) == 1 else kind(tuple(map(self.as_condition, parts)))
 
     def _comparison(self) -> Expression | Term:
         left = self._sum()
         sign = self._take(*_COMPARE)
         if sign is None:
             return left
-        first, second = self._as_term(left), self._as_term(self._sum())
+        first, second = self.as_term(left), self.as_term(self._sum())
         self._check_comparison(sign, first, second)
         return Comparison(_COMPARE[sign], first, second)
 
     def _sum(self) -> Expression | Term:
-        left = self._product()
-        while sign := self._take("+", "-"):
-            left = self._arithmetic(sign, left, self._product())
-        return left
+        return self._computed("+-", self._product)
 
     def _product(self) -> Expression | Term:
-        left = self._unary()
-        while sign := self._take("*", "/"):
-            left = self._arithmetic(sign, left, self._unary())
+        return self._computed("*/", self._unary)
+
+    def _computed(self, signs: str, part: Callable[[], Expression | Term]) -> Expression | Term:
+        left = part()
+        while sign := self._take(*signs):
+            left = self._arithmetic(sign, left, part())
         return left
 
     def _unary(self) -> Expression | Term:
@@ -165,7 +182,7 @@ class _Parser:
 
     def _prefixed(self) -> Expression | Term:
         if self._take("!"):
-            return Not(self._condition(self._unary()))
+            return Not(self.as_condition(self._unary()))
         if self._take("-"):
             inner = self._number(self._unary())
             return Constant(-inner.value) if isinstance(inner, Constant) else Arithmetic("-", (inner,))  # type: ignore[operator]
@@ -206,7 +223,7 @@ class _Parser:
             return Atom(IN_STATE, (Constant(state.text, quoted=True),))
         if function == "Math.pow":
             base = self._number(self._sum())
-            exponent = self._as_term(self._sum()) if self._take(",") else None
+            exponent = self.as_term(self._sum()) if self._take(",") else None
             self._close()
             if isinstance(exponent, Constant) and _is_number(exponent) and exponent.value in range(2, MAX_EXPONENT + 1):
                 return self._bounded(Arithmetic("*", (base,) * int(exponent.value)))
@@ -238,15 +255,12 @@ class _Parser:
 
     def _number(self, part: Expression | Term) -> Term:
         """Return an operand of arithmetic or of an order comparison as a term."""
-        found = self._as_term(part)
+        found = self.as_term(part)
         if isinstance(found, Constant) and not _is_number(found):
             raise self._refused("text cannot be computed with")
         if not self._scope.want(found, NUMBER):
             raise self._refused(f"{self._written(found)} need not be a number, and would be converted,")
         return found
-
-    def _is_text(self, found: Term) -> bool:
-        return self._scope.kinds_of(found) == {TEXT}
 
     def _written(self, found: Term) -> str:
         kinds = " or ".join(sorted(self._scope.kinds_of(found)))
@@ -271,7 +285,7 @@ class _Parser:
             raise self._refused(f"more than {MAX_OPERATIONS} operations")
         return term
 
-    def _condition(self, part: Expression | Term) -> Expression:
+    def as_condition(self, part: Expression | Term) -> Expression:
         if isinstance(part, Constant):
             return TRUE if part.value and part != NO_VALUE else Or(())
         return self._truth(part) if isinstance(part, Term) else part
@@ -286,7 +300,7 @@ class _Parser:
         parts = [Comparison("!=", value, _FALSE[kind]) for kind in sorted(kinds)]
         return parts[0] if len(parts) == 1 else And(tuple(parts))
 
-    def _as_term(self, part: Expression | Term) -> Term:
+    def as_term(self, part: Expression | Term) -> Term:
         if not isinstance(part, Term):
             raise self._refused("a condition is not a value")
         return part
@@ -298,3 +312,41 @@ def _operations(term: Term) -> int:
 
 def _is_number(constant: Constant) -> bool:
     return isinstance(constant.value, int | float) and not isinstance(constant.value, bool)
+
+
+def tokens(text: str, place: Place | None) -> list[Token]:
+    """Return the tokens of an expression.
+
+    Raises:
+        NotExpressibleError: a part is outside the subset, e.g. an object in braces.
+    """
+    found, at, end = [], 0, len(text.rstrip())
+    while at < end:
+        match = _WORDS.match(text, at)
+        if match is None:
+            raise NotExpressibleError("expression", f"'{text}' has no counterpart in conditions and terms", place=place)
+        kind = match.lastgroup or ""
+        word = match[kind]
+        found.append(Token(kind, _unquoted(word, place) if kind == "text" else word))
+        at = match.end()
+    return [*found, Token("end", "")]
+
+
+def _unquoted(word: str, place: Place | None) -> str:
+    """Return the text of a string literal; two escapes that form a surrogate pair become one character.
+
+    Raises:
+        NotExpressibleError: an escape is octal, in braces or cut short, or there is half a surrogate pair.
+    """
+    inside = word[1:-1]
+    if "\\" in _ESCAPE.sub("", inside):
+        raise NotExpressibleError("expression", f"an escape in {word} has no counterpart", place=place)
+    text = _ESCAPE.sub(lambda escape: _character(escape[1]), inside)
+    try:
+        return text.encode("utf-16", "surrogatepass").decode("utf-16")
+    except UnicodeDecodeError:
+        raise NotExpressibleError("expression", f"{word} has half a character", place=place) from None
+
+
+def _character(escape: str) -> str:
+    return chr(int(escape[1:], 16)) if len(escape) > 1 else _ESCAPES.get(escape, escape)

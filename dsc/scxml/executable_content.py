@@ -8,9 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from dsc.errors import NotExpressibleError
-from dsc.scxml.document import Element
+from dsc.scxml.document import STATES, Element
 from dsc.scxml.ecmascript import MAX_WHOLE, condition, joined, term
-from dsc.scxml.elements import STATES
 from dsc.scxml.value_kinds import NO_VALUE, WHOLE, Scope, Sent
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.syntax.expression import Constant, Term, Variable

@@ -21,9 +21,8 @@ from typing import Any
 from dsc.errors import NotExpressibleError
 from dsc.events import RESERVED, TIMERS
 from dsc.model.plot import ActionPlot, Path
-from dsc.scxml.document import Element, read_xml, written
+from dsc.scxml.document import STATES, Element, check, read_xml, written
 from dsc.scxml.ecmascript import condition
-from dsc.scxml.elements import STATES, check
 from dsc.scxml.executable_content import Form, actions, assigned, fired, needed, set_at_first, variable
 from dsc.scxml.value_kinds import BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, Scope, work_out
 from dsc.text.yaml import Document, read_model

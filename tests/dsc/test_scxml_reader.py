@@ -10,9 +10,8 @@ from dsc_charts import Run
 from dsc.dynamic.library import Library
 from dsc.errors import NotExpressibleError
 from dsc.scxml.document import MAX_DEPTH
-from dsc.scxml.ecmascript import condition, term
+from dsc.scxml.ecmascript import condition, term, tokens
 from dsc.scxml.reader import parse_scxml
-from dsc.scxml.tokens import tokens
 from dsc.scxml.writer import to_scxml
 from dsc.testing import DryRun
 from dsc.text.plot_files import parse_plot, plot_to_yaml
