@@ -20,7 +20,7 @@ from knowledge_base.facts import Content, Delta, Fact
 from knowledge_base.language.checking.vocabulary import Signature
 from knowledge_base.language.syntax.expression import TypedVariable
 from knowledge_base.pddl.files import read_text
-from knowledge_base.world.change_checks import check_delta
+from knowledge_base.world.overlay import check_delta
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.schema_compatibility import missing_constants, require_extension
 from knowledge_base.world.state import WorldState

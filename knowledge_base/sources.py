@@ -15,8 +15,8 @@ from knowledge_base.conditions.notification import Notifier
 from knowledge_base.content import require_content
 from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.facts import Content, Fact
-from knowledge_base.world.change_checks import check_fluent
 from knowledge_base.world.graph import WorldGraph
+from knowledge_base.world.overlay import check_fluent
 from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.state import WorldState
 

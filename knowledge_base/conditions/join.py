@@ -15,8 +15,7 @@ from knowledge_base.language.evaluation.compiler import compile_query, compile_t
 from knowledge_base.language.evaluation.lookups import Search, conjuncts
 from knowledge_base.language.evaluation.terms import Bindings, Test
 from knowledge_base.language.syntax.expression import And, Atom, Variable, free_variables
-from knowledge_base.world.index import FactIndex
-from knowledge_base.world.state import WorldState
+from knowledge_base.world.state import FactIndex, WorldState
 
 
 class ConditionRow:

@@ -9,9 +9,8 @@ from functools import lru_cache
 from knowledge_base.facts import Content, Value
 from knowledge_base.language.checking.vocabulary import Signature
 from knowledge_base.language.syntax.expression import TypedVariable
-from knowledge_base.world.index import FactIndex
 from knowledge_base.world.schema import Schema
-from knowledge_base.world.state import WorldState
+from knowledge_base.world.state import FactIndex, WorldState
 
 ROWS = "installed rows"
 """The name of the relation as a predicate; with its blank, no text can declare or write it."""

@@ -1,35 +1,44 @@
-"""Pending changes on top of a world, which itself is left alone."""
+"""Pending changes on top of a world, and the checks that a change passes before it is applied."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
+from knowledge_base.content import require_content, require_finite, require_writable
+from knowledge_base.errors import MAX_NAME, InputError, SchemaError, UnknownNameError, shortened
 from knowledge_base.facts import Content, Delta, Fact, Value
-from knowledge_base.language.checking.vocabulary import Vocabulary
+from knowledge_base.language.checking.check import check_arity, value_fits
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature, Vocabulary
 from knowledge_base.language.evaluation.world import World
-from knowledge_base.world.change_checks import check_delta, rivals
-from knowledge_base.world.index import FactIndex
+from knowledge_base.language.syntax.expression import TypedVariable
+from knowledge_base.spelling import A_NAME_IS, is_name, nearest_name
+from knowledge_base.world.state import FactIndex
+
+_Key = tuple[str, tuple[Value, ...]]
 
 
 class Overlay:
-    """A `World` that is `base` with changes: a transaction's view, a step of a plan tried out.
+    """A `World` with pending changes: a transaction's view, or a step of a plan on trial.
 
     The base must not change in what the overlay touches while the overlay is in use.
+
+    Args:
+        base: the world below the changes, which stays unchanged.
+        added: facts that are true here from the beginning.
+
+    Attributes:
+        schema: the declarations of the base.
     """
 
-    def __init__(self, base: World) -> None:
+    def __init__(self, base: World, added: FactIndex | None = None) -> None:
+        self.schema: Vocabulary = base.schema
         self._base = base
-        self._schema = base.schema
-        self._added = FactIndex()
+        self._added = FactIndex() if added is None else added
         self._removed: dict[Fact, None] = {}
         self._values: dict[Fact, Content] = {}
         self._nodes: dict[str, str] = {}
         self._gone: dict[str, None] = {}
-
-    @property
-    def schema(self) -> Vocabulary:
-        """What may be said about it: as of the base."""
-        return self._schema
 
     @property
     def delta(self) -> Delta:
@@ -79,18 +88,18 @@ class Overlay:
         return [*kept, *self._added.match(predicate, pattern)]
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
-        """At most how many facts agree with `pattern`; a base that cannot count is taken to have none."""
+        """An upper bound of the number of matching facts; a base without `estimate` counts as empty."""
         below = getattr(self._base, "estimate", None)
         own = self._added.estimate(predicate, pattern)
         return own + below(predicate, pattern) if below else own
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """What the function is worth with the changes."""
+        """Value of the function with the changes."""
         pending = self._values.get(Fact(function, args))
         return self._base_value(Fact(function, args)) if pending is None else pending
 
     def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
-        """Where what the function is worth comes from, if a source of the base feeds it."""
+        """Reference of the source that feeds the function, if the base has one."""
         below = getattr(self._base, "reference", None)
         begins_anew = self._gone and not self._gone.keys().isdisjoint(args)
         return below(function, args) if below and not begins_anew else None
@@ -108,10 +117,10 @@ class Overlay:
 
     def _base_value(self, fluent: Fact) -> Content:
         begins_anew = self._gone and not self._gone.keys().isdisjoint(fluent.args)
-        return self._schema.unset(fluent.predicate) if begins_anew else self._base.value(fluent.predicate, fluent.args)
+        return self.schema.unset(fluent.predicate) if begins_anew else self._base.value(fluent.predicate, fluent.args)
 
     def _add(self, fact: Fact) -> None:
-        if self._gone and not self._gone.keys().isdisjoint(fact.args):  # went with its thing, so it is said again
+        if self._gone and not self._gone.keys().isdisjoint(fact.args):  # it was removed with its thing
             self._added.add(fact)
         elif fact in self._removed:
             del self._removed[fact]
@@ -144,3 +153,152 @@ class Overlay:
                 pattern = tuple(name if i == position else None for i in range(signature.arity))
                 for args in self.match(predicate, pattern):
                     yield Fact(predicate, args)
+
+
+def rivals(fact: Fact, world: World) -> Iterator[Fact]:
+    """The true facts that differ from `fact` only in the last argument."""
+    found = world.match(fact.predicate, (*fact.args[:-1], None))
+    return (Fact(fact.predicate, args) for args in list(found) if args != fact.args)
+
+
+def require_single(delta: Delta, world: World) -> None:
+    """Raise an error if `delta`, applied to `world`, makes two facts true that exclude each other.
+
+    Raises:
+        SchemaError: two replacements of the same, or two facts of a functional predicate; both are named.
+    """
+    replaced = _grouped(delta.replaced)
+    for facts in replaced.values():
+        _require_one(facts, "are two replacements of the same")
+    functional = world.schema.functional
+    if not functional:
+        return
+    removed, gone = set(delta.removed), set(delta.removed_nodes)
+    added = _grouped(f for f in delta.added if f.predicate in functional)
+    for key, facts in added.items():
+        before = replaced.get(key) or rivals(next(iter(facts)), world)
+        stay = [f for f in before if f not in removed and gone.isdisjoint(f.args)]
+        _require_one({**dict.fromkeys(stay), **facts}, f"cannot both be true, as '{key[0]}' is functional; use replace")
+
+
+def _grouped(facts: Iterable[Fact]) -> dict[_Key, dict[Fact, None]]:
+    found: dict[_Key, dict[Fact, None]] = {}
+    for fact in facts:
+        found.setdefault((fact.predicate, fact.args[:-1]), {})[fact] = None
+    return found
+
+
+def _require_one(facts: dict[Fact, None], wrong: str) -> None:
+    if len(facts) > 1:
+        first, second, *_ = facts
+        raise SchemaError(f"{first} and {second} {wrong}")
+
+
+def check_delta(delta: Delta, world: World) -> None:
+    """Raise an error unless `delta` can be applied to `world`.
+
+    Raises:
+        UnknownNameError: an undeclared type, predicate or function, or an unknown thing.
+        SchemaError: a wrong number of arguments, a wrong type, a second type for a thing, a second fact of a
+            functional predicate, a value that a source feeds.
+        InputError: a number that is not finite, or a new thing with a name that PDDL cannot spell.
+    """
+    schema, admission = world.schema, _Admission(delta, world)
+    # Facts may be removed together with the things they are about.
+    before = _Admission(replace(delta, removed_nodes=()), world) if delta.removed_nodes else admission
+    reference = getattr(world, "reference", None)
+    for name, type_name in delta.nodes.items():
+        admission.node(name, type_name)
+    for fact in (*delta.added, *delta.replaced):
+        admission.fact(fact, schema.told(fact.predicate))
+    for fact in delta.removed:
+        before.fact(fact, schema.told(fact.predicate))
+    for fluent, content in delta.values.items():
+        admission.fact(fluent, schema.function(fluent.predicate))
+        require_content(content, schema.result(fluent.predicate), fluent)
+        if delta.removed_nodes and not set(delta.removed_nodes).isdisjoint(fluent.args):
+            continue  # the new thing has no source
+        if reference is not None and (source := reference(fluent.predicate, fluent.args)) is not None:
+            raise SchemaError(f"{fluent} is fed by '{source}' and cannot be set")
+    for name in delta.removed_nodes:
+        if name in schema.constants and name not in delta.nodes:
+            raise SchemaError(f"'{name}' is a constant of the domain and cannot be removed")
+    for fact in delta.replaced:
+        _require_replaceable(fact, schema)
+    if delta.replaced or schema.functional:
+        require_single(delta, world)
+
+
+def check_fluent(fluent: Fact, world: World) -> None:
+    """Raise an error unless the function is declared and takes these arguments.
+
+    Raises:
+        UnknownNameError: an undeclared function, or an unknown thing.
+        SchemaError: a wrong number of arguments, a wrong type.
+    """
+    _Admission(Delta(), world).fact(fluent, world.schema.function(fluent.predicate))
+
+
+def _require_replaceable(fact: Fact, schema: Vocabulary) -> None:
+    if not fact.args:
+        raise SchemaError(f"{fact} has no argument that could be replaced")
+    if len(fact.args) == 1 and fact.predicate not in schema.functional:
+        others = f"all other facts of '{fact.predicate}', which is not functional"
+        raise SchemaError(f"{fact} would replace {others}; retract those that hold no longer")
+
+
+class _Admission:
+    """Checks the parts of a change against the things of a world and of the change itself."""
+
+    def __init__(self, delta: Delta, world: World) -> None:
+        self.delta = delta
+        self.world = world
+        self.schema = world.schema
+        self.type_of = self.changed_type_of if delta.nodes or delta.removed_nodes else world.type_of
+
+    def node(self, name: str, type_name: str) -> None:
+        if not isinstance(name, str) or not name:
+            raise InputError(f"a thing's name is text that is not empty, not {name!r}")
+        self.schema.require_type(type_name)
+        known = None if name in self.delta.removed_nodes else self.world.type_of(name)
+        if known is None and not is_name(name):  # stores of older versions may have such names
+            meant = nearest_name(name)
+            raise InputError(
+                f"{shortened(repr(name), MAX_NAME)} cannot be the name of a thing: {A_NAME_IS}",
+                found=name, valid=[meant] if meant else (),
+            )  # fmt: skip
+        if known is not None and known != type_name:
+            raise SchemaError(f"'{name}' is of type '{known}' and cannot become '{type_name}'")
+
+    def fact(self, fact: Fact, signature: Signature) -> None:
+        if len(fact.args) != len(signature.parameters):
+            check_arity(signature, len(fact.args))
+        for parameter, value in zip(signature.parameters, fact.args, strict=True):
+            known = self.type_of(value) if isinstance(value, str) else None
+            if known is None or (known not in parameter.types and known not in self.schema.fitting(parameter.types)):
+                self.other_argument(value, known, parameter, fact)
+
+    def other_argument(self, value: Value, known: str | None, parameter: TypedVariable, fact: Fact) -> None:
+        """Check an argument that is not a thing of the right type: a value, or a mistake."""
+        wanted = parameter.types or (ROOT_TYPE,)
+        if value_fits(value, wanted):
+            what = f"the argument '?{parameter.name}' of {fact.predicate}"
+            if isinstance(value, str):
+                require_writable(value, what)
+            else:
+                require_finite(value, what)
+            return
+        expected = f"the argument '?{parameter.name}' of {fact} is of type {' or '.join(wanted)}"
+        if known is not None:
+            raise SchemaError(f"{expected}, and '{value}' is of type {known}", found=str(value))
+        if not isinstance(value, str) or set(wanted) <= set(VALUE_TYPES):
+            raise SchemaError(f"{expected}, not {value!r}")
+        raise UnknownNameError(f"there is no object '{value}', used in {fact}", found=value, valid=self.things(wanted))
+
+    def changed_type_of(self, name: str) -> str | None:
+        new = self.delta.nodes.get(name)
+        return self.world.type_of(name) if new is None and name not in self.delta.removed_nodes else new
+
+    def things(self, types: Iterable[str]) -> set[str]:
+        known = {t for t in types if t not in VALUE_TYPES}
+        return {name for t in known for name in self.world.objects(t)} | self.delta.nodes.keys()

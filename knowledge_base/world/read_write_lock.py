@@ -1,7 +1,7 @@
 """Read-write lock: questions and changes take turns in order of arrival, and an interrupt never leaves it taken.
 
-An interrupt (`KeyboardInterrupt`) comes as Python enters a function, begins a loop again, or returns from a call. So an
-`__exit__` here is that of Python's own lock: one call into C, before which no interrupt can come. A gate is a queue,
+Python raises an interrupt (`KeyboardInterrupt`) as it enters a function, begins a loop again, or returns from a call.
+So each `__exit__` is that of Python's own lock: one call into C, before which no interrupt comes. A gate is a queue,
 because a queue may be opened twice.
 """
 
@@ -19,7 +19,7 @@ from typing import Protocol
 from knowledge_base.errors import ConflictError
 
 PATIENCE_S = 0.0005
-"""How long the first in line lets others go first: a few changes' time, some times what handing the lock over takes."""
+"""Time in which the first in line lets others go first: several changes, and several handovers of the lock."""
 
 
 class Enter(Protocol):
@@ -45,11 +45,11 @@ class FairLock:
     the line at its end. (Handing the lock over each time costs more than most of the work done with it.)
 
     Args:
-        patience_s: how long the first in line lets others go first, in seconds.
+        patience_s: time in which the first in line lets others go first, in seconds.
 
     Attributes:
-        held: whether this thread has the lock.
-        release: give the lock back, once.
+        held: tells whether this thread has the lock.
+        release: gives the lock back, once.
         marked: set by the thread that has the lock; cleared each time it is taken anew.
     """
 
@@ -74,35 +74,27 @@ class FairLock:
         return len(self._gates)
 
     def __enter__(self) -> None:
-        again = self.held()
+        marked_here = self.marked and self.held()
+        may_go = not self._gates or self.held() or monotonic() < self._due
         try:
-            may_go = again or not self._gates or monotonic() < self._due
             if not (may_go and self._acquire(blocking=False)):
                 self._wait()
         except BaseException:
             self.let_go()
             raise
-        if not again:  # no calls from here on: they could be interrupted
+        if not marked_here:  # no calls from here on: they could be interrupted
             self.marked = False
 
     def let_go(self) -> None:
-        """Give back what an interrupted call may have taken."""
+        """Give back the lock that an interrupted call may have taken."""
         try:
             self.release()
         except RuntimeError:  # the interrupt came before the call took it
             return
 
-    def is_free(self) -> bool:
-        """Whether no other thread has the lock or stands in line."""
-        free = not self._gates
-        try:
-            self._acquire(blocking=False)
-        finally:
-            try:
-                self.release()
-            except RuntimeError:  # another thread has it
-                free = False
-        return free
+    def take_if_free(self) -> bool:
+        """Take the lock unless another thread has it or stands in line; return whether this thread has it now."""
+        return not self._gates and self._acquire(blocking=False)
 
     def _wait(self) -> None:
         """Stand in line until the lock is taken; leaving the line opens the next gate."""
@@ -136,19 +128,17 @@ class ReadWriteLock:
     only asks cannot change anything: its wait would keep out the thread that is alone.
 
     Args:
-        patience_s: how long the first in line lets others go first, in seconds.
+        patience_s: time in which the first in line lets others go first, in seconds.
     """
 
-    __slots__ = ("__enter__", "__exit__", "_alone", "_apart", "_as_alone", "_as_changing", "_first_apart", "_lock")
+    __slots__ = ("__enter__", "__exit__", "_alone", "_as_alone", "_as_changing", "_lock")
 
     __enter__: Enter
     __exit__: Exit
 
     def __init__(self, patience_s: float = PATIENCE_S) -> None:
         self._lock = FairLock(patience_s)  # marked by a thread that changes something
-        self._alone = FairLock(patience_s)
-        self._apart: set[object] = set()  # who waits until no thread is alone, and then for the lock
-        self._first_apart = FairLock(patience_s)  # had by one of these
+        self._alone = FairLock(patience_s)  # had by a thread that is alone, or waits apart and is next
         self.__enter__ = self._lock.__enter__
         self.__exit__ = self._lock.__exit__
         self._as_changing = _Passage(self._begin_changing, self._lock.__exit__)
@@ -157,7 +147,7 @@ class ReadWriteLock:
     @property
     def waiting(self) -> tuple[int, int]:
         """Number of threads in line, and of threads that wait apart."""
-        return self._lock.length, self._alone.length + self._first_apart.length
+        return self._lock.length, self._alone.length
 
     def changing(self) -> AbstractContextManager[None]:
         """No other thread asks or changes anything.
@@ -168,59 +158,60 @@ class ReadWriteLock:
         return self._as_changing
 
     def alone(self) -> AbstractContextManager[None]:
-        """No other thread changes anything; other threads may ask.
+        """No other thread changes anything; other threads may ask, unless this one changes something already.
 
         Raises:
             ConflictError: on entering, this thread is inside a question.
         """
-        return self._as_alone
+        return self._as_changing if self._lock.marked and self._lock.held() else self._as_alone
 
     def _begin_changing(self) -> None:
-        self._get_to_change()
+        may_change = self._may_change()
+        entered = False
+        try:
+            self._lock.__enter__()
+            entered = True
+            if may_change:
+                pass
+            elif self._alone.take_if_free():
+                self._alone.release()
+            else:
+                self._lock.release()
+                with self._alone:
+                    self._lock.__enter__()
+        except BaseException:
+            if entered:
+                self._lock.let_go()
+                if not may_change:
+                    self._alone.let_go()
+            raise
         self._lock.marked = True  # no calls from here on: they could be interrupted
 
     def _begin_alone(self) -> None:
-        self._get_to_change()
+        if self._may_change():
+            self._alone.__enter__()
+            return
         entered = False
         try:
-            try:
-                self._alone.__enter__()  # it is free, or will be at once
+            with self._lock:
                 entered = True
-            finally:
-                self._lock.release()
+                taken = self._alone.take_if_free()
+            if not taken:
+                self._alone.__enter__()
         except BaseException:
             if entered:
                 self._alone.let_go()
             raise
 
-    def _get_to_change(self) -> None:
-        """Take the lock while no other thread is alone or has waited longer for that."""
-        again, alone = self._lock.held(), self._alone.held()
-        if again and not (self._lock.marked or alone):
+    def _may_change(self) -> bool:
+        """Whether this thread is alone or changes something already."""
+        if self._alone.held():
+            return True
+        if not self._lock.held():
+            return False
+        if not self._lock.marked:
             raise ConflictError("a question is being answered in this thread; nothing can be changed meanwhile")
-        entered = False
-        try:
-            self._lock.__enter__()
-            entered = True
-            if not (again or alone or (not self._apart and self._alone.is_free())):
-                self._lock.release()
-                self._wait_apart()
-        except BaseException:
-            if entered:
-                self._lock.let_go()
-            raise
-
-    def _wait_apart(self) -> None:
-        """Wait until no thread is alone, and then for the lock, in order of arrival."""
-        me = object()
-        try:
-            self._apart.add(me)
-            with self._first_apart:
-                with self._alone:
-                    pass
-                self._lock.__enter__()
-        finally:
-            self._apart.discard(me)
+        return True
 
 
 class _Passage:

@@ -249,6 +249,9 @@ class Schema:
             UnknownNameError: there is none.
             SchemaError: it is computed.
         """
+        found = self.predicates.get(name)
+        if found is not None:
+            return found
         if name in self.computed:
             raise self.computed[name].refused(place)
         return self.predicate(name, place)

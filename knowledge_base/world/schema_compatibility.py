@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from knowledge_base.errors import Place, SchemaError, SchemaMismatchError, nearest
 from knowledge_base.facts import Delta
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Signature
-from knowledge_base.world.change_checks import require_single
+from knowledge_base.world.overlay import require_single
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 

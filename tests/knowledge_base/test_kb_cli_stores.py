@@ -253,7 +253,7 @@ def test_how_a_query_will_be_looked_up(store) -> None:
 
 
 def test_names_of_older_stores_are_printed_so_that_they_do_nothing_to_a_terminal(store, monkeypatch) -> None:
-    monkeypatch.setattr("knowledge_base.world.change_checks.is_name", lambda _: True)
+    monkeypatch.setattr("knowledge_base.world.overlay.is_name", lambda _: True)
     run("tell", store, '(cup "Red one")', '(on "Red one" table)', '(cup "\x1b[31m")')
     (said,) = [fact for fact in json.loads(run("show", store, "--json"))["facts"] if "Red" in fact]
     assert run("retract", store, said).startswith('- (on "Red one" table)')

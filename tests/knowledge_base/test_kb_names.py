@@ -113,7 +113,7 @@ def test_each_door_refuses_what_pddl_cannot_say(tmp_path) -> None:
 
 def test_a_store_that_has_such_a_name_goes_on(tmp_path, monkeypatch) -> None:
     with monkeypatch.context() as older, KnowledgeBase.open(SCHEMA, tmp_path / "s.kb") as kb:
-        older.setattr("knowledge_base.world.change_checks.is_name", lambda _: True)
+        older.setattr("knowledge_base.world.overlay.is_name", lambda _: True)
         kb.apply(Delta(nodes={BAD: "cup"}), author="old")
     with KnowledgeBase.open(None, tmp_path / "s.kb") as kb:
         kb.apply(Delta(nodes={BAD: "cup"}, added=(fact("clean", BAD),)), author="new")

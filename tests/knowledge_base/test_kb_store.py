@@ -134,7 +134,7 @@ def test_query_ask_and_explain(kb) -> None:
 
 
 def test_a_name_with_capitals_of_an_older_store_is_reached_in_quotes_or_as_a_parameter(kb, monkeypatch) -> None:
-    monkeypatch.setattr("knowledge_base.world.change_checks.is_name", lambda _: True)
+    monkeypatch.setattr("knowledge_base.world.overlay.is_name", lambda _: True)
     kb.apply(Delta(nodes={"Cup 9": "cup"}, added=(fact("heavy", "Cup 9"),)), author="test")
     assert kb.ask('(heavy "Cup 9")')
     assert kb.ask("(heavy ?i)", {"i": "Cup 9"})
