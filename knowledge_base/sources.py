@@ -17,7 +17,6 @@ from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.facts import Content, Fact
 from knowledge_base.world.graph import WorldGraph
 from knowledge_base.world.overlay import check_fluent
-from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.state import WorldState
 
 
@@ -92,11 +91,10 @@ class Sources:
         state: WorldState,
         graph: Callable[[], WorldGraph | None],
         installed: Installed,
-        announcer: Notifier,
-        lock: ReadWriteLock,
+        notifier: Notifier,
     ) -> None:
         self._state, self._graph, self._installed = state, graph, installed
-        self._announcer, self._lock = announcer, lock
+        self._notifier, self._lock = notifier, notifier.lock
         self._open: dict[Fact, DataSource] = {}
 
     def bind(self, fluent: Fact, reference: str) -> DataSource:
@@ -129,7 +127,7 @@ class Sources:
             self._state.feed(fluent, content)
             self._show(fluent, source.reference, content)
             self._tell(fluent, before)
-        self._announcer.deliver()
+        self._notifier.deliver()
 
     def close(self, source: DataSource) -> None:
         """See `DataSource.close`."""
@@ -139,14 +137,13 @@ class Sources:
             before = self._value(source.fluent)
             self._drop(source)
             self._tell(source.fluent, before)
-        self._announcer.deliver()
+        self._notifier.deliver()
 
     def close_about(self, things: Iterable[str]) -> None:
         """Things go, and with them what feeds values about them; conditions are told by whoever removes them."""
         gone = set(things)
-        if gone:  # nearly every commit takes nothing away
-            for source in [s for s in self._open.values() if not gone.isdisjoint(s.fluent.args)]:
-                self._drop(source)
+        for source in [s for s in self._open.values() if not gone.isdisjoint(s.fluent.args)]:
+            self._drop(source)
 
     def _drop(self, source: DataSource) -> None:
         source.end()

@@ -12,11 +12,11 @@ from types import TracebackType
 from typing import Self, get_args
 from weakref import WeakSet
 
-from knowledge_base.conditions.condition import Condition, Fire
-from knowledge_base.conditions.damping import TimerClock
-from knowledge_base.conditions.installed import Installed, terms
+from knowledge_base.conditions.condition import Condition
+from knowledge_base.conditions.damping import Fire, TimerClock, terms
+from knowledge_base.conditions.installed import Installed
 from knowledge_base.conditions.notification import Listener, Notifier
-from knowledge_base.conditions.watch import Watch, watch
+from knowledge_base.conditions.watch import Watch
 from knowledge_base.errors import ConflictError, HistoryError, InputError, StoreError
 from knowledge_base.exchange import read_json
 from knowledge_base.facts import Change, Delta, Fact, Value
@@ -58,11 +58,11 @@ class KnowledgeBase(View):
         self._history = history or MemoryHistory(Version(WorldState(schema), 0, clock()))
         start = self._history.newest()
         super().__init__(start.state, start.version)
-        self._announcer = Notifier(self._lock)
-        self._installed = Installed(start.state, start.version, self._lock, self._announcer)
+        self._notifier = Notifier(self._lock, start.version)
+        self._installed = Installed(start.state, self._notifier)
         self._watches: WeakSet[Watch] = WeakSet()
         self._closed = False
-        self._sources = Sources(start.state, lambda: self._graph, self._installed, self._announcer, self._lock)
+        self._sources = Sources(start.state, lambda: self._graph, self._installed, self._notifier)
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
@@ -176,7 +176,7 @@ class KnowledgeBase(View):
             for change in self._history.later(self._version):
                 self._time = change.time
                 self._take_in(change)
-        self._announcer.deliver()
+        self._notifier.deliver()
         return self._version
 
     @contextmanager
@@ -206,17 +206,17 @@ class KnowledgeBase(View):
                 first = self._first(key, expect)
                 transaction = Transaction(Overlay(self._state), self._questions, first)
                 self._writer = (get_ident(), author)
+                self._notifier.quiet = True
                 try:
-                    with self._announcer.quiet():
-                        yield transaction
+                    yield transaction
                 finally:
-                    self._writer = None
+                    self._writer, self._notifier.quiet = None, False
                     transaction.close()
                 if first is None:
-                    with self._lock.changing():
+                    with self._lock:
                         transaction.change = self._commit(transaction.delta, author, key, along)
         finally:
-            self._announcer.deliver()
+            self._notifier.deliver()
 
     def apply(
         self,
@@ -248,7 +248,7 @@ class KnowledgeBase(View):
                 pending = Overlay(self._state)
                 pending.apply(delta)
                 change = self._commit(pending.delta, author, key, along)
-        self._announcer.deliver()
+        self._notifier.deliver()
         return change
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
@@ -275,7 +275,7 @@ class KnowledgeBase(View):
         change the knowledge base. When listeners raise, the committing call raises an `ExceptionGroup`
         after all have been told; the change stays.
         """
-        return self._announcer.subscribe(listener)
+        return self._notifier.subscribe(listener)
 
     def install(
         self,
@@ -315,7 +315,7 @@ class KnowledgeBase(View):
             params = self._questions.given(text, params, self._state, "answers")
             e = self._questions.query(text, params, self._state)
             condition = self._installed.install(e, params, firing, hysteresis)
-        self._announcer.deliver()
+        self._notifier.deliver()
         return condition
 
     def watch(
@@ -337,7 +337,8 @@ class KnowledgeBase(View):
         """
         with self._lock:
             self._require_open()
-            made = watch(self, pattern, {} if params is None else params, limit)
+            made = Watch(pattern, {} if params is None else params, self.schema, self._version, limit)
+            made.follow(self.subscribe(made.hear))
             self._watches.add(made)
             return made
 
@@ -449,14 +450,15 @@ class KnowledgeBase(View):
     def _take_in(self, change: Change) -> None:
         """The change is kept; make it, and queue what others have to be told."""
         effective = change.delta
-        departures = self._installed.departures(effective)
-        self._sources.close_about(effective.removed_nodes)
+        departures = self._installed.departures(effective) if effective.removed_nodes else []
+        if effective.removed_nodes:
+            self._sources.close_about(effective.removed_nodes)
         self._state.commit(effective)
         if self._graph is not None:
             self._graph.commit(effective)
         self._version = change.version
-        self._announcer.add(change)
-        self._installed.commit(effective, departures, self._version)
+        self._notifier.add(change)
+        self._installed.commit(effective, departures)
 
     def _present(self) -> Version:
         with self._lock:

@@ -273,7 +273,7 @@ def _changes(kb: KnowledgeBase, since: int, until: int | None) -> Iterator[Chang
 
 
 def _touches(kb: KnowledgeBase, pattern: str | None) -> Callable[[Change], bool]:
-    from knowledge_base.conditions.pattern import touches
+    from knowledge_base.conditions.watch import touches
     from knowledge_base.language.syntax.text import parse_condition
 
     return (lambda _: True) if pattern is None else touches(parse_condition(pattern, "PATTERN"), {}, kb.schema)

@@ -1,13 +1,14 @@
-"""Damping of conditions: hold time and hysteresis, measured with an injected clock."""
+"""Terms on which a condition fires: edge or each, once, hold time by an injected clock, hysteresis."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
 
 from knowledge_base.errors import InputError
+from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
@@ -21,32 +22,35 @@ from knowledge_base.language.syntax.expression import (
     Or,
 )
 
+Fire = Literal["edge", "each"]
+FIRE: tuple[Fire, ...] = ("edge", "each")
+
 
 class Timer(Protocol):
     """A call that is due later."""
 
     def cancel(self) -> object:
-        """Do not make the call."""
+        """Cancel the call."""
         ...
 
 
 class TimerClock(Protocol):
-    """Gives the time and calls back; both are used from whatever thread commits a change."""
+    """Gives the time and calls back; any thread that commits a change uses both."""
 
     def now(self) -> float:
         """Seconds from some fixed moment."""
         ...
 
     def call_later(self, delay_s: float, callback: Callable[[], None]) -> Timer:
-        """Call `callback` once when so many seconds have passed."""
+        """Call `callback` once after that time."""
         ...
 
 
 class Hold:
     """A timer that runs while a condition is true.
 
-    `due` is reckoned when the truth changes, under the lock; `start` and `stop` come later, outside the lock
-    and in commit order.
+    `due` is computed when the truth changes, under the lock; `start` and `stop` follow outside the lock, in commit
+    order.
     """
 
     def __init__(self, clock: TimerClock, seconds: float) -> None:
@@ -55,31 +59,58 @@ class Hold:
         self._timer: Timer | None = None
 
     def due(self) -> float:
-        """When a condition that becomes true now has been true for long enough."""
+        """Return the time at which a condition that becomes true now fires."""
         return self._clock.now() + self._seconds
 
     def start(self, due: float, over: Callable[[], None]) -> None:
-        """Call `over` when it is that late."""
+        """Call `over` at that time."""
         self._timer = self._clock.call_later(max(0.0, due - self._clock.now()), over)
 
     def stop(self) -> None:
-        """It has become false, or nobody asks any more."""
+        """Cancel the timer."""
         timer, self._timer = self._timer, None
         if timer is not None:
             timer.cancel()
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """Terms on which a condition fires; see `KnowledgeBase.install`."""
+
+    fire: Fire
+    once: bool
+    hold: Hold | None
+
+
+def terms(fire: Fire, *, hold_s: float, once: bool, clock: TimerClock | None) -> Terms:
+    """Return the terms on which a condition fires, checked; see `KnowledgeBase.install`.
+
+    Raises:
+        InputError: an unknown way to fire, a time that is negative or not finite, or one without a clock.
+    """
+    if fire not in FIRE:
+        message = f"a condition fires at an 'edge' or at 'each' change, not {shown(fire)}"
+        raise InputError(message, found=str(fire), valid=FIRE)
+    if isinstance(hold_s, bool) or not isinstance(hold_s, int | float) or not 0 <= hold_s < math.inf:
+        raise InputError(f"a hold time is a number of seconds, 0 or more, not {shown(hold_s)}")
+    if not hold_s:
+        return Terms(fire, once, None)
+    if clock is None:
+        raise InputError(f"to hold for {hold_s} s a condition needs a clock: install(..., clock=...)")
+    return Terms(fire, once, Hold(clock, hold_s))
 
 
 _UP, _DOWN = (">", ">="), ("<", "<=")
 
 
 def relaxed(e: Expression, margin: float) -> Expression:
-    """`e` with the bound of each comparison moved by `margin`, so that it is true more easily.
+    """Return `e` with the bound of each comparison moved by `margin`, so that it is true more easily.
 
-    `(> (temperature ?t) 60)` becomes `(> (temperature ?t) (- 60 margin))`; under `not` bounds move the other
-    way. `=` and `!=` stay.
+    `(> (temperature ?t) 60)` becomes `(> (temperature ?t) (- 60 margin))`; under `not` bounds move the other way.
+    `=` and `!=` stay.
 
     Raises:
-        InputError: the margin is not a positive number, or there is nothing to move.
+        InputError: the margin is not a positive number, or no comparison has a bound.
     """
     if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0 < margin < math.inf:
         raise InputError(f"hysteresis is a positive number, not {margin!r}")
@@ -90,7 +121,7 @@ def relaxed(e: Expression, margin: float) -> Expression:
 
 
 def _relaxed(e: Expression, margin: float) -> Expression:
-    """`e` made easier by a positive margin, harder by a negative one."""
+    """Return `e` made easier by a positive margin, harder by a negative one."""
     match e:
         case Comparison(operator, _, right) if operator in (*_UP, *_DOWN):
             eased = -margin if operator in _UP else margin

@@ -1,172 +1,143 @@
-"""All installed conditions of a knowledge base, found by what a change touches.
+"""All installed conditions of a knowledge base, found by the facts, values and types that a change touches.
 
-Every commit passes here under the lock, so that each version is judged exactly. Whom it can affect is looked up
-for each changed fact, number or type (`readers`); conditions that do not agree with it are not looked at.
+Every commit passes here under the lock, so that each version is evaluated exactly. `AlphaIndex` finds the conditions
+that a changed fact, value or type can affect; no other condition is evaluated.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
+from operator import attrgetter
 
-from knowledge_base.conditions.alpha_index import AlphaIndex
-from knowledge_base.conditions.condition import FIRE, Condition, Fire, Terms
-from knowledge_base.conditions.condition_shape import Args, Lifted, Shape, lifted
-from knowledge_base.conditions.damping import Hold, TimerClock, relaxed
-from knowledge_base.conditions.dependencies import BOTH, Kind, Occurrence
-from knowledge_base.conditions.join import ConditionIndex, ConditionRow, Join
+from knowledge_base.conditions.condition import Condition
+from knowledge_base.conditions.damping import Terms, relaxed
+from knowledge_base.conditions.join import AlphaIndex, ConditionRow, Join
 from knowledge_base.conditions.notification import Notifier
-from knowledge_base.errors import InputError
+from knowledge_base.conditions.shape import BOTH, Args, Kind, Lifted, Occurrence, Shape, lifted
 from knowledge_base.facts import Delta, Fact, Value
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.expression import Expression, substitute
 from knowledge_base.language.syntax.text import to_text
-from knowledge_base.world.read_write_lock import ReadWriteLock
-from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 MORE, LESS = 1, -1
 
-
-def terms(fire: Fire, *, hold_s: float, once: bool, clock: TimerClock | None) -> Terms:
-    """The terms on which a condition fires, checked; see `KnowledgeBase.install`.
-
-    Raises:
-        InputError: an unknown way to fire, a time that is negative or not finite, or one without a clock.
-    """
-    if fire not in FIRE:
-        message = f"a condition fires at an 'edge' or at 'each' change, not {shown(fire)}"
-        raise InputError(message, found=str(fire), valid=FIRE)
-    if isinstance(hold_s, bool) or not isinstance(hold_s, int | float) or not 0 <= hold_s < math.inf:
-        raise InputError(f"a hold time is a number of seconds, 0 or more, not {shown(hold_s)}")
-    if not hold_s:
-        return Terms(fire, once, None)
-    if clock is None:
-        raise InputError(f"to hold for {hold_s} s a condition needs a clock: install(..., clock=...)")
-    return Terms(fire, once, Hold(clock, hold_s))
-
-
 Event = tuple[Kind, str, Args, int]
-"""One fact, number or type that a change makes different: its name, arguments, and `MORE`, `LESS` or `BOTH`."""
+"""One fact, value or type that a change makes different: its name, arguments, and `MORE`, `LESS` or `BOTH`."""
 
 
 class Installed:
-    """The relations of a knowledge base's conditions by shape; all but `later` and `deliver` under its lock."""
+    """The joins of a knowledge base's conditions by shape; to be used under its lock."""
 
-    def __init__(self, world: WorldState, version: int, lock: ReadWriteLock, announcer: Notifier) -> None:
-        self.lock = lock
-        self.version = version
+    def __init__(self, world: WorldState, notifier: Notifier) -> None:
         self._world = world
-        self._announcer = announcer
-        self._relations: dict[Shape, Join] = {}
-        self._readers: dict[tuple[Kind, str], ConditionIndex] = {}
-        self._told: dict[ConditionRow, dict[Condition, None]] = {}
+        self._schema = world.schema
+        self._notifier = notifier
+        self._joins: dict[Shape, Join] = {}
+        self._readers: dict[tuple[Kind, str], AlphaIndex] = {}
+        self._conditions: dict[ConditionRow, dict[Condition, None]] = {}
         self._changed: dict[ConditionRow, None] = {}
         self._numbers = 0
 
     def install(self, e: Expression, params: Mapping[str, Value], terms: Terms, hysteresis: float | None) -> Condition:
-        """Keep a condition evaluated that was checked.
+        """Keep a checked condition evaluated.
 
         Raises:
-            InputError: there is nothing that the hysteresis could be about.
+            InputError: there is a hysteresis, but no comparison.
         """
         eased = e if hysteresis is None else relaxed(e, hysteresis)
         found = lifted(e, params, self._schema)
         rise = self._row(found)
         stay = rise if eased is e else self._row(lifted(eased, params, self._schema))
         self._numbers += 1
-        condition = Condition(self, to_text(substitute(e, params)), (rise, stay), found.names, terms, self._numbers)
+        text = to_text(substitute(e, params))
+        condition = Condition(text, (rise, stay), found.names, terms, self._numbers, self._notifier, self._remove)
         for row in (rise, stay):
-            self._told.setdefault(row, {})[condition] = None
+            self._conditions.setdefault(row, {})[condition] = None
         if terms.fire == "each":
             stay.relation.want_all(stay)
         condition.begin()
         return condition
 
-    def remove(self, condition: Condition) -> None:
-        """Forget a condition, and what was kept for it alone."""
-        for row in dict.fromkeys(condition.rows):
-            told = self._told[row]
-            del told[condition]
-            if not told:
-                del self._told[row]
-                row.relation.drop(row)
-                if not row.relation.rows:
-                    self._relations.pop(row.relation.shape, None)
-
     def conditions(self) -> list[Condition]:
-        """All that are installed, in the order of installation."""
-        return sorted({c for told in self._told.values() for c in told}, key=lambda c: c.number)
+        """Return the conditions in the order of installation."""
+        return sorted({c for several in self._conditions.values() for c in several}, key=lambda c: c.number)
 
     def departures(self, effective: Delta) -> list[Event]:
-        """The types and numbers that go with removed things; to be asked for before the change is made."""
+        """Return the types and values that go with removed things; to be called before the change is made."""
         gone = set(effective.removed_nodes)
-        if not (gone and self._relations):
+        if not (gone and self._joins):
             return []
-        numbers = self._world.values_about(gone)
+        values = self._world.values_about(gone)
         types = [(name, t) for name in gone if (t := self._world.type_of(name)) is not None]
         return [
-            *(("said", f.predicate, f.args, BOTH) for f in numbers),
+            *(("said", f.predicate, f.args, BOTH) for f in values),
             *(("type", t, (name,), LESS) for name, own in types for t in self._schema.ancestors(own)),
         ]
 
-    def commit(self, effective: Delta, departures: list[Event], version: int) -> None:
-        """Judge the change that the world has made, and queue what has to be told."""
-        self.version = version
-        if self._relations:
-            self._judge([*departures, *self._events(effective)])
-
-    def refreshed(self, fluent: Fact) -> None:
-        """A fluent is worth something else, and no version was made: a source feeds it."""
-        self._judge([("said", fluent.predicate, fluent.args, BOTH)])
-
-    def later(self, call: Callable[[], None]) -> None:
-        """Queue a call for when the lock is released; under the lock."""
-        self._announcer.queue(call)
-
-    def deliver(self) -> None:
-        """Make the queued calls; without the lock."""
-        self._announcer.deliver()
-
-    @property
-    def _schema(self) -> Schema:
-        return self._world.schema
-
-    def _events(self, effective: Delta) -> Iterator[Event]:
+    def commit(self, effective: Delta, departures: list[Event]) -> None:
+        """Evaluate the change that was made in the world, and queue the notifications."""
+        if not self._joins:
+            return
+        events = departures
         for fact in effective.removed:
-            yield "said", fact.predicate, fact.args, LESS
+            events.append(("said", fact.predicate, fact.args, LESS))
         for name, own in effective.nodes.items():
             for type_name in self._schema.ancestors(own):
-                yield "type", type_name, (name,), MORE
+                events.append(("type", type_name, (name,), MORE))
         for fact in effective.added:
-            yield "said", fact.predicate, fact.args, MORE
+            events.append(("said", fact.predicate, fact.args, MORE))
         for fluent in effective.values:
-            yield "said", fluent.predicate, fluent.args, BOTH
+            events.append(("said", fluent.predicate, fluent.args, BOTH))
+        self._evaluate(events)
 
-    def _judge(self, events: list[Event]) -> None:
-        """Bring all rows up to date with what has happened, and tell the conditions of those that changed."""
-        known = self._readers
-        reached = [(known[kind, name], args, sign) for kind, name, args, sign in events if (kind, name) in known]
+    def refreshed(self, fluent: Fact) -> None:
+        """Evaluate a fluent with another value that a source feeds, without a version."""
+        self._evaluate([("said", fluent.predicate, fluent.args, BOTH)])
+
+    def _evaluate(self, events: list[Event]) -> None:
+        """Bring all rows up to date with the events, then the conditions of the changed rows."""
         self._changed.clear()
-        suspects = dict.fromkeys(s for readers, args, sign in reached for s in readers.broken(args, sign))
-        renewed = [row for row, witness in suspects if row.relation.loses(row, witness)]
-        failing = (row for readers, _, _ in reached for row in readers.failing)
-        for row in dict.fromkeys((*renewed, *failing)):
+        reached: list[tuple[AlphaIndex, Args, int]] = []
+        suspects: dict[tuple[ConditionRow, Args], None] = {}
+        renewed: dict[ConditionRow, None] = {}
+        for kind, name, args, sign in events:
+            readers = self._readers.get((kind, name))
+            if readers is not None:
+                reached.append((readers, args, sign))
+                suspects.update(dict.fromkeys(readers.broken(args, sign)))
+        for row, witness in suspects:
+            if row.relation.loses(row, witness):
+                renewed[row] = None
+        for readers, _, _ in reached:
+            renewed.update(readers.failing)
+        for row in renewed:
             row.relation.renew(row)
         for readers, args, sign in reached:
-            for trigger, rows in tuple(readers.made(args, sign)):
-                if rows and trigger.admits(args):  # what came before may have closed them
+            for trigger, rows in readers.made(args, sign):
+                if rows:  # an earlier event may have closed them
                     trigger.relation.make(trigger, args, rows)
-        touched = {condition for row in self._changed for condition in self._told.get(row, ())}
-        for condition in sorted(touched, key=lambda c: c.number):
-            condition.judge(self.version, self._changed)
+        touched: dict[Condition, None] = {}
+        for row in self._changed:
+            touched.update(self._conditions.get(row, {}))
+        for condition in sorted(touched, key=attrgetter("number")):
+            condition.judge(self._notifier.version, self._changed)
+
+    def _remove(self, condition: Condition) -> None:
+        """Forget a condition, and the rows that it alone has."""
+        for row in dict.fromkeys(condition.rows):
+            conditions = self._conditions[row]
+            del conditions[condition]
+            if not conditions:
+                del self._conditions[row]
+                row.relation.drop(row)
+                if not row.relation.rows:
+                    self._joins.pop(row.relation.shape, None)
 
     def _row(self, found: Lifted) -> ConditionRow:
-        relation = self._relations.get(found.shape)
-        if relation is None:
-            relation = Join(found.shape, self._world, self._readers_of, self._changed)
-            self._relations[found.shape] = relation
-        return relation.row(found.key)
+        join = self._joins.get(found.shape)
+        if join is None:
+            join = self._joins[found.shape] = Join(found.shape, self._world, self._readers_of, self._changed)
+        return join.row(found.key)
 
-    def _readers_of(self, occurrence: Occurrence) -> ConditionIndex:
+    def _readers_of(self, occurrence: Occurrence) -> AlphaIndex:
         return self._readers.setdefault((occurrence.kind, occurrence.name), AlphaIndex())

@@ -1,21 +1,31 @@
-"""Join of the installed conditions of one shape, kept up to date by what changes (Rete, Forgy 1982)."""
+"""Join of the installed conditions of one shape, kept up to date by changes (Rete, Forgy 1982)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cached_property
+from dataclasses import replace
+from functools import cached_property, lru_cache
+from operator import itemgetter
 
-from knowledge_base.conditions.alpha_index import AlphaIndex, picker
-from knowledge_base.conditions.condition_shape import Args, Shape
-from knowledge_base.conditions.dependencies import Occurrence, occurrences
-from knowledge_base.conditions.open_rows import ROWS, RowsWorld, schema_with_rows
+from knowledge_base.conditions.shape import Args, Occurrence, Shape, occurrences
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact, Value
+from knowledge_base.language.checking.vocabulary import Signature
 from knowledge_base.language.evaluation.compiler import compile_query, compile_test
 from knowledge_base.language.evaluation.lookups import Search, conjuncts
 from knowledge_base.language.evaluation.terms import Bindings, Test
-from knowledge_base.language.syntax.expression import And, Atom, Variable, free_variables
+from knowledge_base.language.syntax.expression import And, Atom, TypedVariable, Variable, free_variables
+from knowledge_base.world.overlay import Overlay
+from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import FactIndex, WorldState
+
+ROWS = "installed rows"
+"""Name of the open rows as a predicate; it has a blank, so that no text can declare or contain it."""
+
+Positions = tuple[int, ...]
+Picked = object
+"""The values at some positions: one unchanged, several as a tuple."""
+Picker = Callable[[Args], Picked]
 
 
 class ConditionRow:
@@ -25,7 +35,7 @@ class ConditionRow:
         relation: the join of that shape.
         key: the values of the shape's parameters.
         bindings: the same, by name.
-        witnesses: choices for the shape's answers that make it true: one is kept, or all (`wants_all`).
+        witnesses: values of the shape's answers that make it true: one is kept, or all (`wants_all`).
         wants_all: whether each change of the set of witnesses counts.
         is_listed: whether changes find it among the open rows.
         error: the error that leaves it without a truth value, if any.
@@ -54,8 +64,45 @@ class ConditionRow:
 
     @property
     def witness(self) -> Args | None:
-        """A choice for the shape's answers that makes it true."""
+        """Values of the shape's answers that make it true."""
         return next(iter(self.witnesses), None)
+
+
+class AlphaIndex:
+    """The rows that read the same predicate, function or type, by polarity and by their values at some positions.
+
+    Attributes:
+        failing: rows without a truth value, because of an error; every change tries them again.
+    """
+
+    def __init__(self) -> None:
+        self.failing: dict[ConditionRow, None] = {}
+        self._relying: dict[tuple[int, Positions], tuple[Picker, _Relying]] = {}
+        self._open: dict[tuple[int, Positions], tuple[Picker, _Open]] = {}
+
+    def relying_at(self, polarity: int, positions: Positions) -> _Relying:
+        """Return the place for witnesses that depend on facts with certain values at these positions."""
+        return self._relying.setdefault((polarity, positions), (_picker(positions), {}))[1]
+
+    def open_at(self, polarity: int, positions: Positions) -> _Open:
+        """Return the place for open rows with parameters at these positions."""
+        return self._open.setdefault((polarity, positions), (_picker(positions), {}))[1]
+
+    def broken(self, args: Args, sign: int) -> list[tuple[ConditionRow, Args]]:
+        """Return the rows with the witnesses that a change may end."""
+        found: list[tuple[ConditionRow, Args]] = []
+        for (polarity, _), (pick, relying) in self._relying.items():
+            if relying and sign * polarity <= 0:
+                found += relying.get(pick(args), ())
+        return found
+
+    def made(self, args: Args, sign: int) -> list[tuple[DeltaJoin, dict[ConditionRow, None]]]:
+        """Return the open rows that may get a witness, by delta join."""
+        found: list[tuple[DeltaJoin, dict[ConditionRow, None]]] = []
+        for (polarity, _), (pick, rows) in self._open.items():
+            if rows and sign * polarity >= 0:
+                found += rows.get(pick(args), {}).items()
+        return found
 
 
 class DeltaJoin:
@@ -69,7 +116,7 @@ class DeltaJoin:
         leaves_open: whether some of them stay undetermined.
     """
 
-    def __init__(self, occurrence: Occurrence, relation: Join, readers: ConditionIndex) -> None:
+    def __init__(self, occurrence: Occurrence, relation: Join, readers: AlphaIndex) -> None:
         shape = relation.shape
         positions = dict(occurrence.bound)
         columns = {name: i for i, name in enumerate((*shape.params, *shape.answers))}
@@ -82,13 +129,28 @@ class DeltaJoin:
         self.leaves_open = not all(name in positions for name in shape.answers)
         self._occurrence = occurrence
         self._relying = readers.relying_at(occurrence.polarity, tuple(position for position, _ in everything))
-        self._relied_on = picker(tuple(column for _, column in everything))
+        self._relied_on = _picker(tuple(column for _, column in everything))
         self._open = readers.open_at(occurrence.polarity, tuple(position for position, _ in params))
-        self._known = picker(tuple(column for _, column in params))
+        self._known = _picker(tuple(column for _, column in params))
 
-    def bindings(self, args: Args) -> dict[str, Value]:
-        """The values of the parameters and answers that the change determines."""
-        return {name: args[i] for name, i in self._occurrence.bound}
+    def bindings(self, args: Args) -> dict[str, Value] | None:
+        """Return the values of the parameters and answers that a change determines; `None` if it does not fit."""
+        found: dict[str, Value] = {}
+        for one, other in self._occurrence.equal:
+            if args[one] != args[other]:
+                return None
+        for name, position in self._occurrence.bound:
+            found[name] = args[position]
+        return found
+
+    def settles(self, bindings: Bindings) -> bool:
+        """Whether the part of the condition that a change alone determines is false, as for most changes."""
+        if self._settled is None:
+            return False
+        try:
+            return not self._settled(self.relation.world, bindings)
+        except InputError:  # the evaluation of the whole condition decides
+            return False
 
     def lean(self, row: ConditionRow, witness: Args) -> None:
         """Keep the witness where a change of its facts finds it."""
@@ -98,7 +160,7 @@ class DeltaJoin:
         """Forget the witness."""
         values = self._relied_on((*row.key, *witness))
         leaning = self._relying.get(values)
-        if leaning is not None:  # two occurrences may rely on the same fact
+        if leaning is not None:  # two occurrences may depend on the same fact
             leaning.pop((row, witness), None)
             if not leaning:
                 del self._relying[values]
@@ -117,44 +179,29 @@ class DeltaJoin:
             if not self._open[values]:
                 del self._open[values]
 
-    def admits(self, args: Args) -> bool:
-        """Whether a change with these arguments fits, and the part of the condition that it alone settles is true.
-
-        Most changes end here. A part that cannot be computed is left to the evaluation of the whole condition.
-        """
-        equal = self._occurrence.equal
-        if equal and any(args[i] != args[j] for i, j in equal):
-            return False
-        if self._settled is None:
-            return True
-        try:
-            return self._settled(self.relation.world, self.bindings(args))
-        except InputError:
-            return True
-
     @cached_property
     def _settled(self) -> Test | None:
-        """The part of the condition that a change settles alone, if there is one."""
+        """The part of the condition that a change determines alone, if there is one."""
         names = {position: name for name, position in self._occurrence.bound}
-        said = Atom(self._occurrence.name, tuple(Variable(names[i]) for i in sorted(names)))  # true by the change
+        changed = Atom(self._occurrence.name, tuple(Variable(names[i]) for i in sorted(names)))  # true by the change
         known = frozenset(names.values())
-        rest = (part for part in conjuncts(self.relation.shape.body) if part != said)
+        rest = (part for part in conjuncts(self.relation.shape.body) if part != changed)
         parts = tuple(part for part in rest if free_variables(part) <= known)
         return compile_test(And(parts), self.relation.world.schema) if parts else None
 
     @cached_property
     def search(self) -> Search:
-        """Completes what the change and the row's parameters say to witnesses."""
+        """Completes the values of a change and of a row to witnesses."""
         bound = frozenset(self.relation.shape.params).union(name for name, _ in self._occurrence.bound)
         return compile_query(self.relation.shape.body, self.relation.world.schema, bound)
 
     @cached_property
     def join(self) -> Search:
-        """Completes what the change says to open rows with witnesses: to be run on a `RowsWorld`."""
+        """Completes the values of a change to open rows with witnesses, on the world with the open rows."""
         shape, schema = self.relation.shape, self.relation.world.schema
         row = Atom(ROWS, tuple(map(Variable, shape.params)))
         bound = frozenset(name for name, _ in self._occurrence.bound)
-        return compile_query(And((row, shape.body)), schema_with_rows(schema, shape.params), bound)
+        return compile_query(And((row, shape.body)), _schema_with_rows(schema, shape.params), bound)
 
 
 class Join:
@@ -171,7 +218,7 @@ class Join:
         self,
         shape: Shape,
         world: WorldState,
-        readers: Callable[[Occurrence], ConditionIndex],
+        readers: Callable[[Occurrence], AlphaIndex],
         changed: dict[ConditionRow, None],
     ) -> None:
         schema = world.schema
@@ -183,11 +230,11 @@ class Join:
         self._search = compile_query(shape.body, schema, frozenset(shape.params))
         self._joins = not all(t.covers for t in self._triggers)
         self._open = FactIndex()
-        self._rows_world = RowsWorld(world, self._open)
+        self._world_with_rows = Overlay(world, self._open)
         self._changed = changed
 
     def row(self, key: Args) -> ConditionRow:
-        """The row for these values, evaluated when it is new."""
+        """Return the row for these values, evaluated when it is new."""
         row = self.rows.get(key)
         if row is None:
             row = self.rows[key] = ConditionRow(self, key)
@@ -204,12 +251,12 @@ class Join:
         """Forget the row."""
         for witness in tuple(row.witnesses):
             self._remove(row, witness)
-        self._mend(row)
+        self._repair(row)
         self._list(row, is_open=False)
         del self.rows[row.key]
 
     def loses(self, row: ConditionRow, witness: Args) -> bool:
-        """Drop the witness if it no longer holds; return whether the row needs a search then."""
+        """Drop the witness if it is no longer one; return whether the row needs a search then."""
         try:
             if self._test(self.world, {**row.bindings, **dict(zip(self.shape.answers, witness, strict=True))}):
                 return False
@@ -219,16 +266,19 @@ class Join:
         return not row.witnesses and not row.wants_all
 
     def make(self, trigger: DeltaJoin, args: Args, rows: dict[ConditionRow, None]) -> None:
-        """Find what a change that the trigger admits makes true of open rows that agree with it in their parameters."""
+        """Find the witnesses that a change makes for open rows that agree with it in their parameters."""
         bindings = trigger.bindings(args)
+        is_simple = len(rows) == 1 and not trigger.leaves_open
+        if bindings is None or (not is_simple and trigger.settles(bindings)):
+            return
         try:
             if len(rows) == 1 or not trigger.finds:
                 for row in tuple(rows):
                     self._complete(row, trigger, bindings)
             else:
-                for found in list(trigger.join(self._rows_world, bindings)):
+                for found in list(trigger.join(self._world_with_rows, bindings)):
                     self._add(self.rows[tuple([found[name] for name in self.shape.params])], self._witness(found))
-        except InputError:  # some row of those reached cannot be computed; which one shows one by one
+        except InputError:  # some row cannot be computed; the evaluation of each decides which
             for row in tuple(rows):
                 self.renew(row)
 
@@ -236,7 +286,7 @@ class Join:
         """Evaluate the row again."""
         try:
             found = dict.fromkeys(self._witness(b) for b in self._few(row, self._search(self.world, row.bindings)))
-            self._mend(row)
+            self._repair(row)
         except InputError as error:
             found = {}
             self._fail(row, error)
@@ -263,7 +313,7 @@ class Join:
         return [] if first is None else [first]
 
     def _witness(self, bindings: Bindings) -> Args:
-        return tuple([bindings[name] for name in self.shape.answers])
+        return tuple(map(bindings.__getitem__, self.shape.answers))
 
     def _add(self, row: ConditionRow, witness: Args) -> None:
         if witness in row.witnesses or not row.is_open or row.error is not None:
@@ -271,20 +321,18 @@ class Join:
         row.witnesses[witness] = None
         for trigger in self._triggers:
             trigger.lean(row, witness)
-        self._has_changed(row)
+        self._changed[row] = None
+        self._list(row, is_open=row.wants_all)
 
     def _remove(self, row: ConditionRow, witness: Args) -> None:
         del row.witnesses[witness]
         for trigger in self._triggers:
             trigger.let_go(row, witness)
-        self._has_changed(row)
-
-    def _has_changed(self, row: ConditionRow) -> None:
         self._changed[row] = None
         self._list(row, is_open=row.is_open)
 
     def _list(self, row: ConditionRow, *, is_open: bool) -> None:
-        """Put an open row into index and relation, where changes find it; take a closed row out."""
+        """Put an open row where changes find it; remove a closed row from there."""
         if row.is_listed is is_open:
             return
         row.is_listed = is_open
@@ -303,12 +351,26 @@ class Join:
         for trigger in self._triggers:
             trigger.readers.failing[row] = None
 
-    def _mend(self, row: ConditionRow) -> None:
+    def _repair(self, row: ConditionRow) -> None:
         if row.error is not None:
             row.error = None
             for trigger in self._triggers:
                 trigger.readers.failing.pop(row, None)
 
 
-ConditionIndex = AlphaIndex[ConditionRow, DeltaJoin]
-"""The rows of all joins that read one name."""
+_Relying = dict[Picked, dict[tuple[ConditionRow, Args], None]]
+"""Rows and witnesses by the values that the facts they depend on have."""
+_Open = dict[Picked, dict[DeltaJoin, dict[ConditionRow, None]]]
+"""Open rows by the values of their parameters, and by the delta join that finds their witnesses."""
+
+
+def _picker(positions: Positions) -> Picker:
+    """Return a function that takes the values at these positions."""
+    return itemgetter(*positions) if positions else itemgetter(slice(0))
+
+
+@lru_cache(maxsize=64)
+def _schema_with_rows(schema: Schema, params: tuple[str, ...]) -> Schema:
+    """Return `schema` with the open rows declared; most shapes have equal names of parameters."""
+    rows = Signature(ROWS, tuple(map(TypedVariable, params)))
+    return replace(schema, predicates={**schema.predicates, ROWS: rows})

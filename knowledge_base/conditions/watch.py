@@ -1,4 +1,4 @@
-"""Committed changes as an asynchronous iterator that never loses one without saying so."""
+"""Watches: the committed changes that touch a pattern such as `(on ?o table)`, as an asynchronous iterator."""
 
 from __future__ import annotations
 
@@ -7,76 +7,50 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from threading import Lock
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
-from knowledge_base.conditions.notification import Listener
-from knowledge_base.conditions.pattern import Touches, touches
-from knowledge_base.conditions.waiters import Waiters
-from knowledge_base.errors import InputError
-from knowledge_base.facts import Change, Value
+from knowledge_base.conditions.notification import Waiters
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.facts import Change, Delta, Value
+from knowledge_base.language.checking.check import check_arity
 from knowledge_base.language.checking.inputs import fitted_names, require_condition, require_params, shown
-from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.language.syntax.expression import Atom, Constant, Expression, Variable
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.schema import Schema
+
+Touches = Callable[[Change], bool]
+"""Tells whether a change touches a pattern."""
 
 
 @dataclass(frozen=True, slots=True)
 class Missed:
-    """The watcher was too slow: changes after version `since`, up to `until`, are not told; look anew.
+    """A gap of a watch with a slow reader: the changes after version `since` up to `until`.
 
     Attributes:
-        since: the latest version the watcher has been told everything of.
-        until: the latest version that was left out; what follows is told again.
+        since: the latest version up to which the reader has all changes.
+        until: the latest version in the gap; the next item follows it.
     """
 
     since: int
     until: int
 
 
-class Observed(Protocol):
-    """What can be watched: a knowledge base."""
-
-    @property
-    def schema(self) -> Schema:
-        """What may be said."""
-        ...
-
-    @property
-    def version(self) -> int:
-        """How many changes were committed."""
-        ...
-
-    def subscribe(self, listener: Listener) -> Callable[[], None]:
-        """Call `listener` with every change until the function returned is called."""
-        ...
-
-
-def watch(observed: Observed, pattern: str | Expression | None, params: Mapping[str, Value], limit: int) -> Watch:
-    """Watch `observed` from its present version on; see `KnowledgeBase.watch` for the rest."""
-    if isinstance(limit, bool) or not isinstance(limit, int) or limit < 1:
-        raise InputError(f"a watch keeps at least one change for its reader, not {shown(limit)}")
-    touching = None if pattern is None else _touching(pattern, params, observed.schema)
-    made = Watch(touching, observed.version, limit)
-    made.follow(observed.subscribe(made.hear))
-    return made
-
-
-def _touching(pattern: str | Expression, params: Mapping[str, Value], schema: Schema) -> Touches:
-    require_condition(pattern)
-    require_params(params)
-    parsed = parse_condition(pattern) if isinstance(pattern, str) else pattern
-    return touches(parsed, dict(zip(fitted_names(parsed, params), params.values(), strict=True)), schema)
-
-
 class Watch:
-    """An asynchronous iterator over changes from when it is made; see `KnowledgeBase.watch`.
+    """An asynchronous iterator over the changes after a version; see `KnowledgeBase.watch`.
 
-    It may be read by one or several tasks, of any event loop. It ends when it is closed; as a context manager
-    it is closed at the end of the block.
+    One or several tasks of any event loop may read it. It ends when it is closed; as a context manager it is closed at
+    the end of the block.
+
+    Raises:
+        InputError: the limit is not a number of changes, or the pattern is not a pattern.
     """
 
-    def __init__(self, touches: Touches | None, version: int, limit: int) -> None:
-        self._touches = touches
+    def __init__(
+        self, pattern: str | Expression | None, params: Mapping[str, Value], schema: Schema, version: int, limit: int
+    ) -> None:
+        if isinstance(limit, bool) or not isinstance(limit, int) or limit < 1:
+            raise InputError(f"a watch keeps at least one change for its reader, not {shown(limit)}")
+        self._touches = None if pattern is None else _touching(pattern, params, schema)
         self._limit = limit
         self._told = version
         self._queue: deque[Change] = deque()
@@ -84,14 +58,14 @@ class Watch:
         self._waiters: Waiters[None] = Waiters()
         self._guard = Lock()
         self._closed = False
-        self._unsubscribe: Callable[[], None] = _nothing
+        self._unsubscribe: Callable[[], None] | None = None
 
     def follow(self, unsubscribe: Callable[[], None]) -> None:
-        """`unsubscribe` ends the changes; called by the maker."""
+        """Let `close` call `unsubscribe`, which ends the notifications."""
         self._unsubscribe = unsubscribe
 
     def hear(self, change: Change) -> None:
-        """Take in a change; the knowledge base calls it, from any thread."""
+        """Receive a change; the knowledge base calls it, from any thread."""
         if self._touches is not None and not self._touches(change):
             return
         with self._guard:
@@ -104,8 +78,9 @@ class Watch:
             self._waiters.answer(None)
 
     def close(self) -> None:
-        """End it: whoever reads it is done."""
-        self._unsubscribe()
+        """End the watch and the loops of its readers."""
+        if self._unsubscribe is not None:
+            self._unsubscribe()
         with self._guard:
             self._closed = True
             self._queue.clear()
@@ -116,7 +91,7 @@ class Watch:
         return self
 
     async def __anext__(self) -> Change | Missed:
-        """The next change that touches the pattern, or which ones were missed."""
+        """The next change that touches the pattern, or a gap."""
         while True:
             with self._guard:
                 if (item := self._take()) is not None:
@@ -150,4 +125,77 @@ class Watch:
         return None
 
 
-def _nothing() -> None: ...
+def _touching(pattern: str | Expression, params: Mapping[str, Value], schema: Schema) -> Touches:
+    require_condition(pattern)
+    require_params(params)
+    parsed = parse_condition(pattern) if isinstance(pattern, str) else pattern
+    return touches(parsed, dict(zip(fitted_names(parsed, params), params.values(), strict=True)), schema)
+
+
+def touches(pattern: Expression, params: Mapping[str, Value], schema: Schema) -> Touches:
+    """Return a function that tells whether a change touches `pattern`: a predicate, function or type with arguments.
+
+    A variable without a value in `params` stands for any value, the same at each place. Removed things touch the
+    functions that may have had a value about them.
+
+    Raises:
+        InputError: the pattern is something else.
+        UnknownNameError: there is no predicate, function or type of that name.
+        SchemaError: a wrong number of arguments.
+    """
+    if not isinstance(pattern, Atom) or not all(isinstance(a, Variable | Constant) for a in pattern.args):
+        raise InputError("a pattern is one predicate, function or type, as in (on ?o table)", place=pattern.place)
+    name, fits = pattern.predicate, _Fits(pattern, params)
+    if schema.is_type(name, len(pattern.args)):
+        return lambda change: _typed(change.delta, name, schema, fits)
+    if name in schema.functions:
+        check_arity(schema.functions[name], len(pattern.args), pattern.place)
+        return lambda change: _numbered(change.delta, name, fits)
+    if name in schema.computed:
+        raise schema.computed[name].refused(pattern.place)
+    if name not in schema.predicates:
+        valid = (*schema.predicates, *schema.functions, *schema.types)
+        message = f"there is no predicate, function or type '{name}'"
+        raise UnknownNameError(message, place=pattern.place, found=name, valid=valid)
+    check_arity(schema.predicates[name], len(pattern.args), pattern.place)
+    return lambda change: any(
+        f.predicate == name and fits(f.args) for facts in (change.delta.removed, change.delta.added) for f in facts
+    )
+
+
+class _Fits:
+    """Whether arguments agree with a pattern's."""
+
+    def __init__(self, pattern: Atom, params: Mapping[str, Value]) -> None:
+        first: dict[str, int] = {}
+        self.fixed: dict[int, Value] = {}
+        self._equal: list[tuple[int, int]] = []
+        for position, arg in enumerate(pattern.args):
+            if isinstance(arg, Constant):
+                self.fixed[position] = arg.value
+            elif isinstance(arg, Variable) and arg.name in params:
+                self.fixed[position] = params[arg.name]
+            elif isinstance(arg, Variable) and first.setdefault(arg.name, position) != position:
+                self._equal.append((first[arg.name], position))
+        self.count = len(pattern.args)
+
+    def __call__(self, args: tuple[Value, ...]) -> bool:
+        if any(args[i] != value for i, value in self.fixed.items()):
+            return False
+        return all(args[i] == args[j] for i, j in self._equal)
+
+    def may_contain(self, name: str) -> bool:
+        return name in self.fixed.values() or len(self.fixed) < self.count
+
+
+def _typed(delta: Delta, name: str, schema: Schema, fits: _Fits) -> bool:
+    """Whether the change touches the type; the type of a removed thing is unknown."""
+    return any(schema.is_a(own, name) and fits((thing,)) for thing, own in delta.nodes.items()) or any(
+        fits((thing,)) for thing in delta.removed_nodes
+    )
+
+
+def _numbered(delta: Delta, name: str, fits: _Fits) -> bool:
+    return any(f.predicate == name and fits(f.args) for f in delta.values) or any(
+        fits.may_contain(thing) for thing in delta.removed_nodes
+    )

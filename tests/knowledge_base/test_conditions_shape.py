@@ -6,7 +6,7 @@ import pytest
 from kb_strategies import SCHEMA
 
 from knowledge_base import Delta, KnowledgeBase, fact
-from knowledge_base.conditions.condition_shape import lifted
+from knowledge_base.conditions.shape import lifted
 from knowledge_base.language.syntax.text import parse_condition
 
 
