@@ -80,6 +80,10 @@ class AlphaIndex:
         self._relying: dict[tuple[int, Positions], tuple[Picker, _Relying]] = {}
         self._open: dict[tuple[int, Positions], tuple[Picker, _Open]] = {}
 
+    def __bool__(self) -> bool:
+        """Whether a change can reach any row."""
+        return bool(self.failing) or any(found for _, found in (*self._relying.values(), *self._open.values()))
+
     def relying_at(self, polarity: int, positions: Positions) -> _Relying:
         """Return the place for witnesses that depend on facts with certain values at these positions."""
         return self._relying.setdefault((polarity, positions), (_picker(positions), {}))[1]

@@ -309,7 +309,7 @@ def test_a_failing_listener_silences_nobody(kb) -> None:
 def test_a_mistake_is_told_and_installs_nothing(kb, text, options, message) -> None:
     with pytest.raises(InputError, match=message):
         kb.install(text, **options)
-    assert not kb._installed._relations
+    assert not kb._installed._joins
 
 
 def test_an_unknown_thing_as_a_parameter_is_simply_not_there(kb) -> None:

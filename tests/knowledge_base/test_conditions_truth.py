@@ -81,5 +81,5 @@ def test_truth_and_firings_are_those_of_evaluating_anew_in_order(data) -> None:
         assert heard == expected
     for _, condition, _ in installed:
         condition.cancel()
-    assert not kb._installed._relations
+    assert not kb._installed._joins
     assert not any(kb._installed._readers.values())

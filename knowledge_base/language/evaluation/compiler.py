@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
+from operator import itemgetter
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
@@ -159,7 +160,12 @@ def _atom(atom: Atom, schema: Vocabulary) -> Test:
     check_arity(schema.predicate(atom.predicate, atom.place), len(atom.args), atom.place)
     if atom.predicate in schema.computed:
         return _computed(atom, schema)
-    predicate, arguments = atom.predicate, compile_arguments(atom.args, schema)
+    predicate = atom.predicate
+    names = [arg.name for arg in atom.args if isinstance(arg, Variable)]
+    if len(names) == len(atom.args) > 1:  # as most questions about one fact
+        pick = itemgetter(*names)
+        return lambda world, bindings: world.holds(predicate, pick(bindings))
+    arguments = compile_arguments(atom.args, schema)
     return lambda world, bindings: world.holds(predicate, arguments(world, bindings))
 
 
