@@ -41,7 +41,6 @@ class DomainVocabulary(Vocabulary, Protocol):
 
     def with_functions(self, *functions: Signature) -> Vocabulary:
         """The vocabulary with these functions too."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,7 +106,7 @@ def test_names_have_no_control_characters(name: str) -> None:
 
 
 EFFECTS = [
-    ("(or (quiet))", "'or' is no effect"),
+    ("(or (quiet))", "'or' is not an effect"),
     ("(not (not (quiet)))", "only a predicate can be deleted"),
     ("(increase (weight cup1))", r"\(increase \(FUNCTION ...\) NUMBER\)"),
     ("(increase ?weight 1)", "in parentheses"),

@@ -221,12 +221,12 @@ def test_effects_assign_content(kb, effect, fluent, content):
 @pytest.mark.parametrize(
     ("effect", "message"),
     [
-        ("(assign (label ?t) 3)", "'label' is worth a text, and '3' is of type number"),
-        ("(assign (label ?t) ?t)", r"'label' is worth a text, and '\?t' is of type cup"),
+        ("(assign (label ?t) 3)", "'label' has values of type text, and '3' is of type number"),
+        ("(assign (label ?t) ?t)", r"'label' has values of type text, and '\?t' is of type cup"),
         ('(assign (weight ?t) "heavy")', "'assign' works on numbers"),
         ("(increase (label ?t) 1)", "'increase' works on numbers"),
         ("(increase (weight ?t) (label ?t))", "'increase' works on numbers"),
-        ("(assign (pose ?t map) 1)", "'pose' is worth a geometry"),
+        ("(assign (pose ?t map) 1)", "'pose' has values of type geometry"),
     ],
 )
 def test_effects_that_assign_something_else_are_refused(effect, message):

@@ -65,7 +65,7 @@ def test_a_thing_is_taken_back_by_any_of_its_types(kb) -> None:
         ("(= (wait mug) 4)", "SAID 1:1:4: there is no function 'wait'; did you mean 'weight'?"),
         ("(on mug)", "SAID 1:1:1: 'on' takes 2 arguments, as in (on ?c - cup ?s - surface); found 1"),
         ("(on ?x table)", "SAID 1:1:5: the variable '?x' is not bound"),
-        ("(or (clean mug))", "SAID 1:1:1: 'or' is no effect"),
+        ("(or (clean mug))", "SAID 1:1:1: 'or' is not an effect"),
         ("clean mug", "SAID 1:1:7: an effect is expected, and here a second begins"),
         ("", "SAID 1:1:1: the text is empty where an effect is expected"),
     ],

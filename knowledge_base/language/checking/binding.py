@@ -1,7 +1,7 @@
 """Free variables: which of them a condition finds values for, which must be bound, and the errors if not.
 
-An atom finds values, unless it is computed; `not`, `imply`, `forall` and comparisons only test, so that a
-variable occurring nowhere else has no answers that could be listed (safe queries in the sense of Datalog).
+An atom finds values, unless it is computed; `not`, `imply`, `forall` and comparisons only test. So a variable that
+occurs nowhere else has no answers to list (safe queries in the sense of Datalog).
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ def check_answers(e: Expression, bound: frozenset[str], schema: Vocabulary) -> N
     for name in sorted(only_tested(e, schema, bound)):
         kind = next(_types(e, name, schema), "object")
         raise InputError(
-            f"the variable '?{name}' occurs only under 'not', in a comparison, in something computed or in a part "
-            f"of an 'or', where it finds no values; say what it is, e.g. ({kind} ?{name})",
+            f"the variable '?{name}' occurs only under 'not', in a comparison, computed predicate or part of an "
+            f"'or', and finds no values; name its type, e.g. ({kind} ?{name})",
             place=variable_place(e, name),
         )
 

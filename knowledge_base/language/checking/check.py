@@ -44,11 +44,11 @@ def check(
 
     Args:
         e: the condition.
-        schema: what may be said.
+        schema: the declarations.
         variables: the variables that will be bound, with their types (`None`: anything).
         free: whether other variables are an error, or what a query asks for.
-        objects: the known things with their types, if the names in `e` are to be checked against them;
-            without it only the schema's constants are known and other names pass.
+        objects: the known things with their types, against which names in `e` are checked. Without it other
+            names than the schema's constants pass.
 
     Raises:
         UnknownNameError: an undeclared predicate, function, type, variable or object.
@@ -70,7 +70,7 @@ def check_effect(
 ) -> None:
     """Raise an error with its place unless `effect` can be applied to worlds of `schema`.
 
-    Args and errors are those of `check`; a type as effect is a `SchemaError`, since things keep their type.
+    Args and errors as for `check`; a type as effect is a `SchemaError`, since things keep their type.
     """
     check_depth(effect)
     _Checker(schema, objects, variables or {}, "error").effect(effect)
@@ -116,7 +116,7 @@ def check_arity(signature: Signature, count: int, place: Place | None = None) ->
 
 
 def value_fits(value: Value, wanted: tuple[str, ...]) -> bool:
-    """Whether a value that is no thing's name may stand where one of the `wanted` types is expected."""
+    """Whether a value that names no thing may be an argument of one of the `wanted` types."""
     if isinstance(value, bool):
         return "boolean" in wanted
     if isinstance(value, str):
@@ -162,19 +162,19 @@ class _Checker:
         match e:
             case Atom():
                 self.atom(e)
-            case Not(body):
-                self.condition(body)
-            case And(parts) | Or(parts):
-                for part in parts:
-                    self.condition(part)
-            case Imply(premise, conclusion):
-                self.condition(premise)
-                self.condition(conclusion)
+            case Comparison():
+                self.comparison(e)
             case Exists(variables, body) | Forall(variables, body):
                 with self.inside(variables):
                     self.condition(body)
-            case Comparison():
-                self.comparison(e)
+            case And(parts) | Or(parts):
+                for part in parts:
+                    self.condition(part)
+            case Not(body):
+                self.condition(body)
+            case Imply(premise, conclusion):
+                self.condition(premise)
+                self.condition(conclusion)
 
     def effect(self, effect: Effect) -> None:
         match effect:
@@ -195,7 +195,7 @@ class _Checker:
                 self.assignment(effect)
 
     def assignment(self, effect: NumericEffect) -> None:
-        """What is assigned must be what the function may be worth; all else works on numbers."""
+        """The value must have the type of the function's result; all operators but `assign` work on numbers."""
         result = self.schema.result(effect.call.function, effect.call.place)
         self.term(effect.call)
         if effect.operator != "assign" or result == "number":
@@ -206,7 +206,7 @@ class _Checker:
         types = self.types_of(effect.value)
         if types is not None and result not in types:
             raise SchemaError(
-                f"'{effect.call.function}' is worth a {result}, and {_written(effect.value)} is of type "
+                f"'{effect.call.function}' has values of type {result}, and {_written(effect.value)} is of type "
                 f"{' or '.join(types)}",
                 place=effect.value.place or effect.place,
             )
@@ -322,7 +322,7 @@ class _Checker:
 
 
 def unknown_object(name: str, place: Place | None, valid: tuple[str, ...]) -> UnknownNameError:
-    """The error for a name that is no known thing."""
+    """The error for a name without a known thing."""
     return UnknownNameError(
         f"there is no object '{name}' (text is written in quotes)", place=place, found=name, valid=valid
     )

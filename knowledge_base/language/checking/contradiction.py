@@ -1,8 +1,8 @@
-"""Whether conditions can hold together at all, as far as their form tells, whatever the world is like.
+"""Whether the form of conditions excludes that they hold together, in every world.
 
-The answer "no" is certain; where nothing is found against it, the answer is "perhaps". What is looked at: an atom and
-its negation, comparisons of one term with constants, and what `and`, `or`, `imply` and `not` make of those. A
-quantified condition is one atom; `(not (forall ...))` and the `(exists (... not ...))` that it means are the same.
+The answer "no" is certain; without a contradiction it is "perhaps". The analysis covers an atom and its negation,
+comparisons of one term with constants, and `and`, `or`, `imply` and `not` of those. A quantified condition is one atom;
+`(not (forall ...))` equals its `(exists (... not ...))`.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.text import to_text
 
 MOST_CASES = 512
-"""Ways in which a part of a condition can hold that are looked at; with more, the answer is "perhaps"."""
+"""Number of ways in which a part of a condition can hold; with more, the answer is "perhaps"."""
 
 MOST_TOGETHER = 64
-"""Things that have to hold or not in one such way; with more, the answer is "perhaps", too."""
+"""Number of literals in one such way; with more, the answer is "perhaps", too."""
 
 _OPPOSITE = {"=": "!=", "!=": "=", "<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 _MIRRORED = {"=": "=", "!=": "!=", "<": ">", ">": "<", "<=": ">=", ">=": "<="}
@@ -56,7 +56,7 @@ def complete(conditions: Iterable[Expression]) -> bool:
 
 
 def subjects(condition: Expression) -> frozenset[str]:
-    """What a condition is about: its atoms, and the terms that it compares with constants, as text."""
+    """The subjects of a condition, as text: its atoms, and the terms that it compares with constants."""
     return frozenset(literal.about for literal in _literals(_normal(condition, holds=True)))
 
 
@@ -66,8 +66,8 @@ class _Literal:
 
     Attributes:
         about: an atom, or a compared term.
-        operator: how the term is compared; an atom is compared with a truth value.
-        value: with what.
+        operator: the comparison; an atom is compared with a truth value.
+        value: the other side.
     """
 
     about: str
@@ -109,7 +109,7 @@ class _TooManyError(Exception):
 
 
 def _cases(e: Expression) -> list[_Case]:
-    """The ways in which a condition can hold, each a conjunction; those that cannot be are left out at once."""
+    """The ways in which a condition can hold, each a conjunction, without those that contradict themselves."""
     match e:
         case And(parts):
             cases: list[_Case] = [()]

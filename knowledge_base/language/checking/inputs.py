@@ -1,4 +1,4 @@
-"""What programs hand in where types are not checked: each judged once, at the entrance, with one line of error."""
+"""Checks of arguments from programs without type checks: each once, at the public method, with one line of error."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NO_CHANGE = Delta()
 
 
 def shown(value: object) -> str:
-    """The value as a message says it, whatever it is."""
+    """Any value as a message shows it."""
     try:
         return str.__str__(repr(value))
     except ValueError:  # Python writes no number of that many digits
@@ -46,7 +46,7 @@ def require_params(params: object) -> None:
     """Raise an error unless the parameters are a mapping to values that facts can be about.
 
     Raises:
-        InputError: it is no mapping, a name is no text, or a value is none.
+        InputError: it is not a mapping, a name is not text, or a value has another type.
         SchemaError: a value is a geometry.
     """
     if type(params) is not dict and not isinstance(params, Mapping):
@@ -108,7 +108,7 @@ def require_delta(delta: object) -> None:
     """Raise `InputError` unless it is a `Delta` whose parts are what they are declared to be."""
     if not isinstance(delta, Delta):
         raise InputError(f"a change is a Delta, not {shown(delta)}")
-    if delta == _NO_CHANGE:  # as most are; what is empty and of the wrong kind does not equal it
+    if delta == _NO_CHANGE:  # the usual case; an empty part of another type differs
         return
     for name in ("nodes", "values"):
         if not isinstance(part := getattr(delta, name), Mapping):

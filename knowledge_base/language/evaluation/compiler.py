@@ -4,9 +4,8 @@ A *test* answers whether a condition holds when all its free variables are bound
 bindings that make it hold. Quantifiers are searches too: `exists` looks for a witness and `forall` for a
 counterexample, through the index and not by trying all objects.
 
-A search decides at every step anew which condition to look up next: the one with the fewest matches, given
-what is bound by then. What can be prepared for a step depends only on the conditions that are left, and is
-kept (`SearchPlan`).
+A search decides at every step which condition to look up next: the one with the fewest matches for the variables
+bound so far. `SearchPlan` keeps the preparation of a step, which depends only on the conditions that are left.
 """
 
 from __future__ import annotations
@@ -99,15 +98,15 @@ def compile_query(e: Expression, schema: Vocabulary, bound: frozenset[str]) -> S
     """A search for values of the free variables of `e` that are not in `bound`.
 
     Raises:
-        InputError: such a variable is only tested; and what `compile_test` raises.
+        InputError: such a variable is only tested; other errors as for `compile_test`.
     """
     return _search(conjuncts(e), schema, bound)
 
 
 def compile_answers(e: Expression, schema: Vocabulary, bound: frozenset[str], names: tuple[str, ...]) -> Answers:
-    """All that `compile_query` would find, as dictionaries of the variables `names`, which are those it finds.
+    """The results of `compile_query` as dictionaries of the variables `names`, which are those it finds.
 
-    No two are the same: facts and things are found once, and `distinct` sees to the rest.
+    All answers differ: facts and things are found once, and `distinct` removes other repetitions.
     """
     plan = SearchPlan(conjuncts(e), schema, bound, names)
     first_test, only = plan.first.test, plan.first.answering
@@ -279,7 +278,7 @@ def _search(conditions: Iterable[Conjunct], schema: Vocabulary, bound: frozenset
 
 
 def _candidates(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[Bindings]:
-    """What is found; an error about candidates that cannot be computed comes after all others."""
+    """The candidates found; an error about candidates that cannot be computed comes after all others."""
     failed: list[InputError] = []
     for stage, found in _ends(plan, world, bindings, failed):
         for candidate in _computable(found, failed):
@@ -292,7 +291,7 @@ def _candidates(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[
 
 
 def _computable(found: Iterator[Bindings], failed: list[InputError]) -> Iterator[Bindings]:
-    """What can be computed of `found`: a filter goes on after an error in its test, a generator is over."""
+    """The computable candidates of `found`: a filter continues after an error in its test, a generator ends."""
     while True:
         try:
             yield from found
@@ -303,7 +302,7 @@ def _computable(found: Iterator[Bindings], failed: list[InputError]) -> Iterator
 
 
 def _keep_first(failed: list[InputError], error: InputError) -> None:
-    """There may be one for every candidate, and only the first is said."""
+    """Keep only the first of the errors; every candidate may have one."""
     if not failed:
         failed.append(error)
 
@@ -311,10 +310,11 @@ def _keep_first(failed: list[InputError], error: InputError) -> None:
 def _ends(
     plan: SearchPlan, world: World, bindings: Bindings, failed: list[InputError] | None = None
 ) -> Iterator[tuple[Stage, Iterator[Bindings]]]:
-    """The stages with at most one look-up left, and the candidates that passed all tests, to be gone through at once.
+    """The stages with at most one look-up left, each with the candidates that passed all tests.
 
-    The plan's first test was passed. Backtracking with a stack of its own, so that long conjunctions do not recurse.
-    On the way errors are put into `failed` and their candidates left out, if it is given.
+    The caller evaluates the plan's first test, and exhausts the candidates before it continues. Backtracking keeps an
+    explicit stack, so that long conjunctions do not recurse. With `failed`, it collects errors and omits their
+    candidates.
     """
     stack: list[tuple[Stage, Iterator[Bindings]]] = [(plan.tested, iter((bindings,)))]
     while stack:
@@ -340,16 +340,16 @@ def _ends(
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """What to do next: the tests, then one of the look-ups.
+    """One step of a search: the tests, then one of the look-ups.
 
     Attributes:
         test: whether the conditions hold that need no more values; `None` if there are none.
         choices: the look-ups that may come next, by the number of their condition.
-        left: the conditions that are not dealt with then.
+        left: the conditions that remain after the tests.
         bound: the variables that have a value.
         last: the look-up, if it is the last: nothing is left to be tested of what it finds.
-        answering: gives the answers that it finds, where they are wanted.
-        after: the stages that follow, as far as they are prepared.
+        answering: gives the answers of `last`, if the search has names for them.
+        after: the following stages that are prepared.
     """
 
     test: Test | None
@@ -365,15 +365,15 @@ class SearchPlan:
     """The stages of one search, each prepared when it is first reached.
 
     Args:
-        conditions: what has to hold.
-        schema: what may be said.
+        conditions: the conditions of the search.
+        schema: the declarations.
         bound: the variables that have a value already.
-        names: the variables whose values are wanted as answers, if they are.
+        names: the variables of the answers, if the search gives answers.
 
     Attributes:
         steps: the conditions; stages have their numbers.
-        first: where the search begins.
-        tested: the same without its test, for who has made it.
+        first: the first stage.
+        tested: the same without its test, for a caller that has evaluated it.
     """
 
     def __init__(

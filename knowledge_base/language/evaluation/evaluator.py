@@ -1,7 +1,7 @@
 """Conditions, terms and effects on a world: truth, answers, values and changes.
 
-Conditions are compiled when they are first used and remembered by identity, so that asking the same
-expression again costs no more than the look-ups it needs. Nothing is ever executed as text.
+Conditions are compiled at their first use and remembered by identity. So a further evaluation of the same expression
+costs only its look-ups. No text is executed.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
 
     Raises:
         UnknownNameError: a free variable is not bound, or a predicate, function or type is not declared.
-        SchemaError: a wrong number of arguments, or `<` and the like met something that is no number.
+        SchemaError: a wrong number of arguments, or `<` or a similar operator met a value that is not a number.
         InputError: it is nested too deeply, or something in it cannot be computed.
     """
     return asked(e, world.schema).holds(world, bindings)
@@ -99,13 +99,11 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
 
 def asked(e: Expression, schema: Vocabulary) -> Asked:
     """The condition ready to be asked of worlds with this schema; errors of the text as for `holds`."""
-    return _conditions.find(e, schema) or _conditions.keep(e, schema, _compiled(e, schema))
-
-
-def prepare(e: Expression, schema: Vocabulary) -> None:
-    """Raise now what is wrong with the text of `e`, whatever the world will be; errors as for `holds`."""
-    if _conditions.find(e, schema) is None:
-        _conditions.keep(e, schema, _compiled(e, schema))
+    found = _conditions.find(e, schema)
+    if found is None:
+        check_depth(e)
+        found = _conditions.keep(e, schema, Asked(e, free_variables(e), compile_test(e, schema)))
+    return found
 
 
 def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> list[dict[str, Value]]:
@@ -124,32 +122,36 @@ def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
 def rows(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Iterator[dict[str, Value]]:
     """The answers of `query` in the same order, each when it is found; `world` must not change until the last.
 
-    An error about candidates that cannot be computed comes after all answers; otherwise errors are those of `query`.
+    An error about candidates that cannot be computed comes after all answers; other errors as for `query`.
     """
     check_depth(e)
     bound = free_variables(e).intersection(bindings)
     check_answers(e, bound, world.schema)
-    names = _asked_for(e, bound)
+    names = asked_for(e, bound)
     found = compile_query(e, world.schema, bound)(world, bindings)
     return ({name: each[name] for name in names} for each in found)
 
 
 def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried:
     """The query ready to be answered when `params` are bound; errors of the text as for `query`."""
-    queries = _queries.find(e, schema) or _queries.keep(e, schema, _unsearched(e))
+    queries = _queries.find(e, schema)
+    if queries is None:
+        check_depth(e)
+        queries = _queries.keep(e, schema, _Queries(free_variables(e), {}))
     bound = queries.free.intersection(params)
     found = queries.by_bound.get(bound)
     if found is None:
-        found = queries.by_bound[bound] = _compiled_query(e, schema, bound)
+        check_answers(e, bound, schema)
+        found = queries.by_bound[bound] = Queried(e, compile_answers(e, schema, bound, asked_for(e, bound)))
     return found
 
 
 def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Content:
-    """What `term` is worth on `world`.
+    """The value of `term` on `world`.
 
     Raises:
         UnknownNameError: a free variable is not bound, or a function is not declared.
-        SchemaError: arithmetic met something that is no number.
+        SchemaError: arithmetic met a value that is not a number.
         InputError: a division by zero.
     """
     if isinstance(term, Constant):
@@ -157,7 +159,10 @@ def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_B
     if isinstance(term, Variable) and term.name in bindings:
         return bindings[term.name]
     schema = world.schema
-    known = _terms.find(term, schema) or _terms.keep(term, schema, _compiled_term(term, schema))
+    known = _terms.find(term, schema)
+    if known is None:
+        check_depth(term)
+        known = _terms.keep(term, schema, _Term(free_variables(term), compile_term(term, schema)))
     for name in known.free:
         if type(bindings.get(name)) not in VALUE_TYPES:
             check_bound(term, bindings)
@@ -165,34 +170,15 @@ def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_B
 
 
 def evaluate_argument(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Value:
-    """What `term` is worth as an argument of a fact; errors as for `evaluate_term`, and a geometry is one."""
+    """The value of `term` as an argument of a fact; errors as for `evaluate_term`, and for a geometry."""
     found = evaluate_term(term, world, bindings)
     if isinstance(found, tuple):
-        raise SchemaError("a geometry can be compared, but nothing is said about it", place=term.place)
+        raise SchemaError("a geometry can be compared, but is not an argument of a fact", place=term.place)
     return found
 
 
-def _unsearched(e: Expression) -> _Queries:
-    check_depth(e)
-    return _Queries(free_variables(e), {})
-
-
-def _compiled(e: Expression, schema: Vocabulary) -> Asked:
-    check_depth(e)
-    return Asked(e, free_variables(e), compile_test(e, schema))
-
-
-def _compiled_term(term: Term, schema: Vocabulary) -> _Term:
-    check_depth(term)
-    return _Term(free_variables(term), compile_term(term, schema))
-
-
-def _compiled_query(e: Expression, schema: Vocabulary, bound: frozenset[str]) -> Queried:
-    check_answers(e, bound, schema)
-    return Queried(e, compile_answers(e, schema, bound, _asked_for(e, bound)))
-
-
-def _asked_for(e: Expression, bound: frozenset[str]) -> tuple[str, ...]:
+def asked_for(e: Expression, bound: frozenset[str]) -> tuple[str, ...]:
+    """The free variables of `e` that are not in `bound`, each once, in the order of the text."""
     return tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
 
 
@@ -200,9 +186,9 @@ _ARITHMETIC = {"increase": "+", "decrease": "-", "scale-up": "*", "scale-down": 
 
 
 def apply_effect(effect: Effect, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Delta:
-    """What `effect` changes on `world`, which itself is left alone.
+    """The changes of `effect` on `world`, which stays unchanged.
 
-    All conditions and values are those of the world before (PDDL 2.1). A fact both deleted and added is
+    All conditions and values refer to the world before (PDDL 2.1). A fact both deleted and added is
     added. Several changes of one number in an effect add up; two different assignments contradict.
 
     Raises:

@@ -13,7 +13,7 @@ from knowledge_base.facts import Value
 from knowledge_base.language.checking.binding import check_bound
 from knowledge_base.language.checking.vocabulary import Read
 from knowledge_base.language.evaluation.compiler import counterexamples, witnesses
-from knowledge_base.language.evaluation.evaluator import NO_BINDINGS, choices, evaluate_term, holds, prepare
+from knowledge_base.language.evaluation.evaluator import NO_BINDINGS, asked, choices, evaluate_term, holds
 from knowledge_base.language.evaluation.terms import Bindings
 from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.effect import check_depth
@@ -35,10 +35,10 @@ from knowledge_base.language.syntax.text import to_text
 from knowledge_base.spelling import value_text
 
 _Judged = tuple["Explanation", InputError | None]
-"""A part, and why it cannot be computed."""
+"""A part, and the error if it cannot be computed."""
 
 MOST_TRIED = 200
-"""How many choices of a false `exists` are looked at for the one that comes nearest."""
+"""Number of choices of a false `exists` that are compared to find the nearest miss."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +47,11 @@ class Explanation:
 
     Attributes:
         text: the condition in the language.
-        truth: whether it holds; what cannot be computed counts as false where another part decides.
-        children: its parts, all of them judged; for `exists` and `forall` the one choice that shows it, if
-            there is one (a witness, the nearest miss, a counterexample).
-        detail: for a comparison with computed sides what they are worth, for a computed predicate what its
-            inputs are; for a choice, what was chosen; why something cannot be computed.
+        truth: whether it holds; a part that cannot be computed counts as false where another part decides.
+        children: all its parts; for `exists` and `forall` the one choice that shows it, if any: a witness, the
+            nearest miss or a counterexample.
+        detail: the values of a comparison's computed sides, the inputs of a computed predicate, the chosen
+            objects, or the reason for a missing value.
         decider: which of the children decides; `None` for a leaf.
     """
 
@@ -120,11 +120,11 @@ def _explain(e: Expression, world: World, bindings: Bindings) -> Explanation:
 
 
 def _judged(e: Expression, world: World, bindings: Bindings) -> _Judged:
-    """A part, whose failure need not matter when another one decides."""
+    """A part with its error, which has no effect when another part decides."""
     try:
         return _explain(e, world, bindings), None
     except InputError as error:
-        prepare(e, world.schema)  # a mistake in the text is one even if the part does not matter
+        asked(e, world.schema)  # a mistake in the text is an error even if the part does not decide
         text = to_text(substitute(e, bindings))
         return Explanation(text, truth=False, detail=f"cannot be computed: {error}"), error
 
@@ -180,7 +180,7 @@ def _shown(
 
 
 def _nearness(body: Expression, world: World, choice: Bindings) -> int:
-    """How many parts hold; only asked, since explaining all choices multiplies with every nested `exists`."""
+    """Number of parts that hold, without explanations, which would multiply with every nested `exists`."""
     return sum(_is_so(part, world, choice) for part in body.parts) if isinstance(body, And) else 0
 
 
@@ -192,7 +192,7 @@ def _is_so(e: Expression, world: World, bindings: Bindings) -> bool:
 
 
 def _detail(e: Atom | Comparison, world: World, bindings: Bindings) -> str | None:
-    """What stands behind a leaf that does not just say a fact."""
+    """The values or inputs behind a leaf that is not just a fact."""
     if isinstance(e, Comparison):
         return _compared(e, world, bindings)
     of = world.schema.computed.get(e.predicate)

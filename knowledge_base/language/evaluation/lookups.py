@@ -128,7 +128,7 @@ def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabul
     heapify(agenda)
     while agenda:
         _, i = heappop(agenda)
-        if i in taken:  # it stood there with an earlier, greater cost
+        if i in taken:  # an entry with an earlier, greater cost
             continue
         taken[i] = steps[i]
         found = steps[i].free - known
@@ -261,7 +261,7 @@ def _name(arg: Term, finds: frozenset[str]) -> str | None:
 def _pattern(
     getters: Sequence[Argument | None], names: Sequence[str | None]
 ) -> Callable[[World, Bindings], tuple[Value | None, ...]]:
-    """What to look for; most look-ups go from one end of an arc, a variable with that name, to the other."""
+    """The pattern of a look-up; most go from one end of an arc, a variable with that name, to the other."""
     match getters:
         case [None, None]:
             return lambda _world, _bindings: (None, None)
@@ -306,7 +306,7 @@ def things(variable: TypedVariable) -> Search:
 
 
 def alternatives(branches: Sequence[Search]) -> Search:
-    """All that one of the branches finds, branch by branch; an error of one comes after all others."""
+    """The results of all branches, branch by branch; an error of one comes after all others."""
 
     def search(world: World, bindings: Bindings) -> Iterator[Bindings]:
         failed: InputError | None = None

@@ -1,4 +1,4 @@
-"""How a query will run on a world as it is: which conditions are looked up, in which order, and which are tested."""
+"""The plan of a query on a world: the order of its conditions, each looked up or tested."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Literal
 from knowledge_base.facts import Value
 from knowledge_base.language.checking.binding import check_answers
 from knowledge_base.language.evaluation.compiler import SearchPlan, Stage
-from knowledge_base.language.evaluation.evaluator import NO_BINDINGS
+from knowledge_base.language.evaluation.evaluator import NO_BINDINGS, asked_for
 from knowledge_base.language.evaluation.lookups import (
     Conjunct,
     JoinStep,
@@ -31,14 +31,13 @@ from knowledge_base.language.syntax.expression import (
     Variable,
     free_variables,
     substitute,
-    variables_in_order,
 )
 from knowledge_base.language.syntax.text import to_text
 
 Kind = Literal["test", "computed", "look up", "scan", "things", "alternatives", "witnesses"]
-"""`test`: a condition whose variables all have values, `computed`: one that Python judges; `look up`: facts with
-given arguments, `scan`: all facts of a predicate; `things` of a type; `alternatives`: each part of an `or` in
-turn; `witnesses` of an `exists`."""
+"""`test`: a condition whose variables all have values. `computed`: a condition that Python evaluates. `look up`: facts
+with given arguments. `scan`: all facts of a predicate. `things` of a type. `alternatives`: each part of an `or` in
+turn. `witnesses` of an `exists`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +45,12 @@ class QueryStep:
     """One condition of a query, at its turn.
 
     Attributes:
-        kind: what is done with it.
+        kind: its evaluation.
         text: the condition, with the parameters' values in it.
         by: for a look-up the arguments that have a value by then.
         finds: the variables that get their values here.
-        matches: at most how many facts match, or how many things there are; `None` where nobody has counted.
-        varies: the order from here on is decided while running, by the values found before.
+        matches: an upper bound of the number of facts or things; `None` if it is unknown.
+        varies: whether values found before decide the order from here.
         reached: whether the first candidate got that far.
     """
 
@@ -82,7 +81,7 @@ class QueryPlan:
     Attributes:
         text: the query, with the parameters' values in it.
         answers: the variables it finds values for.
-        steps: what is done, in order.
+        steps: the evaluation, in order.
     """
 
     text: str
@@ -99,7 +98,7 @@ class QueryPlan:
 
 
 def plan_query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> QueryPlan:
-    """How `e` will be asked of `world`, found out by following the first candidate.
+    """The plan of the query `e` on `world`, from following its first candidate.
 
     Raises:
         InputError: as for `query`.
@@ -107,9 +106,8 @@ def plan_query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_B
     check_depth(e)
     bound = free_variables(e).intersection(bindings)
     check_answers(e, bound, world.schema)
-    answers = tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
     follower = _Follower(SearchPlan(conjuncts(e), world.schema, bound), world, bindings)
-    return QueryPlan(to_text(substitute(e, bindings)), answers, tuple(follower.steps()))
+    return QueryPlan(to_text(substitute(e, bindings)), asked_for(e, bound), tuple(follower.steps()))
 
 
 class _Follower:
@@ -175,7 +173,7 @@ class _Follower:
     ) -> QueryStep:
         """A step; a look-up is given what was `bound` before it."""
         e = _expression(conjunct)
-        finds = () if bound is None else tuple(dict.fromkeys(n for n in variables_in_order(e) if n not in bound))
+        finds = () if bound is None else asked_for(e, bound)
         reached = self._candidate is not None
         return QueryStep(kind, self._text(e), by, finds, matches, self._varies, reached)
 

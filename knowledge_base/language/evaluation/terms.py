@@ -1,4 +1,4 @@
-"""Terms compiled to closures: what an argument or a side of a comparison is worth on a world."""
+"""Terms compiled to closures: the value of an argument or of a side of a comparison on a world."""
 
 from __future__ import annotations
 
@@ -78,14 +78,14 @@ def compile_argument(term: Term, schema: Vocabulary) -> Argument:
     """
     geometry = isinstance(term, Arithmetic) and term.operator == GEOMETRY
     if geometry or (isinstance(term, Call) and schema.result(term.function, term.place) == GEOMETRY):
-        raise SchemaError("a geometry can be compared, but nothing is said about it", place=term.place)
+        raise SchemaError("a geometry can be compared, but is not an argument of a fact", place=term.place)
     return cast("Argument", compile_term(term, schema))
 
 
 def compile_comparison(e: Comparison, schema: Vocabulary) -> Test:
     """A function that compares; `=` and `!=` anything, the others numbers.
 
-    The function raises `SchemaError` when it meets a side that is no number.
+    The function raises `SchemaError` when it meets a side that is not a number.
     """
     left, right = compile_term(e.left, schema), compile_term(e.right, schema)
     if e.operator == "=":
@@ -106,7 +106,7 @@ def compile_comparison(e: Comparison, schema: Vocabulary) -> Test:
 
 
 def same(left: Content, right: Content) -> bool:
-    """Equality of values; a truth value is no number, though Python takes `True` for 1."""
+    """Equality of values; a truth value is not a number, though in Python `True == 1`."""
     return left == right and isinstance(left, bool) == isinstance(right, bool)
 
 

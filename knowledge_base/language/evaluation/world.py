@@ -22,37 +22,31 @@ from knowledge_base.language.syntax.text import to_text
 class World(Protocol):
     """A state of the world: the store, pending changes on top of it, a planner's state.
 
-    Predicates are the told ones; types as predicates, computed predicates, quantifiers and comparisons are the
-    language's affair and are built from these answers. A world that also has `estimate(predicate, pattern) -> int`,
-    at most how many facts match, lets conjunctions begin with the rarest. One that has `reference(function, args) ->
-    str | None`, where what the function is worth comes from, refuses to have it set. One that has `spend()` is told of
-    every effect that is applied on it, and may end that (`bounds`).
+    Predicates are those with asserted facts; the language derives types as predicates, computed predicates,
+    quantifiers and comparisons from these answers. Three methods are optional. `estimate(predicate, pattern) -> int`
+    gives an upper bound of the matching facts, so that conjunctions begin with the rarest. `reference(function, args)
+    -> str | None` names the data source of a function's value, which no effect may set. `spend()` is called for every
+    effect on the world, and may end it (`Bounds`).
     """
 
     @property
     def schema(self) -> Vocabulary:
-        """What may be said about it."""
-        ...
+        """The declarations."""
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
         """Whether the fact is true."""
-        ...
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[tuple[Value, ...]]:
         """The arguments of all facts that agree with `pattern`; `None` is open; in order of insertion."""
-        ...
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """What the function is worth; until it is set, what `content.UNSET` says."""
-        ...
+        """The value of the function; until it is set, the value in `content.UNSET`."""
 
     def objects(self, type_name: str) -> Iterable[str]:
         """The things of that type or a subtype, in order of insertion."""
-        ...
 
     def type_of(self, name: str) -> str | None:
         """The thing's type; `None` if there is no such thing."""
-        ...
 
 
 LOOK_EVERY = 500
@@ -63,12 +57,12 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What a question may take before it is given up; nothing is bounded that is `None`.
+    """The bounds of a question; `None` means unbounded.
 
     Attributes:
-        work: how many facts and things are looked at; a second sees about a million.
+        work: number of facts and things that it may visit; about a million in a second.
         seconds: of real time.
-        cancelled: is asked about every millisecond, in the thread that answers; `True` ends the question.
+        cancelled: called about every millisecond, in the thread that answers; `True` ends the question.
         now: a clock in seconds.
     """
 
@@ -79,7 +73,7 @@ class Bounds:
 
 
 class _Given(Exception):  # noqa: N818  no error of the question: the evaluator must not take it for one
-    """The question is given up, for the reason said."""
+    """The question ends without an answer, for this reason."""
 
 
 class Meter:
@@ -89,7 +83,7 @@ class Meter:
         bounds: those of the question.
 
     Attributes:
-        work: how many facts and things were looked at.
+        work: number of facts and things visited.
     """
 
     def __init__(self, bounds: Bounds | None) -> None:
@@ -99,13 +93,13 @@ class Meter:
         self._look_at = 0
 
     def spend(self, work: int = 1) -> None:
-        """So much more was looked at."""
+        """Add to the work."""
         self.work += work
         if self.work >= self._look_at:
             self._look()
 
     def each(self, found: Iterable[_T]) -> Iterator[_T]:
-        """What was found, counted one by one."""
+        """The items of `found`, counted one by one."""
         for one in found:
             self.work += 1
             if self.work >= self._look_at:
@@ -114,7 +108,7 @@ class Meter:
 
     @contextmanager
     def over(self, question: str | Expression) -> Iterator[None]:
-        """The block answers the question; raises `OutOfBoundsError` if that is given up."""
+        """The block answers the question; raises `OutOfBoundsError` if a bound ends that."""
         try:
             yield
         except _Given as given:
@@ -146,7 +140,7 @@ class BoundedWorld:
 
     @property
     def schema(self) -> Vocabulary:
-        """What may be said about it."""
+        """The declarations."""
         return self._world.schema
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
@@ -156,13 +150,13 @@ class BoundedWorld:
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterator[tuple[Value, ...]]:
         """The arguments of all facts that agree with `pattern`."""
-        if self.estimate is not None and len(pattern) - pattern.count(None) > 1:  # a list that is looked through
+        if self.estimate is not None and len(pattern) - pattern.count(None) > 1:  # a list that is searched
             self._meter.spend(self.estimate(predicate, pattern))
         self._meter.spend()
         return self._meter.each(self._world.match(predicate, pattern))
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """What the function is worth."""
+        """The value of the function."""
         self._meter.spend()
         return self._world.value(function, args)
 

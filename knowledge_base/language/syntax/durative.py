@@ -1,7 +1,7 @@
 """Durative actions as values (PDDL 2.1, Fox & Long 2003).
 
-Seen by those who do one thing after the other, a durative action is an ordinary one: it needs what the action
-needs when it is alone, and does what it has done at its end.
+Without concurrency a durative action is an ordinary action. Its precondition is what the action alone needs; its
+effect is the change until its end.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FALSE = Or(())
 
 @dataclass(frozen=True, slots=True)
 class Duration:
-    """How long an action takes, in seconds: something between two terms, which are equal when it is fixed.
+    """The duration of an action in seconds, between two terms, which are equal when it is fixed.
 
     An action without an upper bound has the constant infinity as `most`.
     """
@@ -49,12 +49,12 @@ class Duration:
 
 @dataclass(frozen=True, slots=True)
 class DurativeParts:
-    """What a durative action needs and does, by time.
+    """The conditions and effects of a durative action, by time.
 
     Attributes:
-        start, end: what holds when it begins and just before it ends.
-        over_all: what holds all the time between the two.
-        start_effect, end_effect: what it changes at its two ends.
+        start, end: the conditions when it begins and just before it ends.
+        over_all: the condition during the time between the two.
+        start_effect, end_effect: the changes at its two ends.
     """
 
     start: Expression = TRUE
@@ -65,17 +65,17 @@ class DurativeParts:
 
     @property
     def precondition(self) -> Expression:
-        """What must hold at first so that the action, alone, can be begun and ended.
+        """The condition before the action that lets it begin and end, alone.
 
-        That is the condition at the start, and what the others ask for beyond what the start effect settles,
-        as far as one can tell from the action as it is written (the same predicate of the same variables).
+        It has the condition at the start, and from the other conditions the parts that the start effect does not
+        decide. The effect decides a part with the same predicate of the same variables.
         """
         later = [_after(e, self.start_effect, frozenset()) for e in (self.over_all, self.end)]
         return _conjunction([part for e in (self.start, *later) for part in _conjuncts(e)])
 
     @property
     def effect(self) -> Effect:
-        """What has changed when the action, alone, has come to its end."""
+        """The changes from the beginning to the end of the action, alone."""
         undone = tuple(leaf.atom for leaf in _unconditional(self.end_effect) if isinstance(leaf, Delete))
         settled = set(_settled(self.end_effect))
         kept = (_unless(part, undone) for part in _parts(self.start_effect) if _changed(part) not in settled)
@@ -93,7 +93,7 @@ def _conjunction(parts: list[Expression]) -> Expression:
 
 
 def _after(e: Expression, effect: Effect, bound: frozenset[str]) -> Expression:
-    """What must hold before `effect` so that `e` holds after it (regression, by comparing texts)."""
+    """The condition before `effect` under which `e` holds after it (regression, by comparing texts)."""
     match e:
         case Atom():
             said = {isinstance(leaf, Add) for leaf in _unconditional(effect) if _atom(leaf) == e}
@@ -129,7 +129,7 @@ def _unconditional(effect: Effect) -> Iterator[Effect]:
 
 
 def _settled(effect: Effect) -> Iterator[Atom | Call | None]:
-    """What is no longer as it was before, whatever that was."""
+    """The atoms and functions whose values after the effect do not depend on those before."""
     for part in _unconditional(effect):
         if not isinstance(part, NumericEffect) or part.operator == "assign":
             yield _changed(part)

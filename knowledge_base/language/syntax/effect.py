@@ -39,14 +39,14 @@ class Add(Located):
 
 @dataclass(frozen=True, slots=True)
 class Delete(Located):
-    """The atom holds no longer: `(not (on ?i ?s))`."""
+    """The atom does not hold afterwards: `(not (on ?i ?s))`."""
 
     atom: Atom
 
 
 @dataclass(frozen=True, slots=True)
 class AllOf(Located):
-    """All parts at once; `(and)` changes nothing."""
+    """All parts together; `(and)` changes nothing."""
 
     parts: tuple[Effect, ...]
 
@@ -69,7 +69,7 @@ class When(Located):
 
 @dataclass(frozen=True, slots=True)
 class NumericEffect(Located):
-    """What a function is worth changes: `(increase (failures ?i) 1)`; `operator` is one of `ASSIGNMENTS`."""
+    """A change of a function's value: `(increase (failures ?i) 1)`; `operator` is one of `ASSIGNMENTS`."""
 
     operator: str
     call: Call

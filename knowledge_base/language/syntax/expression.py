@@ -1,7 +1,7 @@
 """Conditions and terms as frozen values, without a world.
 
-The forms are those of PDDL 2.1 conditions (Fox & Long 2003) plus `!=`, quoted text and truth values; a type
-is also a unary predicate. Comparison ignores places, so the same text at two places gives equal expressions.
+The language has the conditions of PDDL 2.1 (Fox & Long 2003), `!=`, quoted text and truth values; a type is also
+a unary predicate. Comparison ignores places, so the same text at two places gives equal expressions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from knowledge_base.spelling import is_plain_name
 
 @dataclass(frozen=True, slots=True)
 class Located:
-    """Base of everything that was written somewhere; `place` is for messages only."""
+    """Base of all values read from text; `place` is for messages only."""
 
     place: Place | None = field(default=None, compare=False, repr=False, kw_only=True)
 
@@ -47,8 +47,8 @@ class Variable(Located):
 class Constant(Located):
     """An object's name, a number, a truth value, or text in quotes.
 
-    Text that cannot stand without quotes (blanks, upper case) is quoted whatever `quoted` says, so that
-    printing and reading give the same value again. Quoted text names the object of exactly that spelling.
+    Text that needs quotes (blanks, upper case) is quoted even without `quoted`, so that printing and reading give
+    the same value again. Quoted text names the object of exactly that spelling.
     """
 
     value: Value
@@ -61,7 +61,7 @@ class Constant(Located):
 
 @dataclass(frozen=True, slots=True)
 class Call(Located):
-    """What a function is worth: `(failures ?item)`."""
+    """The value of a function: `(failures ?item)`."""
 
     function: str
     args: tuple[Term, ...] = ()
@@ -189,7 +189,7 @@ def free_variables(e: Expression | Term) -> frozenset[str]:
 
 
 def variable_place(e: Expression | Term, name: str) -> Place | None:
-    """Where the variable `name` is first written in `e`."""
+    """The place of the first `?name` in `e`."""
     if isinstance(e, Variable):
         return e.place if e.name == name else None
     found = (variable_place(part, name) for part in parts_of(e))

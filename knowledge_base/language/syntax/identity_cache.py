@@ -1,7 +1,7 @@
-"""Remembering what was worked out about frozen values, by their identity.
+"""Results for frozen values, by their identity.
 
-Hashing a condition by its content walks all of it, which costs more than evaluating it; conditions live as
-long as the chart or text they belong to, so their identity is enough.
+Hashing a condition by its content walks all of it, which costs more than evaluating it. Conditions live as long as
+their chart or text, so their identity suffices.
 """
 
 from __future__ import annotations

@@ -1,17 +1,18 @@
-r"""Text to nested groups of words: the outer form of all PDDL text.
+r"""Text to nested groups of words and typed lists: the outer form of all PDDL text.
 
-A word is a run of characters other than blanks, parentheses, quotes and semicolons, and `?` begins a new one
-(`(on?x ?y)` is found in files); `;` starts a comment; `"..."` is text with the escapes `\"`, `\\`, `\n`, `\r`.
-Reading is iterative; nesting is limited to `MAX_DEPTH` because everything that follows recurses, and nobody writes
-conditions that deep. Compiling nested quantifiers takes most, seven Python frames for each, so that with a caller
-that has used 150 of the 1,000 frames Python allows, about 120 would be the end.
+A word is a run of characters other than blanks, parentheses, quotes and semicolons. A `?` begins a new word, since
+files have `(on?x ?y)`. `;` starts a comment; `"..."` is text with the escapes `\"`, `\\`, `\n`, `\r`.
+
+Reading is iterative, but all functions on the result recurse, so `MAX_DEPTH` limits the nesting. Compilation of
+nested quantifiers needs most, seven Python frames for each. With a caller that uses 150 of Python's 1,000 frames, the
+end is near 120.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from knowledge_base.errors import ParseError, Place
@@ -24,10 +25,10 @@ _TOKEN = re.compile(
     r"""(?P<skip>\s+|;[^\n]*)|(?P<open>\()|(?P<close>\))|(?P<text>"(?:[^"\\]|\\.)*")|(?P<word>[^\s()";][^\s()";?]*)""",
     re.DOTALL,
 )
-_HALF = re.compile("[\udc80-\udcff]")  # what a file's other bytes are read as
+_HALF = re.compile("[\udc80-\udcff]")  # bytes of a file that are not UTF-8
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
-_ENDS = {"n": "\n", "r": "\r"}  # of lines: as they are, a file's reader could make one of the other
+_ENDS = {"n": "\n", "r": "\r"}  # a reader of files may replace one end of a line by the other
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """What stands between two parentheses; `place` is the opening one."""
+    """The content of two parentheses; `place` is the opening one."""
 
     items: tuple[Node, ...]
     place: Place
@@ -59,12 +60,6 @@ class Group:
 Node = Word | Group
 
 
-@dataclass(slots=True)
-class _Open:
-    place: Place
-    items: list[Node] = field(default_factory=list)
-
-
 def read(text: str, source: str | None = None) -> list[Node]:
     """The groups and words at the top of `text`, in order.
 
@@ -76,22 +71,23 @@ def read(text: str, source: str | None = None) -> list[Node]:
         ParseError: a parenthesis or quote without its partner, nesting beyond `MAX_DEPTH`, half a character, or a
             control character in a word.
     """
-    stack = [_Open(Place(source, 1, 1))]
+    top: list[Node] = []
+    stack = [(Place(source, 1, 1), top)]
     for kind, word, place in _tokens(text, source):
         if kind == "open":
             if len(stack) > MAX_DEPTH:
                 raise ParseError(f"parentheses are nested more than {MAX_DEPTH} deep", place=place)
-            stack.append(_Open(place))
+            stack.append((place, []))
         elif kind == "close":
             if len(stack) == 1:
                 raise ParseError("')' without a '(' before it", place=place)
-            done = stack.pop()
-            stack[-1].items.append(Group(tuple(done.items), done.place))
+            begun, items = stack.pop()
+            stack[-1][1].append(Group(tuple(items), begun))
         else:
-            stack[-1].items.append(_word(kind, word, place))
+            stack[-1][1].append(_word(kind, word, place))
     if len(stack) > 1:
-        raise ParseError("'(' is never closed", place=stack[-1].place)
-    return stack[0].items
+        raise ParseError("'(' is never closed", place=stack[-1][0])
+    return top
 
 
 def _tokens(text: str, source: str | None) -> Iterator[tuple[str, str, Place]]:
@@ -159,7 +155,7 @@ def parse_typed_list(nodes: Sequence[Node], *, perhaps_none: bool = False) -> li
 
 
 def parse_names(nodes: Sequence[Node]) -> list[TypedName]:
-    """A typed list of things or types, whose names must be told from variables, numbers and keywords.
+    """A typed list of things or types, whose names differ from variables, numbers and keywords.
 
     There may be none of a type: files that were generated have that.
 
@@ -185,7 +181,7 @@ def parse_variables(node: Node) -> tuple[TypedVariable, ...]:
 
 
 def typed_variables(nodes: Sequence[Node], *, distinct: bool = True) -> tuple[TypedVariable, ...]:
-    """The variables of a typed list that is not in parentheses of its own, as in `(on ?a ?b - item)`.
+    """The variables of a typed list without parentheses, as in `(on ?a ?b - item)`.
 
     Raises:
         ParseError: a name without `?`, or the same name twice where they have to be `distinct`.

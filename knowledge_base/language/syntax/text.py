@@ -2,8 +2,8 @@
 
 Reading the text of a value gives an equal value again.
 
-Names are folded to lower case, as PDDL compares them; quoted text stays as it is. What is checked here is
-form only; whether names are declared is checked against a schema (`check`).
+Names are folded to lower case, as PDDL compares them; quoted text is not. The parser checks only the form; `check`
+compares names with a schema.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def parse_effect(text: str | Node, source: str | None = None) -> Effect:
     if head in EFFECT_KEYWORDS:
         return _keyword_effect(head, args, group)
     if head in KEYWORDS:
-        raise ParseError(f"'{head}' is no effect", place=group.place, found=head, valid=EFFECT_KEYWORDS)
+        raise ParseError(f"'{head}' is not an effect", place=group.place, found=head, valid=EFFECT_KEYWORDS)
     return Add(_atom(group, head, EFFECT_KEYWORDS), place=group.place)
 
 
@@ -185,7 +185,7 @@ def _atom(group: Group, head: str, keywords: Iterable[str]) -> Atom:
         return Atom(head, tuple(parse_term(a) for a in group.items[1:]), place=group.place)
     except ParseError:
         nested = any(isinstance(a, Group) for a in group.items[1:])
-        if nested and nearest(head, keywords) is not None:  # a misspelt keyword explains more
+        if nested and nearest(head, keywords) is not None:  # a misspelt keyword is the better explanation
             raise ParseError(
                 f"'{head}' is read as a predicate, whose arguments are names, variables or numbers",
                 place=group.place,
@@ -208,7 +208,7 @@ def _simple_term(word: Word) -> Term:
     if text in TRUTH_VALUES:
         return Constant(TRUTH_VALUES[text], place=word.place)
     if text == "-" or text.startswith(":"):
-        raise ParseError(f"'{text}' is no name, variable or number", place=word.place)
+        raise ParseError(f"'{text}' is not a name, variable or number", place=word.place)
     return Constant(text, place=word.place)
 
 
