@@ -23,9 +23,8 @@ from knowledge_base.facts import Change, Delta, Fact, Value
 from knowledge_base.group_commit import GroupCommit
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.file import Durability, located
-from knowledge_base.journal.history import History, Version, Writer, gone
+from knowledge_base.journal.history import History, MemoryHistory, Version, Writer, gone
 from knowledge_base.journal.journal import Journal
-from knowledge_base.journal.memory_history import MemoryHistory
 from knowledge_base.language.checking.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.sources import DataSource, Sources

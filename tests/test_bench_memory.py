@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from knowledge_base.journal import memory_history
+from knowledge_base.journal import history
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
 EVENTS = 6_000
@@ -26,7 +26,7 @@ def _quick_collections():
 @pytest.mark.usefixtures("_quick_collections")
 def test_a_run_holds_nothing_of_what_is_over(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(BENCHMARKS)
-    monkeypatch.setattr(memory_history, "MOST_KEPT", 100)  # the history of knowledge is full at once
+    monkeypatch.setattr(history, "MOST_KEPT", 100)  # the history of knowledge is full at once
     from memory_run import Watch
 
     blocks = []

@@ -27,8 +27,8 @@ from dsc.skills import skill
 from dsc.text.plot_files import parse_plot
 from dsc.trace import Trace
 from knowledge_base import Delta, Fact, KnowledgeBase, Schema, StoreError
-from knowledge_base.journal import journal, memory_history
-from knowledge_base.journal.memory_history import MemoryHistory
+from knowledge_base.journal import history, journal
+from knowledge_base.journal.history import MemoryHistory
 
 SCHEMA = Schema.parse("(define (domain d) (:predicates (quiet)))")
 QUIET, LOUD = Delta(added=(Fact("quiet"),)), Delta(removed=(Fact("quiet"),))
@@ -50,7 +50,7 @@ def exchanged(function, old, new):
 def exactly_the_last_keys_are_remembered():
     """A repeated key counts as long as it is one of the last `MOST_KEYS`, and not longer."""
     kb = KnowledgeBase(SCHEMA)
-    most, memory_history.MOST_KEYS = memory_history.MOST_KEYS, 3
+    most, history.MOST_KEYS = history.MOST_KEYS, 3
     try:
         for number in range(4):
             kb.apply(LOUD if number % 2 else QUIET, "a", key=f"key {number}")
@@ -60,7 +60,7 @@ def exactly_the_last_keys_are_remembered():
         kb.apply(QUIET, "a", key="key 0")
         assert kb.version == version + 1
     finally:
-        memory_history.MOST_KEYS = most
+        history.MOST_KEYS = most
 
 
 def a_key_at_the_oldest_version_outlives_compaction(folder):

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 from domains.clean_up_table.observations import RESULT
 from domains.clean_up_table.table_world import TableWorld
 from knowledge_base.errors import Place, StoreError
-from knowledge_base.journal.atomic_files import new_database
-from knowledge_base.journal.file import Kind, connect, is_there, located, require_one_name, require_own
+from knowledge_base.journal.file import Kind, connect, is_there, located, new_database, require_one_name, require_own
 from knowledge_base.journal.sidecar_files import WORLD
 
 if TYPE_CHECKING:

@@ -16,8 +16,7 @@ from dsc.trace import Trace, text_of
 from knowledge_base.exchange import delta_form
 from knowledge_base.facts import Delta
 from knowledge_base.journal.archive import Archive
-from knowledge_base.journal.history import Version
-from knowledge_base.journal.memory_history import MemoryHistory
+from knowledge_base.journal.history import MemoryHistory, Version
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 

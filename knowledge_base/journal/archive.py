@@ -12,10 +12,10 @@ from typing import Any, NoReturn
 from knowledge_base.errors import ConflictError, Place, StoreError
 from knowledge_base.exchange import FORM_ERRORS, delta_of, schema_of, world_of
 from knowledge_base.facts import Change
-from knowledge_base.journal.atomic_files import TABLES
 from knowledge_base.journal.file import reading
 from knowledge_base.journal.history import Version, Writer, gone, too_early
 from knowledge_base.journal.integrity import (
+    ENDS,
     NOTHING,
     Ends,
     Tip,
@@ -30,6 +30,17 @@ from knowledge_base.world.schema import Schema
 from knowledge_base.world.schema_compatibility import require_extension
 from knowledge_base.world.state import WorldState
 
+TABLES = {
+    "schemas": """CREATE TABLE schemas (version INTEGER NOT NULL, hash TEXT NOT NULL, declarations TEXT NOT NULL,
+        digest BLOB NOT NULL)""",
+    "changes": """CREATE TABLE changes (version INTEGER PRIMARY KEY, time REAL NOT NULL, author TEXT NOT NULL,
+        delta TEXT NOT NULL, digest BLOB NOT NULL)""",
+    "snapshots": """CREATE TABLE snapshots (version INTEGER PRIMARY KEY, time REAL NOT NULL, world TEXT NOT NULL,
+        head BLOB NOT NULL, digest BLOB NOT NULL)""",
+    "keys": """CREATE TABLE keys (number INTEGER PRIMARY KEY, key TEXT NOT NULL UNIQUE, version INTEGER NOT NULL,
+        time REAL NOT NULL, author TEXT NOT NULL, delta TEXT, context BLOB NOT NULL, digest BLOB NOT NULL)""",
+    "ends": ENDS,
+}
 _JOURNAL = """SELECT version, time, author, delta, digest FROM changes WHERE version > ? AND version <= ?
     ORDER BY version"""
 _LAST = "SELECT max(version) FROM (SELECT version FROM changes UNION ALL SELECT version FROM snapshots)"

@@ -1,37 +1,63 @@
-"""The SQLite file of a store: connections, headers, and errors with their meaning."""
+"""The SQLite file of a store: connections, headers, and errors with their meaning.
+
+A process that cannot write a store, or create SQLite's sidecar files, reads it in place without locks if its log is
+empty. It reads any other store from a private copy with its log, so that the last commits are included.
+"""
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
 import sqlite3
+import tempfile
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from threading import Lock
+from typing import Literal, NamedTuple
 
 from knowledge_base.errors import DamagedStoreError, Place, StoreError
-from knowledge_base.journal.read_only import changed, is_still, open_still, stamp_of
-from knowledge_base.journal.sidecar_files import INDEX, LOG, OLD_LOG, regular, require_no_strangers, unlocked
+from knowledge_base.journal.sidecar_files import INDEX, LOG, OLD_LOG, place, regular, require_no_strangers, unlocked
 from knowledge_base.pddl.files import files_beside
 
 Durability = Literal["memory", "process", "power"]
 """The events that a commit survives: none; the death of the process; a power cut (if the disk reports writes
 correctly).
 """
-
 APPLICATION_ID = 0x6473636B  # "dsck", the file kind in SQLite's application_id
 FORMAT = 3
 PATIENCE_S = 1.0
 """Seconds to wait for another process that locks the file; normally there is none."""
-
 _LONGEST_PATH = 500
 """Bytes; SQLite opens no file with a path of more than 511."""
-_PAGES_IN_LOG = {"process": 0, "power": 1000}
-"""Pages of 4 KiB in SQLite's log after which a commit runs a checkpoint; 0: a thread runs it."""
-_LOG_LENGTH = (_PAGES_IN_LOG["power"] + 24) * (4096 + 24)  # a frame is a page and its head; commits are not cut
-_SYNCHRONOUS = {"process": "NORMAL", "power": "FULL"}  # in WAL mode only FULL waits for the disk in each commit
+_PAGE_SIZE = 4096
+_WAL = b"\2\2"
+"""Bytes 18 and 19 of SQLite's header for a database in WAL mode, for writing and reading."""
+_TRIES = 5
+"""Number of attempts to copy a file during writes."""
+Seen = tuple[tuple[int, int, bool] | None, ...]
+"""Device, inode, and whether there is content: of a store and of SQLite's sidecar files."""
+Stamp = tuple[tuple[int, int, int] | None, ...]
+"""Inode, length and time of the store's file and of its log; equal until either is written."""
+
+
+class Kind(NamedTuple):
+    """A kind of SQLite file, by its header.
+
+    Attributes:
+        name: its name in messages.
+        application_id: SQLite's `application_id`.
+        form: number of its format.
+    """
+
+    name: str
+    application_id: int
+    form: int
+
+
+STORE = Kind("knowledge store", APPLICATION_ID, FORMAT)
 
 
 @contextmanager
@@ -76,10 +102,6 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
             yield connection
         finally:
             connection.close()
-
-
-Seen = tuple[tuple[int, int, bool] | None, ...]
-"""Device, inode, and whether there is content: of a store and of SQLite's sidecar files."""
 
 
 def _seen(name: str) -> Seen:
@@ -156,93 +178,12 @@ def is_there(path: Path) -> bool:
     return found is not None
 
 
-def writing(path: Path, durability: Durability) -> sqlite3.Connection:
-    """Return a connection to write with.
-
-    Raises:
-        StoreError: the file cannot be opened, or is not a store.
-    """
-    with reported(path, "open"):
-        require_own(path)
-        require_one_name(path)
-        connection = connect(path, "rw")
-        try:
-            require_store(connection, path)
-            connection.execute("PRAGMA journal_mode = WAL")
-            connection.execute(f"PRAGMA synchronous = {_SYNCHRONOUS[durability]}")
-            connection.execute(f"PRAGMA wal_autocheckpoint = {_PAGES_IN_LOG[durability]}")
-        except BaseException:
-            connection.close()
-            raise
-    return connection
-
-
 def require_one_name(path: Path) -> None:
     """Raise `StoreError` for a file with several names (hard links), for each would have a separate log and lock."""
     found = regular(path)
     if found is not None and found.st_nlink > 1:
         said = f"the file has {found.st_nlink} names (hard links); only a store with one name is written"
         raise StoreError(said, place=Place(str(path)))
-
-
-def to_tidy_up(path: Path) -> sqlite3.Connection:
-    """Return a second connection to an open store, for a checkpoint.
-
-    Raises:
-        sqlite3.Error: the connection cannot be opened.
-    """
-    connection = connect(path, "rw")
-    connection.execute("PRAGMA synchronous = NORMAL")  # otherwise the log could be reset before the file is on the disk
-    return connection
-
-
-def lay_out_log(path: Path) -> None:
-    """Extend SQLite's log to its final length; the writer's connection is open.
-
-    A growing file makes each wait for the disk longer and dependent on other writers, since its length must be stored
-    too. SQLite ignores content after the last commit; zeros are never a commit.
-
-    Raises:
-        StoreError: the disk is full.
-    """
-    try:
-        with open(path.with_name(path.name + LOG), "r+b", opener=_not_through_links) as log:
-            length = log.seek(0, os.SEEK_END)
-            log.write(bytes(max(0, _LOG_LENGTH - length)))
-            log.flush()
-            os.fsync(log.fileno())
-    except OSError as error:
-        raise StoreError(f"cannot lay out the store's log: {error.strerror}", place=Place(str(path))) from error
-
-
-def delete_empty_log(path: Path) -> None:
-    """Delete the sidecar files that SQLite leaves at a moved store's old path; the writer still holds its lock."""
-    log = path.with_name(path.name + LOG)
-    if not path.exists() and log.exists() and not log.stat().st_size:
-        log.unlink()
-        path.with_name(path.name + INDEX).unlink(missing_ok=True)
-
-
-def _not_through_links(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NOFOLLOW)
-
-
-@dataclass(frozen=True, slots=True)
-class Kind:
-    """A kind of SQLite file, by its header.
-
-    Attributes:
-        name: its name in messages.
-        application_id: SQLite's `application_id`.
-        form: number of its format.
-    """
-
-    name: str
-    application_id: int
-    form: int
-
-
-STORE = Kind("knowledge store", APPLICATION_ID, FORMAT)
 
 
 def require_own(path: Path, kind: Kind = STORE) -> None:
@@ -277,3 +218,118 @@ def connect(path: Path, mode: str) -> sqlite3.Connection:
     """Return a connection in autocommit mode; `mode` is SQLite's `mode` of URI filenames."""
     uri = f"{path.absolute().as_uri()}?mode={mode}"
     return sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False, timeout=PATIENCE_S)
+
+
+@contextmanager
+def new_database(path: Path, application_id: int, form: int, *, lasting: bool) -> Iterator[sqlite3.Connection]:
+    """Yield a connection to a database in memory, in a transaction; the end of the block makes it a file at `path`.
+
+    Args:
+        path: the path of the new file.
+        application_id: identifies the kind of file in SQLite's header.
+        form: the number of its format, SQLite's `user_version`.
+        lasting: whether its name survives a power cut, as its content does.
+
+    Raises:
+        OSError: a file exists at `path`, or none can be made; nothing has changed.
+        sqlite3.Error: likewise.
+    """
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as connection:
+        connection.execute(f"PRAGMA page_size = {_PAGE_SIZE}")
+        connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
+        connection.execute("BEGIN")
+        connection.execute(f"PRAGMA application_id = {application_id}")
+        connection.execute(f"PRAGMA user_version = {form}")
+        yield connection
+        connection.execute("COMMIT")
+        content = bytearray(connection.serialize())
+    content[18:20] = _WAL  # so that SQLite never keeps a rollback journal
+    os.close(place(path, bytes(content), lasting=lasting, synced=True))
+
+
+class _Copy(NamedTuple):
+    path: Path
+    stamp: Stamp
+    folder: Path
+    process: int
+
+
+_lock = Lock()
+_copies: list[_Copy] = []
+"""The last copy, since a store is mostly read more than once."""
+
+
+def is_still(path: Path) -> bool:
+    """Return whether SQLite would need to create a sidecar file that this process must not create."""
+    if all(regular(path.with_name(path.name + ending)) for ending in (LOG, INDEX)):
+        return False
+    return not (os.access(path, os.W_OK) and os.access(path.parent, os.W_OK))
+
+
+def open_still(path: Path) -> tuple[sqlite3.Connection, Stamp | None]:
+    """Return a connection in a transaction, with the stamp that the store must still have after reading.
+
+    A copy has no stamp.
+
+    Raises:
+        StoreError: the store cannot be copied.
+        sqlite3.Error: the store cannot be read.
+    """
+    stamp = stamp_of(path)
+    log = stamp[1]
+    if log is None or log[1] == 0:
+        return _begun(unlocked(path)), stamp
+    with _lock:  # until SQLite has opened the log too
+        return _begun(sqlite3.connect(_copied(path), isolation_level=None, check_same_thread=False)), None
+
+
+def stamp_of(path: Path) -> Stamp:
+    """Return the present stamp of a store."""
+    found = (regular(path), regular(path.with_name(path.name + LOG)))
+    return tuple(one and (one.st_ino, one.st_size, one.st_mtime_ns) for one in found)
+
+
+def _begun(connection: sqlite3.Connection) -> sqlite3.Connection:
+    try:
+        connection.execute("PRAGMA query_only = ON")
+        connection.execute("BEGIN")
+        connection.execute("SELECT 1 FROM sqlite_master")
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def _copied(path: Path) -> Path:
+    for _ in range(_TRIES):
+        stamp = stamp_of(path)
+        if _copies and _copies[0][:2] == (path, stamp) and _copies[0].process == os.getpid():
+            return _copies[0].folder / "copy"
+        _forget()
+        try:
+            folder = Path(tempfile.mkdtemp(prefix="dsc-"))
+            _copies.append(_Copy(path, stamp, folder, os.getpid()))
+            shutil.copyfile(path, folder / "copy")
+            shutil.copyfile(path.with_name(path.name + LOG), folder / f"copy{LOG}")
+        except OSError as error:
+            _forget()
+            said = f"cannot copy the store, which is the way to read it here: {error.strerror}"
+            raise StoreError(said, place=Place(str(path))) from None
+    _forget()
+    raise changed(path)
+
+
+def changed(path: Path) -> StoreError:
+    """Return the error for a store that changed during a read without locks."""
+    return StoreError("the store was written while it was read; read it again", place=Place(str(path)))
+
+
+def _forget() -> None:
+    """Delete the copy; after a fork it belongs to the parent."""
+    while _copies:
+        copy = _copies.pop()
+        if copy.process == os.getpid():
+            shutil.rmtree(copy.folder, ignore_errors=True)
+
+
+atexit.register(_forget)

@@ -11,17 +11,8 @@ from pathlib import Path
 from knowledge_base.errors import ConflictError, InputError, Place, StoreError
 from knowledge_base.exchange import compact, delta_form, schema_form, schema_hash, world_form
 from knowledge_base.facts import Change
-from knowledge_base.journal.archive import Archive, schema_at
-from knowledge_base.journal.atomic_files import making
-from knowledge_base.journal.checkpoints import CHECKPOINTS
-from knowledge_base.journal.file import (
-    Durability,
-    delete_empty_log,
-    is_there,
-    lay_out_log,
-    reported,
-    writing,
-)
+from knowledge_base.journal.archive import TABLES, Archive, schema_at
+from knowledge_base.journal.file import APPLICATION_ID, FORMAT, Durability, is_there, new_database, reported
 from knowledge_base.journal.history import Version, Writer
 from knowledge_base.journal.integrity import (
     NOTHING,
@@ -34,8 +25,15 @@ from knowledge_base.journal.integrity import (
     put_ends,
     require_sound,
 )
-from knowledge_base.journal.lock import WriterLock
-from knowledge_base.journal.write_transaction import TransactionGroup, WriteTransaction
+from knowledge_base.journal.sidecar_files import WriterLock, store_owning
+from knowledge_base.journal.write_transaction import (
+    CHECKPOINTS,
+    TransactionGroup,
+    WriteTransaction,
+    delete_empty_log,
+    lay_out_log,
+    writing,
+)
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.schema_compatibility import missing_constants, require_extension, require_functional
 from knowledge_base.world.state import WorldState
@@ -296,14 +294,33 @@ def _no_schema(path: Path) -> InputError:
 
 
 def _make(path: Path, schema: Schema | None, durability: Durability, time: float) -> None:
+    """Make an empty store; the caller holds its writer lock.
+
+    Raises:
+        StoreError: the store cannot be made; the path stays free.
+        InputError: there is no schema.
+    """
     if schema is None:  # another process has just removed the store
         raise _no_schema(path)
-    with making(path, durability) as connection:
-        identity = os.urandom(SIZE)  # no row of another store matches it
-        first = _put_schema(connection, schema, 0, identity)
-        _put_world(connection, 0, float(time), compact(world_form(WorldState(schema))), identity, first)
-        tips = {"changes": Tip(0, identity), "schemas": Tip(1, first), "keys": Tip(0, NOTHING), STORE: Tip(1, identity)}
-        put_ends(connection, tips.items())
+    owner = store_owning(path)
+    if owner not in (None, path):
+        said = f"'{path.name}' is the name of a sidecar file of the store '{owner}'"
+        raise StoreError(said, place=Place(str(path)))
+    lasting = durability == "power"
+    try:
+        with reported(path, "make"), new_database(path, APPLICATION_ID, FORMAT, lasting=lasting) as connection:
+            for statement in TABLES.values():
+                connection.execute(statement)
+            identity = os.urandom(SIZE)  # no row of another store matches it
+            first = _put_schema(connection, schema, 0, identity)
+            _put_world(connection, 0, float(time), compact(world_form(WorldState(schema))), identity, first)
+            tips = {"changes": Tip(0, identity), "schemas": Tip(1, first), "keys": Tip(0, NOTHING)}
+            put_ends(connection, (tips | {STORE: Tip(1, identity)}).items())
+    except FileExistsError:
+        said = f"'{path.name}' is there already; a new store replaces no file"
+        raise StoreError(said, place=Place(str(path))) from None
+    except OSError as error:
+        raise StoreError(f"cannot make the store '{path}': {error.strerror}") from error
 
 
 def _put_schema(connection: sqlite3.Connection, schema: Schema, version: int, before: bytes) -> bytes:

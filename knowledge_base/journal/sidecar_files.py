@@ -1,12 +1,15 @@
-"""Sidecar files of a store: their names, and checks that they belong to it."""
+"""Sidecar files of a store: names, checks that they belong to it, atomic creation, and the writer's lock."""
 
 from __future__ import annotations
 
+import fcntl
 import os
+import re
+import secrets
 import sqlite3
 import stat
 from collections.abc import Iterable
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 from knowledge_base.errors import Place, StoreError
@@ -16,7 +19,7 @@ ENDINGS = (LOG, INDEX, OLD_LOG, LOCK, WORLD)
 """Endings of the sidecar files: SQLite's log, its index and its rollback journal, the writer lock, and the simulated
 world of a run.
 """
-
+MODE = 0o644
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFLNK: "a link",
@@ -33,6 +36,8 @@ _SHORTEST = 512
 """Bytes of the smallest database; SQLite treats a shorter file as empty."""
 _INDEX_PART = 32768
 """An index has a multiple of this number of bytes; 3, briefly, when SQLite creates it."""
+_LOCK_MARK = re.compile(rb"dsc writer +(\d+)\n")
+"""The content of a lock file, always of the same length; a lock file is never empty."""
 
 
 def store_owning(path: Path, in_use: Iterable[Path] = ()) -> Path | None:
@@ -184,3 +189,141 @@ def _beside(path: Path) -> Path | None:
         if name not in ("", path.name):
             return path.with_name(name)
     return None
+
+
+def place(path: Path, content: bytes, *, locked: bool = False, synced: bool = False, lasting: bool = False) -> int:
+    """Make a file; return its descriptor, open to read and write.
+
+    The file has no name until it is complete. On a file system without nameless files it has a random name until then,
+    which remains if the process is killed.
+
+    Args:
+        path: the path of the new file.
+        content: its whole content.
+        locked: whether this process holds a lock on it (`flock`) from the beginning.
+        synced: whether its content survives a power cut.
+        lasting: whether its name survives a power cut.
+
+    Raises:
+        FileExistsError: `path` exists.
+        OSError: the file cannot be made.
+    """
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        file, name = _nameless(path.parent, folder)
+        try:
+            with os.fdopen(file, "wb", closefd=False) as whole:  # a full disk may take a part without an error
+                whole.write(content)
+            if synced:
+                os.fsync(file)
+            if locked:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.link(name, path, src_dir_fd=folder, follow_symlinks=True)  # fails if the path exists
+            if lasting:
+                os.fsync(folder)
+        except BaseException:
+            os.close(file)
+            raise
+        finally:
+            if name.parent == path.parent:
+                name.unlink()
+    finally:
+        os.close(folder)
+    return file
+
+
+def _nameless(parent: Path, folder: int) -> tuple[int, Path]:
+    """Return the descriptor of a new file, and the name by which it can be linked."""
+    with suppress(OSError, AttributeError):  # some systems and file systems lack nameless files
+        Path("/proc/self/fd").lstat()
+        file = os.open(".", os.O_TMPFILE | os.O_RDWR | os.O_CLOEXEC, MODE, dir_fd=folder)
+        return file, Path(f"/proc/self/fd/{file}")
+    name = parent / f".dsc-{secrets.token_hex(8)}"
+    return os.open(name, os.O_CREAT | os.O_EXCL | os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC, MODE), name
+
+
+class WriterLock:
+    """The right to write a store, from now until `release`.
+
+    A sidecar file holds the lock and names the process; `release` deletes it. The store file cannot hold it, since
+    closing it in any thread would drop SQLite's own locks. A file of that name that is not a lock stays unchanged.
+
+    Raises:
+        StoreError: another writer has the store open, in this process or another, or the lock file cannot be made.
+    """
+
+    def __init__(self, store: Path) -> None:
+        self._store = store
+        self._path = store.with_name(store.name + LOCK)
+        self._released = False
+        self._file = self._locked()
+        while not self._is_there():  # its owner deleted the file between open and lock
+            os.close(self._file)
+            self._file = self._locked()
+        os.pwrite(self._file, _lock_content(), 0)
+
+    def release(self) -> None:
+        """Release the lock and delete its file; further calls do nothing."""
+        if not self._released:
+            self._released = True
+            if self._is_there():
+                self._path.unlink()
+            os.close(self._file)
+
+    def _is_there(self) -> bool:
+        """Return whether the locked file is still the one at the path."""
+        try:
+            return os.path.samestat(os.fstat(self._file), self._path.lstat())
+        except FileNotFoundError:
+            return False
+
+    def _locked(self) -> int:
+        while True:
+            try:
+                return self._found()
+            except FileNotFoundError:
+                pass  # there was no writer, or it has just left
+            try:
+                return place(self._path, _lock_content(), locked=True)
+            except FileExistsError:
+                continue  # another writer was faster
+            except OSError as error:
+                said = f"cannot write '{self._path}': {error.strerror}"
+                raise StoreError(said, place=Place(str(self._store))) from None
+
+    def _found(self) -> int:
+        """Return the locked descriptor of the existing file.
+
+        Raises:
+            FileNotFoundError: there is no lock file.
+            StoreError: as for the class.
+        """
+        file = open_own(self._path, self._store)
+        try:
+            process = self._process(file)
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise _taken(self._store, process) from None
+        except BaseException:
+            os.close(file)
+            raise
+        return file
+
+    def _process(self, file: int) -> str:
+        """Return the process number in the file."""
+        found = _LOCK_MARK.fullmatch(os.pread(file, 2 * len(_lock_content()), 0))
+        if found is None:
+            raise foreign(self._path, self._store, "is not the lock of a store")
+        return found[1].decode()
+
+
+def _lock_content() -> bytes:
+    return b"dsc writer %20d\n" % os.getpid()
+
+
+def _taken(store: Path, process: str) -> StoreError:
+    return StoreError(
+        f"another writer has it open (process {process}); it can be opened with read_only=True meanwhile",
+        place=Place(str(store)),
+    )

@@ -14,8 +14,7 @@ from kb_worlds import PROPERTY, Ticks
 
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, StoreError, fact
 from knowledge_base.conditions.notification import Notifier
-from knowledge_base.journal.history import Version
-from knowledge_base.journal.memory_history import MemoryHistory
+from knowledge_base.journal.history import MemoryHistory, Version
 
 ON_SHELF = Delta(added=(fact("on", "cup1", "shelf"),))
 OFF_SHELF = Delta(removed=(fact("on", "cup1", "shelf"),))

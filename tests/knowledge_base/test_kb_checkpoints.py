@@ -10,8 +10,8 @@ import pytest
 from kb_worlds import Ticks
 
 from knowledge_base import Delta, Fact, KnowledgeBase, Schema
-from knowledge_base.journal import checkpoints, journal, write_transaction
-from knowledge_base.journal.checkpoints import CHECKPOINTS
+from knowledge_base.journal import journal, write_transaction
+from knowledge_base.journal.write_transaction import CHECKPOINTS
 
 SCHEMA = Schema.parse("(define (domain d) (:predicates (quiet)))")
 CHANGES = (Delta(added=(Fact("quiet"),)), Delta(removed=(Fact("quiet"),)))
@@ -45,8 +45,8 @@ def in_file(path):
 def test_files_are_tidied_up_while_their_writers_go_on(path, monkeypatch):
     monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 20)
     by = set()
-    tidy_up = checkpoints._tidy_up
-    monkeypatch.setattr(checkpoints, "_tidy_up", lambda path: by.add(threading.current_thread()) or tidy_up(path))
+    tidy_up = write_transaction._tidy_up
+    monkeypatch.setattr(write_transaction, "_tidy_up", lambda path: by.add(threading.current_thread()) or tidy_up(path))
     with opened(path) as one, opened(path.with_name("other.kb")) as other:
         for _ in range(3):
             commit(one, 10)
@@ -74,7 +74,7 @@ def test_a_store_that_cannot_be_tidied_up_loses_nothing(path, monkeypatch):
     def broken(_):
         raise sqlite3.OperationalError("disk I/O error")
 
-    monkeypatch.setattr(checkpoints, "to_tidy_up", broken)
+    monkeypatch.setattr(write_transaction, "to_tidy_up", broken)
     with opened(path) as kb:
         commit(kb, 11)
         CHECKPOINTS.settle()
@@ -85,9 +85,9 @@ def test_a_store_that_cannot_be_tidied_up_loses_nothing(path, monkeypatch):
 
 def test_a_log_that_grows_faster_than_it_is_tidied_up_is_kept_short_by_its_writer(path, monkeypatch):
     monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 10)
-    monkeypatch.setattr(checkpoints, "MOST_IN_LOG", 30)
-    tidy_up = checkpoints._tidy_up
-    monkeypatch.setattr(checkpoints, "_tidy_up", lambda path: tidy_up(path) and 31)  # he is never done
+    monkeypatch.setattr(write_transaction, "MOST_IN_LOG", 30)
+    tidy_up = write_transaction._tidy_up
+    monkeypatch.setattr(write_transaction, "_tidy_up", lambda path: tidy_up(path) and 31)  # he is never done
     with opened(path) as kb:
         for _ in range(100):
             commit(kb, 10)
@@ -99,7 +99,7 @@ def test_a_log_that_grows_faster_than_it_is_tidied_up_is_kept_short_by_its_write
 def test_what_has_left_nothing_in_the_log_asks_for_nothing(path, monkeypatch):
     monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 1)
     asked = []
-    monkeypatch.setattr(checkpoints, "_tidy_up", lambda path: asked.append(path) or 0)
+    monkeypatch.setattr(write_transaction, "_tidy_up", lambda path: asked.append(path) or 0)
     with opened(path) as kb:
         CHECKPOINTS.settle()
         before = len(asked)
@@ -138,7 +138,7 @@ def test_a_change_is_not_called_failed_because_no_thread_can_tidy_up_after_it(pa
             raise RuntimeError("can't start new thread")
 
     monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 2)
-    monkeypatch.setattr(checkpoints, "Thread", NoMore)
+    monkeypatch.setattr(write_transaction, "Thread", NoMore)
     with opened(path) as kb:
         commit(kb, 50)
         assert kb.version == 50

@@ -23,7 +23,7 @@ from knowledge_base import (
     StoreError,
     fact,
 )
-from knowledge_base.journal import journal, memory_history
+from knowledge_base.journal import history, journal
 
 QUIET = Delta(added=(Fact("quiet"),))
 LOUD = Delta(removed=(Fact("quiet"),))
@@ -227,7 +227,7 @@ def test_compaction_makes_the_file_smaller_and_keeps_it_whole(path):
 
 
 def test_in_memory_only_the_last_changes_are_kept(monkeypatch):
-    monkeypatch.setattr(memory_history, "MOST_KEPT", 3)
+    monkeypatch.setattr(history, "MOST_KEPT", 3)
     kb = opened(None)
     for number in range(5):
         kb.apply(LOUD if number % 2 else QUIET, author="test")

@@ -11,7 +11,7 @@ import pytest
 from dsc.runs.archive import has_run
 from knowledge_base import Delta, KnowledgeBase, Schema, fact
 from knowledge_base.errors import StoreError
-from knowledge_base.journal import atomic_files, journal, lock
+from knowledge_base.journal import file, journal, sidecar_files
 
 SCHEMA = Schema.parse("(define (domain d) (:types cup) (:predicates (clean ?c - cup)) (:constants c1 - cup))")
 CLEAN = Delta(added=(fact("clean", "c1"),))
@@ -24,7 +24,7 @@ def dies_at(line: int, path) -> bool:
         lines = count()
 
         def trace(frame, happens, _):
-            if frame.f_code.co_filename not in {part.__file__ for part in (journal, lock, atomic_files)}:
+            if frame.f_code.co_filename not in {part.__file__ for part in (journal, file, sidecar_files)}:
                 return None
             if happens == "line" and next(lines) == line:
                 os._exit(9)
@@ -61,7 +61,7 @@ def test_a_system_without_nameless_files_makes_it_under_another_name_first(tmp_p
     assert [file.name for file in tmp_path.iterdir()] == ["s.kb"]
     (tmp_path / "x").touch()
     with pytest.raises(FileExistsError):
-        atomic_files.place(tmp_path / "x", b"new")
+        sidecar_files.place(tmp_path / "x", b"new")
     assert sorted(file.name for file in tmp_path.iterdir()) == ["s.kb", "x"]
 
 
@@ -73,7 +73,7 @@ def test_what_cannot_be_made_leaves_nothing(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device")
         link(source, target, **how)
 
-    monkeypatch.setattr(atomic_files.os, "link", full)
+    monkeypatch.setattr(sidecar_files.os, "link", full)
     with pytest.raises(StoreError, match=r"cannot make the store '.*s.kb': No space left on device"):
         KnowledgeBase.open(SCHEMA, tmp_path / "s.kb")
     assert list(tmp_path.iterdir()) == []

@@ -16,8 +16,7 @@ from dsc.runs.archive import has_run
 from dsc.runs.archive import records_of as run_records
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, StoreError, fact
 from knowledge_base.cli.changes import new
-from knowledge_base.journal.lock import WriterLock
-from knowledge_base.journal.sidecar_files import ENDINGS, is_database, store_owning
+from knowledge_base.journal.sidecar_files import ENDINGS, WriterLock, is_database, store_owning
 
 SCHEMA = Schema.parse("(define (domain d) (:types cup) (:predicates (clean ?c - cup)) (:constants c1 - cup))")
 CLEAN = Delta(added=(fact("clean", "c1"),))

@@ -22,7 +22,7 @@ from dsc.sequencer.clock import LoopClock
 from dsc.viewer.record_sources import records_of
 from knowledge_base import Delta, KnowledgeBase, Schema, StoreError, fact
 from knowledge_base.cli import app as kb
-from knowledge_base.journal import read_only
+from knowledge_base.journal import file as store_file
 from knowledge_base.journal.file import connect
 
 SCHEMA = Schema.parse("(define (domain d) (:types cup) (:predicates (clean ?c - cup)) (:constants c1 - cup))")
@@ -143,7 +143,7 @@ def test_a_medium_that_cannot_be_written(state, kept, expected, folder) -> None:
         with pytest.raises(StoreError, match=r"cannot (write|open) .*s.kb-lock"):
             KnowledgeBase.open(None, medium / "s.kb")
     finally:
-        read_only._forget()
+        store_file._forget()
         subprocess.run(["umount", medium], check=True)  # noqa: S607
     assert found == expected["killed" in state]
 
@@ -163,7 +163,7 @@ def as_nobody(answer: Callable[[], object]) -> object:
         except BaseException as error:  # noqa: BLE001  it is told to the other process
             said = json.dumps(repr(error))
         os.write(mouth, said.encode())
-        read_only._forget()
+        store_file._forget()
         os._exit(0)
     os.close(mouth)
     with os.fdopen(ear) as heard:
@@ -235,7 +235,7 @@ def test_a_copy_is_made_once_and_again_when_the_store_was_written(kept, tmp_path
     monkeypatch.setattr("knowledge_base.journal.file.is_still", lambda path: True)
     copied = []
     copyfile = shutil.copyfile
-    monkeypatch.setattr(read_only.shutil, "copyfile", lambda *which: (copied.append(which), copyfile(*which)))
+    monkeypatch.setattr(store_file.shutil, "copyfile", lambda *which: (copied.append(which), copyfile(*which)))
     with KnowledgeBase.open(None, tmp_path / "s.kb", read_only=True) as world:
         assert (world.version, world.oldest, len(copied)) == (2, 0, 2)
         with connect(tmp_path / "s.kb", "rw") as other:
@@ -244,6 +244,6 @@ def test_a_copy_is_made_once_and_again_when_the_store_was_written(kept, tmp_path
         os.utime(tmp_path / "s.kb")
         with pytest.raises(StoreError, match="damaged: version 2 is missing"):
             world.changes()
-    folder = read_only._copies[0].folder if read_only._copies else None
-    read_only._forget()
+    folder = store_file._copies[0].folder if store_file._copies else None
+    store_file._forget()
     assert folder is None or not folder.exists()

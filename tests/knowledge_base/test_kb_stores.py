@@ -16,7 +16,7 @@ from knowledge_base import (
     StoreError,
     fact,
 )
-from knowledge_base.journal.lock import WriterLock
+from knowledge_base.journal.sidecar_files import WriterLock
 
 TYPES = "item place - object cup - item"
 PREDICATES = "(on ?i - item ?p - place) (clean ?i - item)"
@@ -184,7 +184,7 @@ def test_a_lock_that_is_given_back_while_another_takes_it_is_held_by_one(path, m
         first.release()
         flock(file, operation)
 
-    monkeypatch.setattr("knowledge_base.journal.lock.fcntl.flock", late)
+    monkeypatch.setattr("knowledge_base.journal.sidecar_files.fcntl.flock", late)
     second = WriterLock(path)
     monkeypatch.undo()
     with pytest.raises(StoreError, match="another writer"):
