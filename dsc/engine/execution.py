@@ -50,7 +50,8 @@ class Execution:
             raise RunawayError(f"plots nested deeper than {MAX_NESTING}", [path])
         variables = fill_parameters(compiled.plot, arguments, performer.situation)
         performer.bound.append(PlotBound(path, compiled.plot))
-        state = FrameState(performer.next_serial(), compiled, initial.following, variables)
+        performer.serials += 1
+        state = FrameState(performer.serials, compiled, initial.following, variables)
         frame = Frame(state, parent, host)
         for entrance in initial.parts[0].entrances:
             self._enter(frame, entrance, NOTHING)
@@ -145,7 +146,7 @@ class Execution:
         performer, node, state = self.performer, entrance.node, entrance.node.state
         activation = 0
         if node.addressed:
-            activation = performer.next_serial()
+            activation = performer.serials = performer.serials + 1
             frame.activations = {**frame.activations, node.name: activation}
         if state is not None:
             performer.entered.append(frame.prefix + node.name)

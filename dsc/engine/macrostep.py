@@ -157,9 +157,11 @@ class Macrostep:
         kept = bool(choice.keeps) and self._keep(frame, choice.keeps, event)
         if not choice.parts:
             return kept
-        self._check_progress()
+        if len(self._performer.microsteps) >= MAX_MICROSTEPS:
+            raise self._runaway()
         self._execution.take({frame: choice}, [*zip(repeat(frame), choice.parts, strict=False)])
-        self._performer.end_microstep(event, choice.taken_in(frame.compiled, frame.prefix))
+        taken = choice.taken_in(frame.compiled, frame.prefix) if frame.prefix else choice.taken
+        self._performer.end_microstep(event, taken)
         return True
 
     def _take_together(self, trigger: Trigger, event: Event | None) -> bool:
@@ -168,7 +170,8 @@ class Macrostep:
         kept = [self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event) for one in late]
         if not taken:
             return any(kept)
-        self._check_progress()
+        if len(self._performer.microsteps) >= MAX_MICROSTEPS:
+            raise self._runaway()
         by_frame: dict[Frame, list[TransitionEdge]] = {}
         for one in taken:
             by_frame.setdefault(one.frame, []).append(one.edge)
@@ -179,10 +182,9 @@ class Macrostep:
         self._performer.end_microstep(event, reports)
         return True
 
-    def _check_progress(self) -> None:
-        if len(self._performer.microsteps) >= MAX_MICROSTEPS:
-            trail = [path for micro in self._performer.microsteps[-6:] for path in micro.entered]
-            raise RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round", trail)
+    def _runaway(self) -> RunawayError:
+        trail = [path for micro in self._performer.microsteps[-6:] for path in micro.entered]
+        return RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round", trail)
 
     # -- guards ------------------------------------------------------------------------------------------
 

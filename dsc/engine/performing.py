@@ -84,11 +84,6 @@ class Performer:
         self.entered: list[str] = []
         self.bound: list[PlotBound] = []
 
-    def next_serial(self) -> int:
-        """Return a number never given out before in this run."""
-        self.serials += 1
-        return self.serials
-
     def end_microstep(self, event: Event | None, taken: tuple[Taken, ...]) -> None:
         """Close a microstep: the exits, entries and bindings since the last one."""
         bound = tuple(self.bound)
@@ -216,7 +211,8 @@ class Performer:
     def _emit_later(self, frame: Frame, action: Emit, delay: TermField, attributes: Mapping[str, Any]) -> None:
         name = "" if action.id is None else str(self.value(frame, action.id))
         if action.into is not None:
-            name = f"{action.emit}.{self.next_serial()}"
+            self.serials += 1
+            name = f"{action.emit}.{self.serials}"
             frame.variables = {**frame.variables, action.into: name}
         event = Event(action.emit, attributes, frame=frame.serial)
         self.output.append(SendLater(event, _delay_of(self.value(frame, delay)), name))

@@ -115,8 +115,6 @@ class CompiledReaction:
 
     def taken_in(self, compiled: CompiledPlot, prefix: str) -> tuple[Taken, ...]:
         """Return the report of the transitions in a plot whose states' paths begin with the prefix."""
-        if not prefix:
-            return self.taken
         found = self.reports.get(prefix)
         if found is None:
             if len(self.reports) >= MOST_REPORTS:

@@ -169,7 +169,7 @@ class Dispatcher:
             self.activation.look()
         component = self._components.get(start.component)
         if component is not None and type(component).forget is not Component.forget:
-            task = asyncio.get_running_loop().create_task(_forgotten(component, self._id(start)))
+            task = asyncio.get_running_loop().create_task(_forgotten(component, self._part_of + start.action_id))
             self._forget_tasks.add(task)
             task.add_done_callback(self._forget_tasks.discard)
 
@@ -215,7 +215,7 @@ class Dispatcher:
         Raises:
             InputError: the component failed to stop it.
         """
-        component, action_id = self.component(start.component), self._id(start)
+        component, action_id = self.component(start.component), self._part_of + start.action_id
         try:
             async with asyncio.timeout(CLOSING):
                 with contained():
@@ -261,9 +261,6 @@ class Dispatcher:
             self.activation.look()
         running.begin_limit()
 
-    def _id(self, start: Start) -> str:
-        return self._part_of + start.action_id
-
     async def _execute(self, component: Component, running: RunningSkill, interrupted: InterruptedSkill | None) -> None:
         dependencies = SkillDependencies(self.activation, component)
         try:
@@ -294,7 +291,7 @@ class Dispatcher:
                 running.report(outcome)
 
         clock: Clock = PastClock(self._clock, interrupted.began) if interrupted else self._clock
-        call = SkillCall(self._id(start), clock, report, running.due, self._fault)
+        call = SkillCall(self._part_of + start.action_id, clock, report, running.due, self._fault)
         if component.name in self._cleanups.pending and not component.concurrent and signature.pattern == "skill":
             await self._cleanups.over(component.name)
         if component.name in self.outbox.untaken:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from dsc.calls import OBSERVED
@@ -24,24 +24,24 @@ from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 
 MOST_CANCELLED = 1_000
-"""Cancelled skills of which it is known what started them, for the trace of what they still observe."""
+"""Upper bound of cancelled skills with a known cause, for the trace of their late observations."""
 CHART = "chart"
-"""Author of what a plot tells the knowledge base."""
+"""Author of the changes that a plot makes with `tell`."""
 StepListener = Callable[[Step], None]
 """Called with each macrostep; must not block."""
 
 
 class Reactor:
-    """One macrostep after the other, for a live run and for the replay of a recorded one alike.
+    """Executes one macrostep for each message, in a live run as in the replay of a recorded one.
 
     Attributes:
         machine: the chart's state.
         emitted: outcome events of the plot so far.
         problem: the reason to end the run, or the error of its last step.
-        in_vain: periods that passed without any effect since anything else happened.
+        in_vain: periods without any effect since the last other message.
         settings: an operator's settings of plots, by plot and parameter.
-        caused_by: the records of the skills that were started and may still say something, by action id; of cancelled
-            ones the latest `MOST_CANCELLED`.
+        caused_by: numbers of the records about started skills that may still answer, by action id; of cancelled ones
+            the latest `MOST_CANCELLED`.
         listeners: called with each macrostep, before its actions leave.
     """
 
@@ -154,7 +154,7 @@ class Reactor:
         self.trace.cause = None
         timer = message.timer
         event = Event(timer.event, to=timer.activation, exact=True, number=timer.index)
-        if timer.event != EVERY:  # most periods pass without anything happening; if not, the step says so
+        if timer.event != EVERY:  # most periods have no effect; of the others, the step is recorded
             self.trace.cause = self.tracer.event(event, "timer")
         return event
 
@@ -182,7 +182,7 @@ class Reactor:
             self.knowledge.apply(delta, author)
 
     def _commit(self, step: Step) -> tuple[Output, ...]:
-        """First what the chart told becomes knowledge, then actions may leave."""
+        """Record the step and apply its changes of knowledge; afterwards its actions may leave."""
         if self.listeners:
             with contained():
                 for listener in self.listeners:
@@ -193,19 +193,21 @@ class Reactor:
         if step.knowledge is not NO_CHANGE:
             self._apply(step.knowledge, CHART)
         for output in step.output:
-            if isinstance(output, Cancel):
-                self._forget_causes(output.activation)
-            seq = self.tracer.output(output)
-            if isinstance(output, Start) and seq is not None:
-                self.caused_by[output.action_id] = seq
+            if isinstance(output, Start):
+                self.caused_by[output.action_id] = self.tracer.started(output)
+            elif isinstance(output, Cancel):
+                if cancelled := self.tracer.cancelled(output.activation):
+                    self._forget_causes(cancelled)
+            else:
+                self.tracer.told(output)
         self.emitted.extend(step.emitted)
         if step.errors:
             self.problem = self.problem or "; ".join(step.errors)
         return step.output
 
-    def _forget_causes(self, activation: int) -> None:
-        """Skills of an activation are cancelled: they may say something for a while, and then never again."""
-        self._cancelled.extend(self.tracer.at_work(activation))
+    def _forget_causes(self, cancelled: Iterable[str]) -> None:
+        """Forget the causes of skills some time after their cancellation: until then they may still observe."""
+        self._cancelled.extend(cancelled)
         while len(self._cancelled) > MOST_CANCELLED:
             self.caused_by.pop(self._cancelled.popleft(), None)
 
@@ -216,16 +218,16 @@ class Reactor:
             self.in_vain.add((message.timer.activation, message.timer.index))
 
     def _unhandled(self, message: Message, event: Event) -> None:
-        """End the run if an active state ignores its own skill's answer: it would wait without end."""
+        """End the run if an active state ignores its own skill's answer, as it would wait without end."""
         if not isinstance(message, SkillMessage) or not message.final or event.to is None:
             return
         if self.machine.state.has_activation(event.to):
             skill = f"{message.start.component}.{message.start.skill}"
             whose = f": {event.attributes['reason']}" if event.name in FAILURES else f" of {skill}"
-            self.problem = f"nobody handles '{event.name}'{whose}"
+            self.problem = f"no transition handles '{event.name}'{whose}"
 
 
 def _is_vain(step: Step) -> bool:
-    """Whether its only output is the next period; in the same state and world, that never changes."""
+    """Return whether the only output is the next period; in the same state and world, that never changes."""
     only_timers = all(isinstance(output, StartTimer) for output in step.output)
     return only_timers and not step.knowledge and not step.emitted

@@ -7,16 +7,12 @@ from typing import Any
 
 from dsc.engine.machine_state import FrameState
 from dsc.engine.steps import (
-    Cancel,
     Microstep,
     Note,
     Output,
-    Revoke,
-    SendLater,
     SendMessage,
     SetParameter,
     Start,
-    StartTimer,
     Step,
     SwitchMode,
 )
@@ -29,10 +25,10 @@ from knowledge_base.store import KnowledgeBase
 
 
 class StepTracer:
-    """Writes what the sequencer does into a trace.
+    """Records the sequencer's events, steps and actions in a trace.
 
     Attributes:
-        known_plots: digests of the plots that it has in full already.
+        known_plots: digests of the plots that the trace has in full.
     """
 
     def __init__(self, trace: Trace) -> None:
@@ -42,15 +38,19 @@ class StepTracer:
         self._at_work: dict[int, dict[str, str]] = {}  # activation -> action id -> skill
 
     def world(self, knowledge: KnowledgeBase) -> None:
-        """All that is known at the start; what follows are changes of it. Left out while nobody listens."""
+        """Record the world at the start, unless the trace has no listener; later records are changes of it."""
         if self._trace.heard:
             known = {"schema": schema_form(knowledge.schema), **world_form(knowledge.snapshot())}
             self._trace.record("world", version=knowledge.version, **known)
 
     def event(self, event: Event, source: str, original: str | None = None, conflated: int = 0) -> int:
-        """An event that came in; `original` is the skill's own name for it where the chart uses another.
+        """Record an incoming event; return the number of the record.
 
-        `conflated` older reports were dropped in favour of it.
+        Args:
+            event: with the chart's name for it.
+            source: the skill, `timer` or `outside`.
+            original: the skill's own name for it.
+            conflated: the number of older reports that it replaces.
         """
         if not self._trace.heard:
             return self._trace.record("event")
@@ -63,25 +63,21 @@ class StepTracer:
         return self._trace.record("event", **data)
 
     def begun(self, start: Start) -> str:
-        """A skill has been started, here or before a crash; its name with its component's."""
+        """Note a skill that was started, here or before a crash; return its name with its component's."""
         skill = f"{start.component}.{start.skill}"
         self._at_work.setdefault(start.activation, {})[start.action_id] = skill
         return skill
 
-    def at_work(self, activation: int) -> Iterable[str]:
-        """The ids of the skills that were started for an activation and have not ended."""
-        return self._at_work.get(activation, ())
-
     def answered(self, start: Start) -> None:
-        """A skill has ended by itself: it cannot be cancelled any more."""
+        """Note the end of a skill, which cannot be cancelled afterwards."""
         self._at_work.get(start.activation, {}).pop(start.action_id, None)
 
     def step(self, step: Step) -> int | None:
-        """A macrostep in which something happened: new plots before it, the rules that answered after it."""
+        """Record a macrostep with microsteps: new plots before it, the rules that answered after it."""
         if not step.microsteps:
             return None
         said: dict[str, Any] = {}
-        if self._trace.heard:  # else nobody wants to know what plots look like, or what happened, which takes a while
+        if self._trace.heard:  # texts of plots and microsteps take a while
             self._plots(step)
             said["microsteps"] = [_micro(micro) for micro in step.microsteps]
             if variables := self._changed_variables(step):
@@ -95,7 +91,7 @@ class StepTracer:
         return seq
 
     def decisions(self, step: Step) -> None:
-        """What dynamic states chose in this macrostep, and why."""
+        """Record the decisions of dynamic states in this macrostep, with their reasons."""
         for made in step.decisions if self._trace.heard else ():
             decision = made.decision
             self._trace.record(
@@ -112,7 +108,7 @@ class StepTracer:
             )
 
     def knowledge(self, change: Change) -> None:
-        """A committed change of the knowledge base, if any; what nothing else led to is itself a cause."""
+        """Record a committed change of the knowledge base; without another cause, it becomes the cause."""
         if not (change.delta and self._trace.heard):
             return
         said = delta_form(change.delta)
@@ -120,32 +116,35 @@ class StepTracer:
         self._trace.cause = self._trace.cause or seq
 
     def set_default(self, setting: ParameterMessage) -> int:
-        """An operator has said what a plot's parameter is worth."""
+        """Record an operator's setting of a plot's parameter; return the number of the record."""
         return self._trace.record("action", action="set", port=f"{setting.owner}.{setting.name}", value=setting.value)
 
-    def output(self, output: Output) -> int | None:
-        """An action that leaves; timers do not."""
-        if isinstance(output, Start):
-            skill, arguments = self.begun(output), dict(output.arguments)
-            return self._trace.record("action", action="start", id=output.action_id, skill=skill, arguments=arguments)
-        if isinstance(output, Cancel):
-            for action_id, skill in self._at_work.pop(output.activation, {}).items():
-                self._trace.record("action", action="cancel", id=action_id, skill=skill)
-        if isinstance(output, SetParameter):
-            port = f"{output.component}.{output.parameter}"
-            return self._trace.record("action", action="set", port=port, value=output.value)
-        if isinstance(output, SwitchMode):
-            return self._trace.record("action", action="switch", component=output.component, mode=output.mode)
-        if isinstance(output, SendMessage):
-            port = f"{output.component}.{output.port}"
-            return self._trace.record("action", action="send", port=port, arguments=dict(output.arguments))
-        if isinstance(output, Note):
-            return self._trace.record("log", label=output.label, text=output.text)
-        assert isinstance(output, Cancel | StartTimer | SendLater | Revoke)  # noqa: S101
-        return None
+    def started(self, start: Start) -> int:
+        """Record the start of a skill; return the number of the record."""
+        skill, arguments = self.begun(start), dict(start.arguments)
+        return self._trace.record("action", action="start", id=start.action_id, skill=skill, arguments=arguments)
+
+    def cancelled(self, activation: int) -> Iterable[str]:
+        """Record the cancellation of an activation's skills; return their action ids."""
+        skills = self._at_work.pop(activation, {})
+        for action_id, skill in skills.items():
+            self._trace.record("action", action="cancel", id=action_id, skill=skill)
+        return skills
+
+    def told(self, output: Output) -> None:
+        """Record a one-way action or a note; timers have no record."""
+        match output:
+            case SetParameter(component, parameter, value):
+                self._trace.record("action", action="set", port=f"{component}.{parameter}", value=value)
+            case SwitchMode(component, mode):
+                self._trace.record("action", action="switch", component=component, mode=mode)
+            case SendMessage(component, port, arguments):
+                self._trace.record("action", action="send", port=f"{component}.{port}", arguments=dict(arguments))
+            case Note(label, text):
+                self._trace.record("log", label=label, text=text)
 
     def _changed_variables(self, step: Step) -> dict[str, Any]:
-        """Parameters and variables that are new or have another value than before, by path of the plot's holder."""
+        """Return new and changed values of parameters and variables, by the path of the plot's host state."""
         before, self._frames = self._frames, _frames(step.state.root)
         said = {}
         for path, frame in self._frames.items():
@@ -171,13 +170,13 @@ def _micro(micro: Microstep) -> dict[str, Any]:
         "exited": list(exited),
         "entered": list(entered),
     }
-    if bound:  # the texts of the plots are records of their own
+    if bound:  # separate records have the texts of the plots
         said["bound"] = [{"state": one.state, "plot": one.plot.name, "hash": one.plot.digest} for one in bound]
     return said
 
 
 def _frames(root: FrameState | None) -> dict[str, FrameState]:
-    """The plots that run, by the path of the state that holds each."""
+    """Return the running plots by the paths of their host states."""
     if root is None or not root.children:
         return {} if root is None else {"": root}
     return dict(_inside(root, ""))
@@ -190,7 +189,7 @@ def _inside(frame: FrameState, path: str) -> Iterator[tuple[str, FrameState]]:
 
 
 def _news(before: FrameState | None, frame: FrameState) -> dict[str, Any]:
-    """The values of a plot that were not there before; another instance of it begins anew."""
+    """Return the new and changed values of a plot; in another instance of it, all values are new."""
     known = before.variables if before is not None and before.serial == frame.serial else {}
     return {
         name: _told_once(value) for name, value in frame.variables.items() if name not in known or known[name] != value
@@ -198,6 +197,6 @@ def _news(before: FrameState | None, frame: FrameState) -> dict[str, Any]:
 
 
 def _told_once(value: Any) -> Any:
-    """A plot that an event carries, by name only: its full text is written when it is bound."""
+    """Replace a plot that an event carries by its name: another record has its text when it is bound."""
     is_plot = isinstance(value, dict) and {"plot", "states"} <= value.keys()
     return {"plot": value["plot"]} if is_plot else value

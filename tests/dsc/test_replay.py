@@ -117,7 +117,7 @@ def test_a_run_with_a_problem_shows_it(tmp_path):
     run = Run(tmp_path, [CHARTS["a problem at the end"]])
     shown = command("show", run.path).output
     assert "everything is left" in shown
-    assert "p: ended early: nobody handles 'did' of robot.work" in shown
+    assert "p: ended early: no transition handles 'did' of robot.work" in shown
 
 
 def test_a_divergence_has_its_own_exit_status(tmp_path):

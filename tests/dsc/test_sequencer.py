@@ -107,7 +107,7 @@ def test_intermediate_reports_reach_the_chart_and_the_knowledge_base():
 def test_an_outcome_nobody_handles_ends_the_run_with_a_problem():
     ran = Ran("{plot: p, states: {a: {entry: {trigger: arm.grasp}, on: {slipped: e}}, e: {final: true}}}")
     assert not ran.end.finished
-    assert ran.end.problem == "nobody handles 'grasped' of arm.grasp"
+    assert ran.end.problem == "no transition handles 'grasped' of arm.grasp"
     assert ran.of_type("end") == [{"finished": False, "problem": ran.end.problem}]
 
 
@@ -115,7 +115,7 @@ def test_an_outcome_whose_guards_do_not_hold_ends_the_run_with_a_problem():
     ran = Ran(
         "{plot: p, states: {a: {entry: {trigger: arm.grasp}, on: {grasped: {to: e, when: (p)}}}, e: {final: true}}}"
     )
-    assert "nobody handles 'grasped'" in ran.end.problem
+    assert "no transition handles 'grasped'" in ran.end.problem
 
 
 def test_nothing_to_wait_for_ends_the_run_with_a_problem():
@@ -368,7 +368,7 @@ def test_a_run_that_ends_with_a_problem_puts_its_components_at_rest():
           b: {final: true}
         """
     )
-    assert "nobody handles 'grasped'" in ran.end.problem
+    assert "no transition handles 'grasped'" in ran.end.problem
     assert ran.arm.log[-2:] == ["speed=0", "mode neutral"]
     assert ran.of_type("end")[0]["problem"] == ran.end.problem
     assert ran.sequencer.machine.state.root is None

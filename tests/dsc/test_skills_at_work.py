@@ -413,7 +413,7 @@ def test_a_skill_that_takes_too_long_is_cancelled_and_timed_out():
 def test_a_skill_has_a_bound_even_if_nobody_says_so():
     ran = Ran(GRASP.replace("{item: cup1}}, on", "{seconds: 1000000}}, on"))
     assert not ran.end.finished
-    assert "nobody handles 'timed_out': arm.grasp: no outcome within 300 s" in ran.end.problem
+    assert "no transition handles 'timed_out': arm.grasp: no outcome within 300 s" in ran.end.problem
 
 
 @pytest.mark.parametrize(
@@ -427,7 +427,7 @@ def test_a_wrong_call_of_a_skill_is_a_skill_error_that_says_so(entry):
 
     ran = Ran("{plot: p, states: {a: {entry: " + entry + ", on: {grasped: e}}, e: {final: true}}}", arm=Strict())
     assert not ran.end.finished
-    assert "nobody handles 'skill_error'" in ran.end.problem
+    assert "no transition handles 'skill_error'" in ran.end.problem
     assert "grasp" in ran.end.problem
 
 

@@ -80,7 +80,12 @@ def traced():
         tracer.step(step)
         tracer.decisions(step)
         for output in step.output:
-            tracer.output(output)
+            if isinstance(output, Start):
+                tracer.started(output)
+            elif isinstance(output, Cancel):
+                tracer.cancelled(output.activation)
+            else:
+                tracer.told(output)
     return heard, tracer
 
 
@@ -119,11 +124,11 @@ def test_a_skill_that_is_cancelled_is_told_once_and_one_that_ended_is_not():
     tracer = StepTracer(trace)
     starts = [Start(f"a{n}.0", n, "c", "s", {}) for n in (1, 2)]
     for start in starts:
-        tracer.output(start)
+        tracer.started(start)
     tracer.answered(starts[0])
     for _ in range(2):
         for start in starts:
-            tracer.output(Cancel(start.activation))
+            tracer.cancelled(start.activation)
     assert [r.data for r in heard[2:]] == [{"action": "cancel", "id": "a2.0", "skill": "c.s"}]
 
 
