@@ -17,7 +17,7 @@ from dsc.components.component import Component
 from dsc.components.hooks import contained
 from dsc.model.plot import ActionPlot
 from dsc.text.plot_files import load_library
-from dsc.validation.deployment import addressed_by
+from dsc.validation.subject import addressed_by
 from knowledge_base.errors import InputError, Place, UnknownNameError, described
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain

@@ -101,9 +101,14 @@ def contents_of(step: Step, plots: Plots) -> list[ActionPlot]:
     return [] if step.use.startswith("?") else [plots.plot(step.use)]
 
 
+def is_planned(state: AnyState) -> bool:
+    """Return whether a planner may provide the state's content."""
+    return isinstance(state, DynamicState) and state.goal is not None
+
+
 def action_of(step: Step, plots: Plots) -> str | None:
     """Return the one planning action that all possible plots of the step implement, or `None`."""
-    if isinstance(step, DynamicState) and step.goal is not None:
+    if is_planned(step):
         return None
     actions = {plot.implements for plot in contents_of(step, plots)}
     return actions.pop() if len(actions) == 1 else None
@@ -132,7 +137,7 @@ def entered_by(rule: Rule, plot: ActionPlot, plots: Plots) -> Iterator[ActionPlo
     else:
         entered = [state for name, state in steps.items() if concerns(rule, name, state, plots)]
     found = {used.name: used for state in entered for used in contents_of(state, plots)}
-    planned = any(isinstance(state, DynamicState) and state.goal is not None for state in steps.values())
+    planned = any(map(is_planned, steps.values()))
     if planned and not rule.leads_away:
         found.update({used.name: used for used in _answered_in_plans(rule, plots)})
     yield from found.values()

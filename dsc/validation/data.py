@@ -1,87 +1,202 @@
-"""Data of plots: variables exist, conditions can be evaluated, arguments match."""
+"""Data of plots: variables exist, conditions can be evaluated, and values fit the types of their targets.
+
+A finding about a type needs certainty: a name may denote any object, and a variable may hold a value of a subtype.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 
-from dsc.dynamic.library import Library
-from dsc.dynamic.steps import Outcomes, Step, answerable, concerns, mentioned_in, outputs_of, terms_of
+from dsc.dynamic.steps import (
+    Outcomes,
+    Step,
+    answerable,
+    concerns,
+    contents_of,
+    entered_by,
+    mentioned_in,
+    outputs_of,
+    terms_of,
+)
 from dsc.engine.situation import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
-from dsc.model.actions import (
-    Assign,
-    Block,
-    Choose,
-    Emit,
-    ExternalAction,
-    Internal,
-    Log,
-    Send,
-    Switch,
-    Tell,
-    Trigger,
-    Withdraw,
-)
-from dsc.model.plot import ActionPlot, Path, PlotParameter, PlotVariable
+from dsc.model import actions
+from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
-from dsc.model.states import DynamicState, FinalState, State, SubmachineState
-from dsc.model.transitions import Connector, SelectState, TimedTransition, Transition
+from dsc.model.states import DynamicState, FinalState, HistoryState, State
+from dsc.model.transitions import SelectState, TimedTransition, Transition, TransitionSource, case_value
 from dsc.skills import SkillSignature, check_arguments
-from dsc.validation.nesting import Nesting
-from dsc.validation.rules import RuleScope, Skills, Types, attributes_of
-from knowledge_base.errors import InputError, UnknownNameError
+from dsc.validation.rules import RuleScope, attributes_of, read_as
+from dsc.validation.subject import Subject, Types
+from knowledge_base.errors import InputError
 from knowledge_base.language.checking.binding import unbound_error
 from knowledge_base.language.checking.check import check, check_effect, check_term
 from knowledge_base.language.syntax.effect import Effect, mentioned
-from knowledge_base.language.syntax.expression import Expression, Term, free_variables
-from knowledge_base.world.schema import Schema
+from knowledge_base.language.syntax.expression import Constant, Expression, Term, Variable, free_variables
+from knowledge_base.language.syntax.text import to_text
 
-FREE_TYPES = frozenset({"number", "text", "symbol", "boolean", "condition", "plot"})
+_VALUES = frozenset({"number", "boolean"})
+FREE_TYPES = _VALUES | {"text", "symbol", "condition", "plot"}
 """Types of parameters and variables besides those of the schema."""
+_ANY: Types = {}
 
 
-def check_data(
-    plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
-) -> Iterator[Finding]:
+def check_data(subject: Subject) -> Iterator[Finding]:
     """Yield findings about variables, types, conditions, effects and arguments."""
-    yield from _Data(plot, library, schema, skills, nesting).findings()
+    yield from _Data(subject).findings()
 
 
 class _Data:
-    def __init__(
-        self, plot: ActionPlot, library: Library, schema: Schema | None, skills: Skills, nesting: Nesting
-    ) -> None:
-        self._plot = plot
-        self._library = library
-        self._schema = schema
-        self._skills = skills
-        self._nesting = nesting
-        self._assigned = {**plot.variables, **plot.outputs}
-        declared: dict[str, PlotParameter | PlotVariable] = {**plot.parameters, **self._assigned}
-        self._types: dict[str, str | None] = {name: self._type(one.type) for name, one in declared.items()}
-        self._rules = RuleScope(plot, library, skills, nesting, self._type)
+    """Checks every condition, effect and term in its scope: the types of all names that it can read.
+
+    Attributes of events are names such as `event.item`; of an unknown event (`None`) any attribute may be read.
+    """
+
+    def __init__(self, subject: Subject) -> None:
+        self._subject, self._plot, self._library = subject, subject.plot, subject.library
+        self._schema = subject.schema
+        self._typed = {"number", "text", "boolean"}.union(() if self._schema is None else self._schema.types)
+        self._skills = subject.skills or {}
+        self._assigned, self._own = subject.assigned, subject.types
+        self._rules = RuleScope(subject)
 
     def findings(self) -> Iterator[Finding]:
         yield from self._declarations()
         if self._plot.when is not None:
-            own = {name: self._types[name] for name in self._plot.parameters}
-            yield from self._condition(self._plot.when, own, ("when",))
-        for _, state, path in self._nesting.states:
+            yield from self._condition(self._plot.when, _types(self._plot), ("when",))
+        for _, state, path in self._subject.states:
             if isinstance(state, State):
                 yield from self._state(state, path)
             elif isinstance(state, FinalState):
-                yield from self._terms(state.arguments.items(), None, (*path, "with"))
-                yield from self._internal(state.entry, None, (*path, "entry"))
-            elif isinstance(state, Connector):
-                yield from self._connector(state, path)
-            else:
-                yield from self._internal(state.do, None, (*path, "do"))
+                declared = self._plot.emits.get(state.emit or "")
+                yield from self._terms(state.arguments, None, (*path, "with"), declared or _ANY)
+                yield from self._actions(state.entry, None, (*path, "entry"))
+            elif isinstance(state, HistoryState):
+                yield from self._actions(state.do, None, (*path, "do"))
+            elif isinstance(state, SelectState):
+                yield from self._selection(state, path)
+            if isinstance(state, TransitionSource):
+                yield from self._leaving(state, path)
         for number, rule in enumerate(self._plot.rules):
             yield from self._rule(rule, ("rules", number))
         for number, handler in enumerate(self._plot.handlers):
             yield from self._handler(handler, ("handlers", number))
+
+    # -- parts of a plot ---------------------------------------------------------------------------------
+
+    def _declarations(self) -> Iterator[Finding]:
+        plot, valid = self._plot, FREE_TYPES if self._schema is None else FREE_TYPES | self._schema.types.keys()
+        for name, parameter in plot.parameters.items():
+            yield from self._declared(parameter.type, valid, ("parameters", name))
+            yield from self._fits(parameter.default, parameter.type, _ANY, ("parameters", name, "default"))
+        for group, declared in (("variables", plot.variables), ("outputs", plot.outputs)):
+            for name, variable in declared.items():
+                yield from self._declared(variable.type, valid, (group, name))
+                yield from self._fits(variable.initial, variable.type, self._own, (group, name, "initial"))
+
+    def _declared(self, kind: str, valid: Iterable[str], path: Path) -> Iterator[Finding]:
+        if self._schema is not None and kind not in valid:
+            yield self._subject.finding(path, "known type", f"there is no type '{kind}'", found=kind, valid=valid)
+
+    def _state(self, state: State, path: Path) -> Iterator[Finding]:
+        for key, block in state.blocks():
+            yield from self._actions(block, None, (*path, key), numbered=True)
+        if state.at_least is not None:
+            yield from self._term(state.at_least, None, (*path, "at_least"), "number")
+        if isinstance(state, Step):
+            yield from self._given(state.arguments, None, (*path, "with"), contents_of(state, self._library))
+        if isinstance(state, DynamicState) and state.goal is not None:
+            yield from self._condition(state.goal, self._own, (*path, "goal"))
+
+    def _selection(self, state: SelectState, path: Path) -> Iterator[Finding]:
+        """Check the selected value; find cases that can never be taken, because their type differs from its type."""
+        yield from self._term(state.select, None, (*path, "select"))
+        selected = self._kind(state.select, self._own)
+        for key in state.cases:
+            value = case_value(key)
+            place = value if isinstance(value, int) else key
+            yield from self._fits(Constant(value), selected, _ANY, (*path, "cases", place), to_text(state.select))
+
+    def _leaving(self, state: TransitionSource, path: Path) -> Iterator[Finding]:
+        for here, event, transition in self._subject.leaving(path):
+            if isinstance(transition, TimedTransition):
+                yield from self._term(transition.seconds, None, (*here, "seconds"), "number")
+            if transition.guard is not None or transition.passed or transition.effect:
+                # The event before a connector is unknown at validation.
+                attributes = None
+                if isinstance(state, State) and event in state.on:
+                    attributes = attributes_of(self._subject, event, state)
+                scope = None if attributes is None else {**self._own, **read_as("event.", attributes)}
+                yield from self._transition(transition, scope, here)
+
+    def _transition(self, transition: Transition, scope: Types | None, path: Path) -> Iterator[Finding]:
+        if transition.guard is not None:
+            yield from self._condition(transition.guard, scope, (*path, "when"))
+        if transition.passed:
+            contents = self._subject.contents(transition.target)
+            yield from self._given(transition.passed, scope, (*path, "pass"), contents)
+        yield from self._actions(transition.effect, scope, path)
+
+    def _actions(
+        self, block: Iterable[actions.Internal | actions.ExternalAction], scope: Types | None, path: Path,
+        *, numbered: bool = False,
+    ) -> Iterator[Finding]:  # fmt: skip
+        for position, action in enumerate(block):
+            yield from self._action(action, scope, (*path, position) if numbered else path)
+
+    def _action(  # noqa: C901, PLR0912  # a table by kind
+        self, action: actions.Internal | actions.ExternalAction, scope: Types | None, path: Path
+    ) -> Iterator[Finding]:
+        match action:
+            case actions.Tell(tell=effect):
+                yield from self._effect(effect, scope, (*path, "tell"))
+            case actions.Assign(assign=values):
+                for name in values:
+                    yield from self._variable(name, (*path, "assign", name))
+                yield from self._terms(values, scope, (*path, "assign"), self._assigned)
+            case actions.Emit(emit=event, arguments=values):
+                yield from self._terms(values, scope, (*path, "with"), self._plot.emits.get(event) or _ANY)
+                later = {"delay": action.delay, "id": action.id}
+                yield from self._terms({key: term for key, term in later.items() if term is not None}, scope, path)
+                if action.into is not None:
+                    yield from self._variable(action.into, (*path, "into"))
+            case actions.Withdraw(withdraw=sent):
+                yield from self._term(sent, scope, (*path, "withdraw"))
+            case actions.Log(log=parts):
+                for part in parts:
+                    yield from self._term(part, scope, (*path, "log"))
+            case actions.Choose(condition=condition, then=then, otherwise=otherwise):
+                yield from self._condition(condition, scope, (*path, "if"))
+                yield from self._actions(then, scope, (*path, "then"))
+                yield from self._actions(otherwise, scope, (*path, "else"))
+            case actions.Block(block=inside):
+                yield from self._actions(inside, scope, (*path, "block"))
+            case actions.Configure(to=value):
+                yield from self._term(value, scope, (*path, "to"))
+            case actions.Send(arguments=values):
+                yield from self._terms(values, scope, (*path, "with"))
+            case actions.Trigger(trigger=skill, arguments=values):
+                signature = self._skills.get(skill)
+                wanted = _ANY if signature is None else signature.parameters
+                yield from self._terms(values, scope, (*path, "with"), wanted)
+                if signature is not None:
+                    yield from self._skill_arguments(signature, action, path)
+
+    def _skill_arguments(self, signature: SkillSignature, action: actions.Trigger, path: Path) -> Iterator[Finding]:
+        try:
+            check_arguments(signature, action.arguments)
+        except InputError as error:
+            here = (*path, "with", error.found) if error.found else (*path, "trigger")
+            yield self._subject.caught(error, here, "skill arguments")
+
+    def _variable(self, name: str, path: Path) -> Iterator[Finding]:
+        if name not in self._assigned:
+            message = f"there is no variable '{name}'"
+            yield self._subject.finding(path, "declared variable", message, found=name, valid=self._assigned)
+
+    # -- rules and handlers ------------------------------------------------------------------------------
 
     def _rule(self, rule: Rule, path: Path) -> Iterator[Finding]:
         scope = self._rules.of(rule)
@@ -95,227 +210,147 @@ class _Data:
         if rule.when is not None:
             yield from self._condition(rule.when, scope, (*path, "when"))
         yield from self._reaction(rule.do, scope, (*path, "do"))
-        yield from self._only(rule.do.passed, scope, (*path, "do", "pass"))
+        if rule.do.passed:
+            entered = entered_by(rule, self._plot, self._library)
+            yield from self._given(rule.do.passed, scope, (*path, "do", "pass"), entered)
         if rule.on is not None and rule.then == CONTINUE:
-            yield from self._continued(rule, scope, (*path, "do", "then"))
+            yield from self._continued(rule, {**self._own, **scope}, (*path, "do", "then"))
 
     def _handler(self, handler: Handler, path: Path) -> Iterator[Finding]:
         yield from self._rules.check(handler, path)
         attributes = self._rules.attributes(handler)
-        read = frozenset(mentioned(handler.do.tell)) if handler.do.tell is not None else frozenset()
-        for part in (handler.when, *handler.do.arguments.values()):
-            read |= frozenset() if part is None else free_variables(part)
-        unknown = {name: None for name in read if name.startswith("event.")} if attributes is None else attributes
-        scope = {**self._types, **unknown}
+        scope = None if attributes is None else {**self._own, **attributes}
         if handler.when is not None:
             yield from self._condition(handler.when, scope, (*path, "when"))
         yield from self._reaction(handler.do, scope, (*path, "do"))
         if handler.listen is not None:
-            yield from self._external(handler.listen, (*path, "listen"))
+            yield from self._action(handler.listen, None, (*path, "listen"))
 
-    def _reaction(self, do: Reaction, scope: Types, path: Path) -> Iterator[Finding]:
+    def _reaction(self, do: Reaction, scope: Types | None, path: Path) -> Iterator[Finding]:
         if do.tell is not None:
             yield from self._effect(do.tell, scope, (*path, "tell"))
-        yield from self._only(do.arguments, scope, (*path, "with"))
+        contents = [] if do.use is None else [self._library.plot(do.use)]
+        yield from self._given(do.arguments, scope, (*path, "with"), contents)
         for position, command in enumerate(do.command):
-            yield from self._only(terms_of(command), scope, (*path, "command", position))
+            yield from self._terms(terms_of(command), scope, (*path, "command", position))
 
-    def _continued(self, rule: Rule, event: Types, path: Path) -> Iterator[Finding]:
+    def _continued(self, rule: Rule, scope: Types, path: Path) -> Iterator[Finding]:
         """Check a `continue` response: the rule's event lacks the outputs that `done` would provide."""
         for name, state, outcomes in self._handing_back:
             if rule.on in outcomes and concerns(rule, name, state, self._library):
                 for transition in state.on.get(DONE, ()):
-                    yield from self._transition(transition, event, path)
+                    yield from self._transition(transition, scope, path)
 
     @cached_property
     def _handing_back(self) -> list[tuple[str, Step, Outcomes]]:
         """Return the states with outputs at `done`, with their outcomes."""
-        states = ((name, state) for name, state, _ in self._nesting.states if isinstance(state, Step))
-        return [(n, s, answerable(s, self._library)) for n, s in states if outputs_of(s, self._library)]
-
-    # -- parts of a plot ---------------------------------------------------------------------------------
-
-    def _declarations(self) -> Iterator[Finding]:
-        if self._schema is None:
-            return
-        valid = FREE_TYPES | set(self._schema.types)
-        declared: dict[str, Mapping[str, PlotParameter | PlotVariable]] = {
-            "parameters": self._plot.parameters, "variables": self._plot.variables, "outputs": self._plot.outputs,
-        }  # fmt: skip
-        for kind, declarations in declared.items():
-            for name, declaration in declarations.items():
-                if declaration.type not in valid:
-                    error = UnknownNameError(
-                        f"there is no type '{declaration.type}'",
-                        place=self._plot.place((kind, name)), found=declaration.type, valid=valid,
-                    )  # fmt: skip
-                    yield Finding(error, "known type")
-
-    def _state(self, state: State, path: Path) -> Iterator[Finding]:
-        for key, actions in state.blocks():
-            for position, action in enumerate(actions):
-                if isinstance(action, Internal):
-                    yield from self._internal((action,), None, (*path, key, position))
-                else:
-                    yield from self._external(action, (*path, key, position))
-        for inside, event, transition in self._nesting.leaving(path):
-            if transition.guard is not None or transition.passed or transition.effect:
-                attributes = self._event_types(state, event) if event in state.on else None
-                yield from self._transition(transition, attributes, (*path, *inside))
-            if isinstance(transition, TimedTransition):
-                yield from self._terms([("seconds", transition.seconds)], None, (*path, *inside))
-        if state.at_least is not None:
-            yield from self._terms([("at_least", state.at_least)], None, path)
-        if isinstance(state, SubmachineState | DynamicState):
-            yield from self._terms(state.arguments.items(), None, (*path, "with"))
-        if isinstance(state, DynamicState) and state.goal is not None:
-            yield from self._condition(state.goal, self._types, (*path, "goal"))
-
-    def _connector(self, connector: Connector, path: Path) -> Iterator[Finding]:
-        # The event before a connector is unknown at validation.
-        if isinstance(connector, SelectState):
-            yield from self._terms([("select", connector.select)], None, path)
-        for inside, _, transition in self._nesting.leaving(path):
-            yield from self._transition(transition, None, (*path, *inside))
-
-    def _transition(self, transition: Transition, attributes: Types | None, path: Path) -> Iterator[Finding]:
-        if transition.guard is not None:
-            scope = self._scope(attributes, transition.guard)
-            yield from self._condition(transition.guard, scope, (*path, "when"))
-        yield from self._terms(transition.passed.items(), attributes, (*path, "pass"))
-        yield from self._internal(transition.effect, attributes, path)
-
-    def _internal(self, actions: Iterable[Internal], attributes: Types | None, path: Path) -> Iterator[Finding]:
-        for action in actions:
-            if isinstance(action, Tell):
-                yield from self._effect(action.tell, self._scope(attributes, action.tell), (*path, "tell"))
-            elif isinstance(action, Assign):
-                yield from self._assign(action, (*path, "assign"))
-                yield from self._terms(action.assign.items(), attributes, (*path, "assign"))
-            elif isinstance(action, Emit):
-                yield from self._terms(action.arguments.items(), attributes, (*path, "with"))
-                later = [("delay", action.delay), ("id", action.id)]
-                yield from self._terms([(key, term) for key, term in later if term is not None], attributes, path)
-                if action.into is not None:
-                    yield from self._known_variable(action.into, (*path, "into"))
-            elif isinstance(action, Withdraw):
-                yield from self._terms([("withdraw", action.withdraw)], attributes, path)
-            elif isinstance(action, Log):
-                yield from self._terms([("log", part) for part in action.log], attributes, path)
-            elif isinstance(action, Choose):
-                scope = self._scope(attributes, action.condition)
-                yield from self._condition(action.condition, scope, (*path, "if"))
-                yield from self._internal(action.then, attributes, (*path, "then"))
-                yield from self._internal(action.otherwise, attributes, (*path, "else"))
-            elif isinstance(action, Block):
-                yield from self._internal(action.block, attributes, (*path, "block"))
-
-    def _assign(self, action: Assign, path: Path) -> Iterator[Finding]:
-        for name in action.assign:
-            yield from self._known_variable(name, (*path, name))
-
-    def _known_variable(self, name: str, path: Path) -> Iterator[Finding]:
-        if name not in self._assigned:
-            error = UnknownNameError(
-                f"there is no variable '{name}'", place=self._plot.place(path), found=name, valid=self._assigned
-            )
-            yield Finding(error, "declared variable")
-
-    def _external(self, action: ExternalAction, path: Path) -> Iterator[Finding]:
-        if isinstance(action, Switch):
-            return
-        if isinstance(action, Send):
-            yield from self._terms(action.arguments.items(), None, (*path, "with"))
-            return
-        if not isinstance(action, Trigger):
-            yield from self._terms([("to", action.to)], None, path)
-            return
-        yield from self._terms(action.arguments.items(), None, (*path, "with"))
-        signature = None if self._skills is None else self._skills.get(action.trigger)
-        if signature is not None:
-            yield from self._skill_arguments(signature, action, path)
-
-    def _skill_arguments(self, signature: SkillSignature, action: Trigger, path: Path) -> Iterator[Finding]:
-        try:
-            check_arguments(signature, action.arguments)
-        except InputError as error:
-            here = (*path, "with", error.found) if error.found else (*path, "trigger")
-            yield Finding(_at(error, self._plot, here), "skill arguments")
+        steps = [(name, state) for name, state, _ in self._subject.steps if outputs_of(state, self._library)]
+        return [(name, state, answerable(state, self._library)) for name, state in steps]
 
     # -- the language ------------------------------------------------------------------------------------
 
-    def _condition(self, condition: Expression, scope: Types, path: Path) -> Iterator[Finding]:
+    def _condition(self, condition: Expression, scope: Types | None, path: Path) -> Iterator[Finding]:
         for name in asked_states(condition):
-            if name not in self._nesting.names:
-                error = UnknownNameError(
-                    f"there is no state '{name}'", place=self._plot.place(path),
-                    found=name, valid=self._nesting.names,
-                )  # fmt: skip
-                yield Finding(error, "condition")
-        if self._plot.dialect == "scxml":
+            if name not in self._subject.names:
+                message, valid = f"there is no state '{name}'", self._subject.names
+                yield self._subject.finding(path, "condition", message, found=name, valid=valid)
+        names = self._scope(scope, condition)
+        if not self._subject.strict:
             condition = settle(condition, lambda _: True)
-        if self._schema is not None:
-            try:
-                check(condition, self._schema, scope)
-            except InputError as error:
-                yield Finding(_at(error, self._plot, path), "condition")
+        if self._schema is None:
+            yield from self._unbound(free_variables(condition), names, path, "condition")
             return
-        for name in sorted(free_variables(condition) - scope.keys()):
-            yield Finding(_at(unbound_error(name, None, scope), self._plot, path), "condition")
-
-    def _effect(self, effect: Effect, scope: Types, path: Path) -> Iterator[Finding]:
-        if self._schema is not None:
-            try:
-                check_effect(effect, self._schema, scope)
-            except InputError as error:
-                yield Finding(_at(error, self._plot, path), "effect")
-            return
-        for name in sorted(mentioned(effect) - scope.keys()):
-            yield Finding(_at(unbound_error(name, None, scope), self._plot, path), "effect")
-
-    def _terms(self, terms: Iterable[tuple[str, Term]], attributes: Types | None, path: Path) -> Iterator[Finding]:
-        for key, term in terms:
-            yield from self._only({key: term}, self._scope(attributes, term), path)
-
-    def _only(self, terms: Mapping[str, Term], scope: Types, path: Path) -> Iterator[Finding]:
-        for key, term in terms.items():
-            unknown = sorted(free_variables(term) - set(scope))
-            if not unknown and self._schema is not None and self._plot.dialect == "dsc":
-                yield from self._term(term, scope, (*path, key))
-            for name in unknown:
-                error = UnknownNameError(
-                    f"there is no variable '?{name}' here", place=self._plot.place((*path, key)),
-                    found=name, valid=scope,
-                )  # fmt: skip
-                yield Finding(error, "declared variable")
-
-    def _term(self, term: Term, scope: Types, path: Path) -> Iterator[Finding]:
         try:
-            check_term(term, self._schema or Schema(), scope)
+            check(condition, self._schema, self._known(names))
         except InputError as error:
-            yield Finding(_at(error, self._plot, path), "term")
+            yield self._subject.caught(error, path, "condition")
 
-    def _scope(self, attributes: Types | None, used: Expression | Term | Effect | None) -> dict[str, str | None]:
-        """Return the visible variables; for an unknown event, all of its attributes that the expression uses."""
-        if attributes is not None:
-            return {**self._types, **attributes}
-        names = mentioned(used) if used is not None else frozenset()
-        return {**self._types, **{name: None for name in names if name.startswith("event.")}}
+    def _effect(self, effect: Effect, scope: Types | None, path: Path) -> Iterator[Finding]:
+        names = self._scope(scope, effect)
+        if self._schema is None:
+            yield from self._unbound(mentioned(effect), names, path, "effect")
+            return
+        try:
+            check_effect(effect, self._schema, self._known(names))
+        except InputError as error:
+            yield self._subject.caught(error, path, "effect")
 
-    def _event_types(self, state: State, event: str) -> Types | None:
-        """Return an event's attribute types as `event.name`; `None` if they are unknown."""
-        found = attributes_of(event, state, self._plot, self._library, self._skills)
-        if found is None:
-            return None
-        return {f"event.{name}": self._type(kind) if kind else None for name, kind in found.items()}
+    def _unbound(self, read: Iterable[str], names: Types, path: Path, rule: str) -> Iterator[Finding]:
+        for name in sorted(set(read) - names.keys()):
+            yield self._subject.caught(unbound_error(name, None, names), path, rule)
 
-    def _type(self, name: str) -> str | None:
-        if name in {"number", "text", "boolean"}:
-            return name
-        return name if self._schema is not None and name in self._schema.types else None
+    def _given(
+        self, terms: Mapping[str, Term], scope: Types | None, path: Path, used: Iterable[ActionPlot]
+    ) -> Iterator[Finding]:
+        """Check the arguments for a plot, or for several candidates."""
+        wanted = [_types(plot) for plot in used]
+        for name, term in terms.items():
+            kinds = dict.fromkeys(types[name] for types in wanted if name in types)
+            yield from self._term(term, scope, (*path, name), *kinds)
+
+    def _terms(
+        self, terms: Mapping[str, Term], scope: Types | None, path: Path, wanted: Types = _ANY
+    ) -> Iterator[Finding]:
+        for key, term in terms.items():
+            yield from self._term(term, scope, (*path, key), wanted.get(key))
+
+    def _term(self, term: Term, scope: Types | None, path: Path, *wanted: str | None) -> Iterator[Finding]:
+        names = self._scope(scope, term)
+        unknown = sorted(free_variables(term) - names.keys())
+        for name in unknown:
+            message = f"there is no variable '?{name}' here"
+            yield self._subject.finding(path, "declared variable", message, found=name, valid=names)
+        if not unknown and self._schema is not None and self._subject.strict:
+            try:
+                check_term(term, self._schema, self._known(names))
+            except InputError as error:
+                yield self._subject.caught(error, path, "term")
+        for kind in wanted:
+            yield from self._fits(term, kind, names, path)
+
+    def _scope(self, scope: Types | None, used: Expression | Term | Effect) -> Types:
+        """Return the scope; for an unknown event, the plot's own names and all attributes that are read."""
+        if scope is not None:
+            return scope
+        attributes = [name for name in mentioned(used) if name.startswith("event.")]
+        return {**self._own, **dict.fromkeys(attributes)} if attributes else self._own
+
+    def _known(self, scope: Types) -> dict[str, str | None]:
+        """Return the scope with the types that the schema knows; the language has no other types."""
+        return {name: kind if kind in self._typed else None for name, kind in scope.items()}
+
+    # -- types -------------------------------------------------------------------------------------------
+
+    def _fits(
+        self, term: Term | None, wanted: str | None, scope: Types, path: Path, what: str | None = None
+    ) -> Iterator[Finding]:
+        """Require a value of a fitting type; SCXML's data have no types."""
+        given = None if term is None or wanted is None or not self._subject.strict else self._kind(term, scope)
+        if term is not None and wanted is not None and given is not None and not self._compatible(given, wanted):
+            message = f"'{what or path[-1]}' is of type {wanted}, and {to_text(term)} is of type {given}"
+            yield self._subject.finding(path, "value fits", message, found=to_text(term))
+
+    def _kind(self, term: Term, scope: Types) -> str | None:
+        """Return the type of a term's value, or `None` if it is unknown."""
+        match term:
+            case Variable(name):
+                return scope.get(name)
+            case Constant(bool()):
+                return "boolean"
+            case Constant(str() as name):
+                return "text" if self._schema is None else self._schema.constants.get(name, "text")
+            case _:
+                return "number"
+
+    def _compatible(self, given: str, wanted: str) -> bool:
+        schema = self._schema
+        if _VALUES & {given, wanted}:  # a misspelt type excludes no value
+            known = schema is None or {given, wanted} <= FREE_TYPES | schema.types.keys()
+            return given == wanted or not known
+        if schema is None or not {given, wanted} <= schema.types.keys():
+            return True  # a word may name an object, a plot or a condition
+        return schema.is_a(given, wanted) or schema.is_a(wanted, given)
 
 
-def _at(error: InputError, plot: ActionPlot, path: Path) -> InputError:
-    """Return the error at the place of its text; its own place is relative to that text."""
-    error.place = plot.place(path) or error.place
-    return error
+def _types(plot: ActionPlot) -> dict[str, str]:
+    return {name: parameter.type for name, parameter in plot.parameters.items()}

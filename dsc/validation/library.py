@@ -9,19 +9,20 @@ from dsc.dynamic.library import Library
 from dsc.errors import Finding, PlotError
 from dsc.model.plot import ActionPlot
 from dsc.skills import SkillSignature
-from dsc.validation.arguments import check_arguments, check_outputs, check_parameters
+from dsc.validation.arguments import check_arguments, check_components, check_outputs, check_parameters
 from dsc.validation.data import check_data
-from dsc.validation.deployment import Components, check_components
 from dsc.validation.flow import check_wiring
-from dsc.validation.kinds import check_kinds
-from dsc.validation.nesting import Nesting
 from dsc.validation.reach import check_reach
 from dsc.validation.shape import check_size, check_structure
+from dsc.validation.subject import Components, Subject
 from knowledge_base.language.checking.inputs import require, require_several
 from knowledge_base.world.schema import Schema
 
 MAX_FINDINGS = 50
 """Upper bound for one plot; authors read no more, and each finding takes a search for the nearest name."""
+_CHECKS = (
+    check_reach, check_wiring, check_arguments, check_parameters, check_outputs, check_data, check_components,
+)  # fmt: skip
 
 
 def validate_library(
@@ -59,22 +60,12 @@ def validate_plot(
     require(plot, ActionPlot, "a plot is an ActionPlot, as load_plot and parse_plot give it")
     _require_parts(library, schema)
     signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in _known(skills)}
-    nesting = Nesting(plot)
+    subject = Subject(plot, library, schema, signatures, components)
     for check in (check_structure, check_size):
-        findings = list(islice(check(plot, library, nesting), MAX_FINDINGS))
+        findings = list(islice(check(subject), MAX_FINDINGS))
         if findings:  # later checks would repeat these findings in other words, or take too long
             return findings
-    checks = [
-        check_reach(plot, library, nesting),
-        check_wiring(plot, library, signatures, nesting),
-        check_arguments(plot, library, nesting),
-        check_parameters(plot, library, nesting),
-        check_outputs(plot),
-        check_data(plot, library, schema, signatures, nesting),
-        check_kinds(plot, library, schema, signatures, nesting),
-        check_components(plot, components) if components is not None else (),
-    ]
-    return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
+    return list(islice(chain.from_iterable(check(subject) for check in _CHECKS), MAX_FINDINGS))
 
 
 def _require_parts(library: object, schema: object) -> None:

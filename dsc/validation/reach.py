@@ -1,103 +1,113 @@
-"""Reach of a plot: every state is entered from the first one, and connectors always lead to a state."""
+"""Reach of a plot: states are entered and completed, connectors lead to a state, plots do not use each other."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Step, concerns
 from dsc.errors import Finding
+from dsc.events import DONE
+from dsc.model.actions import Trigger
 from dsc.model.plot import ActionPlot, Path, Scope, initial_of
 from dsc.model.rules import ENTER
-from dsc.model.states import AnyState, CompositeState, DynamicState, OrthogonalState, SubmachineState
-from dsc.model.transitions import Connector
-from dsc.validation.nesting import Nesting
-from knowledge_base.errors import InputError, SchemaError
+from dsc.model.states import (
+    AnyState,
+    CompositeState,
+    DynamicState,
+    FinalState,
+    OrthogonalState,
+    State,
+    SubmachineState,
+)
+from dsc.model.transitions import Connector, TransitionSource
+from dsc.validation.subject import Subject
+from knowledge_base.errors import InputError
 
 
-def check_connectors(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
+def check_connectors(subject: Subject) -> Iterator[Finding]:
     """Yield findings about choices and selections."""
-    connectors = {name: path for name, state, path in nesting.states if isinstance(state, Connector)}
-    circle = circle_of({name: _targets(nesting, path) for name, path in connectors.items()})
+    connectors = {name: path for name, state, path in subject.states if isinstance(state, Connector)}
+    circle = circle_of({
+        name: [target for _, _, way in subject.leaving(path) for target in way.targets]
+        for name, path in connectors.items()
+    })  # fmt: skip
     for name, path in connectors.items():
-        yield from _branches(plot, name, path, nesting)
+        yield from _branches(subject, name, path)
         if name in circle:
-            error = SchemaError(f"connectors lead from '{name}' back to it", place=plot.place(path), found=name)
-            yield Finding(error, "connectors lead on", "let one of them lead to a state, where a run can rest")
+            message = f"connectors lead from '{name}' back to it"
+            fix = "let one of them lead to a state, where a run can rest"
+            yield subject.finding(path, "connectors lead on", message, fix, found=name)
 
 
-def _branches(plot: ActionPlot, name: str, path: Path, nesting: Nesting) -> Iterator[Finding]:
-    *earlier, last = nesting.leaving(path)
-    if last[2].guard is not None:
-        place = plot.place((*path, *last[0]))
-        error = SchemaError(f"'{name}' may lead nowhere: its last branch has a `when`", place=place)
-        yield Finding(error, "choice", "end with a branch without `when`")
-    for inside, _, transition in earlier:
+def _branches(subject: Subject, name: str, path: Path) -> Iterator[Finding]:
+    *earlier, (last_path, _, last) = subject.leaving(path)
+    if last.guard is not None:
+        message = f"'{name}' may lead nowhere: its last branch has a `when`"
+        yield subject.finding(last_path, "choice", message, "end with a branch without `when`")
+    for here, _, transition in earlier:
         if transition.guard is None:
-            error = SchemaError(
-                f"this branch of '{name}' has no `when`, so later branches are never reached",
-                place=plot.place((*path, *inside)),
-            )
-            yield Finding(error, "choice", "give it a `when`, or put it last")
+            message = f"this branch of '{name}' has no `when`, so later branches are never reached"
+            yield subject.finding(here, "choice", message, "give it a `when`, or put it last")
             return
 
 
-def _targets(nesting: Nesting, path: Path) -> list[str]:
-    return [target for _, _, transition in nesting.leaving(path) for target in transition.targets]
-
-
-def circle_of(ways: Mapping[str, list[str]]) -> frozenset[str]:
-    """Return the connectors of one cycle, or nothing; a second cycle is found after the repair of the first.
+def circle_of(ways: Mapping[str, Iterable[str]]) -> list[str]:
+    """Return a cycle, with its first node at its end again, or nothing; its repair uncovers a second one.
 
     Args:
-        ways: connector -> its targets.
+        ways: node -> its targets.
     """
     try:
         TopologicalSorter(ways).prepare()
     except CycleError as error:
-        return frozenset(error.args[1])
-    return frozenset()
+        circle: list[str] = error.args[1]
+        return circle[::-1]  # it follows the ways backwards
+    return []
 
 
-def check_reach(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
+def check_reach(subject: Subject) -> Iterator[Finding]:
     """Yield findings about unreachable states, empty dynamic states, and plots that use each other in a cycle.
 
     Connectors count as states. SCXML does not require that all states can be reached. A generated plot always has all
     its final states.
     """
-    holders = [(state, path) for _, state, path in nesting.states if isinstance(state, Step)]
-    yield from _circle(plot, _used(holders), library)
-    yield from _empty_choices(plot, holders)
-    if plot.dialect == "dsc" and not plot.generated:
-        yield from _unreached(plot, library, nesting)
+    yield from _circle(subject)
+    for name, state, path in subject.steps:
+        if isinstance(state, DynamicState) and not state.dynamic and state.goal is None:
+            message = f"the dynamic state '{name}' has nothing to choose from"
+            fix = "name candidates, or a `goal`"
+            yield subject.finding((*path, "dynamic"), "something to choose", message, fix)
+    if subject.strict and not subject.plot.generated:
+        yield from _unreached(subject)
 
 
-def _unreached(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
+def _unreached(subject: Subject) -> Iterator[Finding]:
     try:
-        expanded = library.expanded(plot)
+        expanded = subject.library.expanded(subject.plot)
     except InputError:  # rules that cannot be applied have a separate finding
         return
-    ways = nesting if expanded is plot else Nesting(expanded)
-    responses = {rule.then for rule in plot.rules}  # the steps of plans may have outcomes that no state here has
+    ways = subject if expanded is subject.plot else Subject(expanded, subject.library)
+    responses = {rule.then for rule in subject.plot.rules}  # steps of plans may have outcomes that no state here has
     for name in _unreached_in(expanded, (), ways, responses):
-        if name in nesting.names:
-            yield _nothing_leads_to(name, plot, library, nesting)
+        if name in subject.names:
+            yield _nothing_leads_to(name, subject)
 
 
-def _nothing_leads_to(name: str, plot: ActionPlot, library: Library, nesting: Nesting) -> Finding:
-    state, place = plot.state(name), plot.place(nesting.names[name])
-    replacing = [rule for rule in plot.rules if rule.before and rule.when is None and rule.then != ENTER]
-    for rule in replacing:
-        if isinstance(state, Step) and concerns(rule, name, state, library):
+def _nothing_leads_to(name: str, subject: Subject) -> Finding:
+    state, path = subject.state(name), subject.names[name]
+    for rule in subject.plot.rules:
+        replaces = rule.before and rule.when is None and rule.then != ENTER
+        if replaces and isinstance(state, Step) and concerns(rule, name, state, subject.library):
             message = f"the rule '{rule.label}' always replaces step '{name}', which is never entered"
-            error = SchemaError(message, place=place, found=name)
-            return Finding(error, "reachable", "say with `when` when the rule does so")
-    error = SchemaError(f"nothing leads to the state '{name}'", place=place, found=name)
-    return Finding(error, "reachable", "add a transition to it, or make it `initial`")
+            return subject.finding(path, "reachable", message, "say with `when` when the rule does so", found=name)
+    fix = "add a transition to it, or make it `initial`"
+    return subject.finding(path, "reachable", f"nothing leads to the state '{name}'", fix, found=name)
 
 
-def _unreached_in(scope: Scope, around: Path, ways: Nesting, responses: set[str]) -> Iterator[str]:
+def _unreached_in(scope: Scope, around: Path, ways: Subject, responses: set[str]) -> Iterator[str]:
     """Yield states without a transition to them, but not their inner states; a transition stays in its scope (S0.3)."""
     reached: set[str] = set()
     waiting = [initial_of(scope), *responses]
@@ -106,7 +116,7 @@ def _unreached_in(scope: Scope, around: Path, ways: Nesting, responses: set[str]
         if name not in reached and name in scope.states:
             reached.add(name)
             leaving = ways.leaving((*around, "states", name))
-            waiting += [transition.target for _, _, transition in leaving if transition.target is not None]
+            waiting += [way.target for _, _, way in leaving if way.target is not None]
     for name, state in scope.states.items():
         path = (*around, "states", name)
         if name not in reached:
@@ -118,49 +128,85 @@ def _unreached_in(scope: Scope, around: Path, ways: Nesting, responses: set[str]
                 yield from _unreached_in(region, (*path, "regions", key), ways, responses)
 
 
-def _empty_choices(plot: ActionPlot, holders: list[tuple[Step, Path]]) -> Iterator[Finding]:
-    for state, path in holders:
-        if isinstance(state, DynamicState) and not state.dynamic and state.goal is None:
-            place = plot.place((*path, "dynamic"))
-            error = SchemaError(f"the dynamic state '{path[-1]}' has nothing to choose from", place=place)
-            yield Finding(error, "something to choose", "name candidates, or a `goal`")
-
-
-def _circle(plot: ActionPlot, used: dict[str, Path], library: Library) -> Iterator[Finding]:
+def _circle(subject: Subject) -> Iterator[Finding]:
     """Yield the first cycle of submachine states that this plot leads to, directly or through other plots."""
+    own, used = subject.plot.name, _used(subject.states)
     for name, path in used.items():
-        circle = _found_circle([plot.name, name], library)
+        circle = circle_of({**_uses(name, subject.library), own: used})
         if circle:
-            error = SchemaError(
-                f"plots use each other in a cycle: {' -> '.join(circle)}", place=plot.place((*path, "use")), found=name
-            )
-            yield Finding(error, "no circle", "choose one of them in a dynamic state")
+            start = circle.index(own) if own in circle else 0
+            way = " -> ".join([*circle[start:-1], *circle[: start + 1]])
+            message, fix = f"plots use each other in a cycle: {way}", "choose one of them in a dynamic state"
+            yield subject.finding((*path, "use"), "no circle", message, fix, found=name)
             return
 
 
-def _found_circle(way: list[str], library: Library) -> list[str]:
-    """Search depth first along used plots; `way` is the plots entered so far, the last one not yet searched."""
-    seen = set(way[:-1])
-    open_: list[Iterator[str]] = [iter((way[-1],))]
-    way = way[:-1]
-    while open_:
-        name = next(open_[-1], None)
-        if name is None:
-            open_.pop()
-            way.pop()
-        elif name in way:
-            return [*way[way.index(name) :], name]
-        elif name not in seen and name in library:
-            seen.add(name)
-            way.append(name)
-            open_.append(iter(_used((state, path) for _, state, path in library.plot(name).walk())))
-    return []
+def _uses(name: str, library: Library) -> dict[str, Iterable[str]]:
+    """Return the plots that submachine states of a plot use, directly or through other plots: plot -> used ones."""
+    found: dict[str, Iterable[str]] = {}
+    waiting = [name]
+    while waiting:
+        one = waiting.pop()
+        if one not in found and one in library:
+            found[one] = _used(library.plot(one).walk())
+            waiting += found[one]
+    return found
 
 
-def _used(states: Iterable[tuple[AnyState, Path]]) -> dict[str, Path]:
+def _used(states: Iterable[tuple[str, AnyState, Path]]) -> dict[str, Path]:
     """Return the plots that submachine states name, each with the first state that does."""
     found: dict[str, Path] = {}
-    for state, path in states:
+    for _, state, path in states:
         if isinstance(state, SubmachineState) and not state.use.startswith("?"):
             found.setdefault(state.use, path)
     return found
+
+
+# -- completion ----------------------------------------------------------------------------------------------
+
+
+def check_completion(subject: Subject, wired: Mapping[str, AnyState]) -> Iterator[Finding]:
+    """Yield findings about `done`; `wired` has the states of the expanded plot."""
+    silent = cache(lambda used: _ends_silently(subject.library.plot(used)))  # many states may use one plot
+    for name, state, path in subject.states:
+        if type(state) is State and DONE in state.on and any(isinstance(a, Trigger) for a in state.entry):
+            message = f"state '{name}' has no content, so it is done immediately and would cancel its skill"
+            yield subject.finding((*path, "on", DONE), "done at once", message, "wire the outcome of the skill")
+        after = wired[name]
+        if isinstance(after, State) and DONE not in after.on and _completes(state, silent):
+            message = f"state '{name}' does not handle its completion"
+            yield subject.finding((*path, "on"), "completion is wired", message, "add `done: STATE` under `on`")
+
+
+def _completes(state: AnyState, silent: Callable[[str], bool]) -> bool:
+    match state:
+        case SubmachineState(use=use):
+            return use.startswith("?") or silent(use)
+        case DynamicState(dynamic=candidates, goal=goal):
+            return goal is not None or any(map(silent, candidates))
+        case CompositeState(states=inside):
+            return any(isinstance(inner, FinalState) for inner in inside.values())
+        case _:
+            return isinstance(state, OrthogonalState)
+
+
+def _ends_silently(plot: ActionPlot) -> bool:
+    """Return whether the plot can reach a top-level final state without firing a declared outcome."""
+    states = [state for state in plot.states.values() if isinstance(state, State)]
+    waiting = {initial_of(plot)}.union(*(_silent_ways(plot, state) for state in states))
+    seen: set[str] = set()
+    while waiting:  # follow connectors along transitions without an outcome
+        name = waiting.pop()
+        seen.add(name)
+        reached = plot.states.get(name)
+        if isinstance(reached, FinalState) and reached.emit is None:
+            return True
+        if isinstance(reached, Connector):
+            waiting |= _silent_ways(plot, reached) - seen
+    return False
+
+
+def _silent_ways(plot: ActionPlot, source: TransitionSource) -> set[str]:
+    """Return the targets of transitions that fire no declared outcome."""
+    silent = (one for _, one in source.transitions() if not set(one.emitted) & set(plot.emits))
+    return {transition.target for transition in silent if transition.target is not None}

@@ -6,14 +6,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, combinations, groupby, islice
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.steps import Step, answerable, concerns
+from dsc.dynamic.steps import answerable, concerns
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import CONTINUE, ENTER, REPLAN, RETRY, Handler, Rule
 from dsc.model.states import CompositeState, DynamicState, State
-from dsc.model.transitions import Connector
 from dsc.validation.library import MAX_FINDINGS
-from dsc.validation.nesting import Nesting
+from dsc.validation.subject import Subject
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.checking.contradiction import contradictory, implied, subjects
 from knowledge_base.language.syntax.expression import (
@@ -30,33 +29,33 @@ from knowledge_base.language.syntax.expression import (
     substitute,
 )
 
-MOST_OVERLAPPING = 32
-"""Upper bound of compared candidates; states with more are skipped."""
+MOST = 32
+"""Upper bound of conditions compared together: states with more candidates are skipped, later guards checked alone."""
 Conditions = Mapping[str, Expression]
 """Candidates in their order, with their conditions over their common parameters."""
 
 
-def review_candidates(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
+_LEFT_OUT = "leave it out, or say when it is meant"
+
+
+def _candidates(subject: Subject) -> Iterator[Finding]:
     """Yield warnings about the candidates of dynamic states, and about those for the steps of plans."""
-    planned = False
-    for name, state, path in nesting.states:
-        if not isinstance(state, DynamicState):
+    for name, state, path in subject.steps:
+        if not isinstance(state, DynamicState) or len(state.dynamic) > MOST:
             continue
-        planned = planned or state.goal is not None
-        conditions = {one: _condition(library.plot(one), state.arguments) for one in state.dynamic}
-        if len(conditions) > MOST_OVERLAPPING:
-            continue
+        conditions = {one: _condition(subject.library.plot(one), state.arguments) for one in state.dynamic}
         for message in (*_never_chosen(conditions), *_overlapping(conditions)):
-            error = SchemaError(f"state '{name}': {message}", place=plot.place((*path, "dynamic")))
-            yield Finding(error, "candidates", "make their conditions exclude each other", "warning")
+            yield _unclear(subject, name, path, message, "make their conditions exclude each other")
         if state.goal is None and _leave_a_gap(conditions):
-            error = SchemaError(f"state '{name}': {_GAP}", place=plot.place((*path, "dynamic")))
-            yield Finding(error, "candidates", "widen one of them, or add a last one without `when`", "warning")
-    if planned:
-        yield from _for_steps(library)
+            message = "the conditions of its candidates leave a gap, where none of them fits"
+            yield _unclear(subject, name, path, message, "widen one of them, or add a last one without `when`")
+    if subject.planned:
+        yield from _for_steps(subject.library)
 
 
-_GAP = "the conditions of its candidates leave a gap, where none of them fits"
+def _unclear(subject: Subject, name: str, path: Path, message: str, fix: str) -> Finding:
+    here, message = (*path, "dynamic"), f"state '{name}': {message}"
+    return subject.finding(here, "candidates", message, fix, level="warning")
 
 
 def _for_steps(library: Library) -> Iterator[Finding]:
@@ -64,7 +63,7 @@ def _for_steps(library: Library) -> Iterator[Finding]:
     for action in dict.fromkeys(plot.implements for plot in library if plot.implements):
         plots = library.implementing(action)
         conditions = {plot.name: _condition(plot, plot.parameters) for plot in plots}
-        if len(plots) <= MOST_OVERLAPPING and _leave_a_gap(conditions):
+        if len(plots) <= MOST and _leave_a_gap(conditions):
             message = f"the plots for '{action}' leave a gap, where none of them fits: {', '.join(conditions)}"
             error = SchemaError(message, place=plots[-1].place(("when",)))
             yield Finding(error, "candidates", "widen one of them, or add one without `when`", "warning")
@@ -127,51 +126,42 @@ def _comparisons(parts: Iterable[Expression | Term]) -> Iterator[Comparison]:
             yield from _comparisons(parts_of(part))
 
 
-MOST = 32
-"""Upper bound of conditions compared together; later ones are only checked alone."""
-
-
 def review_plot(plot: ActionPlot, library: Library) -> list[Finding]:
     """Return warnings about a plot that passes `validate_plot`, at most `MAX_FINDINGS`."""
     if plot.dialect != "dsc":
         return []
-    nesting = Nesting(plot)
-    checks = [
-        _rules(plot, library, nesting), _handlers(plot, nesting), _transitions(plot, nesting),
-        review_candidates(plot, library, nesting),
-    ]  # fmt: skip
+    subject = Subject(plot, library)
+    checks = (_rules(subject), _handlers(subject), _transitions(subject), _candidates(subject))
     return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
 
 
-def _rules(plot: ActionPlot, library: Library, nesting: Nesting) -> Iterator[Finding]:
-    steps = {name: state for name, state, _ in nesting.states if isinstance(state, Step)}
-    planned = any(isinstance(state, DynamicState) and state.goal is not None for state in steps.values())
-    for number, rule in enumerate(plot.rules):
-        earlier = [one for one in plot.rules[:number] if _comes_before(one, rule)]
+def _rules(subject: Subject) -> Iterator[Finding]:
+    for number, rule in enumerate(subject.plot.rules):
+        earlier = [one for one in subject.plot.rules[:number] if _comes_before(one, rule)]
         why = _never(rule.when, [one.when for one in earlier])
-        if why is None and rule.on is not None and not planned and _settled(rule, rule.on, steps, library):
+        if why is None and rule.on is not None and not subject.planned and _settled(subject, rule, rule.on):
             why = f"every state that can end with '{rule.on}' answers it itself"
         if why is not None:
-            why += _listed(earlier)
-            yield _warning(plot, ("rules", number), f"the rule '{rule.label}' can never answer: {why}", "rules")
+            message = f"the rule '{rule.label}' can never answer: {why}{_listed(earlier)}"
+            yield subject.finding(("rules", number), "rules", message, _LEFT_OUT, level="warning")
 
 
-def _handlers(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
+def _handlers(subject: Subject) -> Iterator[Finding]:
     """Check interrupting handlers and parallel ones separately, because they do not affect each other."""
-    for number, handler in enumerate(plot.handlers):
-        same = (one for one in plot.handlers[:number] if one.on == handler.on)
+    for number, handler in enumerate(subject.plot.handlers):
+        same = (one for one in subject.plot.handlers[:number] if one.on == handler.on)
         earlier = [one for one in same if one.interrupt == handler.interrupt]
         why = _never(handler.when, [one.when for one in earlier])
-        if why is None and handler.interrupt and handler.listen is None and _all_answer(handler.on, nesting):
+        if why is None and handler.interrupt and handler.listen is None and _all_answer(handler.on, subject):
             why = f"every state answers '{handler.on}' itself"
         if why is not None:
             message = f"the '{handler.label}' can never answer: {why}{_listed(earlier)}"
-            yield _warning(plot, ("handlers", number), message, "handlers")
+            yield subject.finding(("handlers", number), "handlers", message, _LEFT_OUT, level="warning")
 
 
-def _all_answer(event: str, nesting: Nesting) -> bool:
+def _all_answer(event: str, subject: Subject) -> bool:
     """Return whether each interruptible state takes the event under all conditions."""
-    resting = [state for _, state, _ in nesting.states if isinstance(state, State)]
+    resting = [state for _, state, _ in subject.states if isinstance(state, State)]
     own = [state for state in resting if not isinstance(state, CompositeState)]
     return all(any(way.guard is None for way in state.on.get(event, ())) for state in own)
 
@@ -191,26 +181,24 @@ def _comes_before(earlier: Rule, later: Rule) -> bool:
     return not (bounded or goes_on)
 
 
-def _settled(rule: Rule, event: str, steps: dict[str, Step], library: Library) -> bool:
+def _settled(subject: Subject, rule: Rule, event: str) -> bool:
     """Return whether the states of a rule already handle its event."""
-    mine = [state for name, state in steps.items() if concerns(rule, name, state, library)]
-    able = [state for state in mine if event in answerable(state, library)]
+    mine = [state for name, state, _ in subject.steps if concerns(rule, name, state, subject.library)]
+    able = [state for state in mine if event in answerable(state, subject.library)]
     return bool(able) and all(any(way.guard is None for way in state.on.get(event, ())) for state in able)
 
 
-def _transitions(plot: ActionPlot, nesting: Nesting) -> Iterator[Finding]:
-    for name, state, path in nesting.states:
-        if not isinstance(state, State | Connector):
-            continue
-        ways = [one for one in nesting.leaving(path) if one[0][0] in {"on", "always", "choice"}]
-        for (key, trigger), group in groupby(ways, key=lambda one: (one[0][0], one[1])):
+def _transitions(subject: Subject) -> Iterator[Finding]:
+    for name, _, path in subject.states:
+        ways = [one for one in subject.leaving(path) if one[0][len(path)] in {"on", "always", "choice"}]
+        for _, group in groupby(ways, key=lambda one: one[0][:-1]):
             guards: list[Expression | None] = []
-            for inside, _, way in group:
+            for here, trigger, way in group:
                 why = _never(way.guard, guards)
                 if why is not None:
-                    which = f"transition on '{trigger}'" if key == "on" else "transition"
+                    which = f"transition on '{trigger}'" if here[len(path)] == "on" else "transition"
                     message = f"this {which} out of '{name}' is never taken: {why}"
-                    yield _warning(plot, (*path, *inside), message, "transitions")
+                    yield subject.finding(here, "transitions", message, _LEFT_OUT, level="warning")
                 guards.append(way.guard)
 
 
@@ -222,8 +210,3 @@ def _never(condition: Expression | None, earlier: Sequence[Expression | None]) -
     if None in earlier or (0 < len(others) <= MOST and contradictory(condition or TRUE, *others)):
         return "whenever its condition holds, one before it does"
     return None
-
-
-def _warning(plot: ActionPlot, path: Path, message: str, rule: str) -> Finding:
-    error = SchemaError(message, place=plot.place(path))
-    return Finding(error, rule, "leave it out, or say when it is meant", "warning")
