@@ -31,7 +31,7 @@ from knowledge_base.language.syntax.text import parse_condition as parse_conditi
 from knowledge_base.language.syntax.text import parse_effect as parse_effect
 from knowledge_base.language.syntax.text import to_text as to_text
 from knowledge_base.pddl.problem_text import read_problem as read_problem
-from knowledge_base.prepared import Binding as Binding
+from knowledge_base.questions import Binding as Binding
 from knowledge_base.sources import DataSource as DataSource
 from knowledge_base.store import KnowledgeBase as KnowledgeBase
 from knowledge_base.transaction import Transaction as Transaction

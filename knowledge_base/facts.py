@@ -1,25 +1,41 @@
-"""Facts and changes as values: what skills observe, transactions write and listeners hear."""
+"""Facts, values and changes: skills observe them, transactions write them, and listeners receive them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from knowledge_base.errors import InputError, Place, SchemaError
 from knowledge_base.spelling import value_text
 
 Value = str | int | float | bool
 VALUE_TYPES = frozenset({str, int, float, bool})
-"""What a fact's argument or a bound variable may be: an object's name, a number, a truth value."""
+"""Types of a fact's argument and of a bound variable: an object's name, a number, a truth value."""
 
 Geometry = tuple[float, ...]
-"""A position, a pose, a matrix: finite numbers whose meaning the function's name says; `()` is unknown."""
+"""A position, a pose, a matrix: finite numbers with a meaning by the function's name; `()` is unknown."""
 Content = Value | Geometry
-"""What a function may be worth: the symbolic or geometric content of an arc (S4.3)."""
+"""Value of a function: the symbolic or geometric content of an arc (S4.3)."""
+
+GEOMETRY = "geometry"
+MOST_NUMBERS = 16
+"""Most numbers of a geometry: a 4x4 matrix."""
+
+UNSET: Mapping[str, Content] = {"number": 0, "text": "", "boolean": False, GEOMETRY: ()}
+"""The types of content (PDDL 3.1's typed results), each with the value of a function until it is set."""
+
+_SAID = {
+    "number": "a number",
+    "text": "text",
+    "boolean": "true or false",
+    GEOMETRY: f"a geometry, a tuple of at most {MOST_NUMBERS} numbers",
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """A predicate that holds of its arguments, e.g. `Fact("on", ("cup3", "table1"))`."""
+    """A predicate that is true for its arguments, e.g. `Fact("on", ("cup3", "table1"))`."""
 
     predicate: str
     args: tuple[Value, ...] = ()
@@ -30,7 +46,7 @@ class Fact:
 
 
 def fact(predicate: str, *args: Value) -> Fact:
-    """`fact("on", "cup3", "table1")`, the everyday way to write a `Fact`."""
+    """Return a `Fact`: `fact("on", "cup3", "table1")`."""
     return Fact(predicate, args)
 
 
@@ -38,18 +54,17 @@ def fact(predicate: str, *args: Value) -> Fact:
 class Delta:
     """A change of the world model as a value: applied as a whole or not at all.
 
-    Replacements come before removals, and those before additions, as in PDDL effects, so that a fact in both
-    stays true.
+    Replacements come before removals, and those before additions, as in PDDL effects: a fact in both stays true.
 
     Attributes:
-        nodes: things that are there now, name -> type; naming a known one again with its type is fine.
-        removed: facts that hold no longer; one that did not hold is fine.
-        added: facts that hold now.
-        values: what functions are worth now, by function and arguments.
-        removed_nodes: things that are there no longer, nor any fact or value about them; this comes first
-            of all, so that a thing in `nodes` too begins anew. One that was not there is fine.
-        replaced: facts that hold now, and none any more that differs from them only in the last argument:
-            `fact("at", "cup1", "shelf")` whatever it was at before. What really changes has no part in it.
+        nodes: new things, name -> type; a known thing with its type has no effect.
+        removed: facts that become false; a false fact has no effect.
+        added: facts that become true.
+        values: new values of functions, by function and arguments.
+        removed_nodes: things to remove with all facts and values about them. They come first, so that a thing that is
+            in `nodes` too becomes a new one. An unknown thing has no effect.
+        replaced: facts that become true, while facts that differ only in the last argument become false:
+            `fact("at", "cup1", "shelf")` ends each other place of the cup. Effective changes have none.
     """
 
     nodes: Mapping[str, str] = field(default_factory=dict)
@@ -60,18 +75,18 @@ class Delta:
     replaced: tuple[Fact, ...] = ()
 
     def __bool__(self) -> bool:
-        """Whether it says anything at all."""
+        """Whether it is not empty."""
         return bool(self.nodes or self.removed or self.added or self.values or self.removed_nodes or self.replaced)
 
     def __len__(self) -> int:
-        """How many things, facts and values it names."""
+        """Number of its things, facts and values."""
         facts = len(self.removed) + len(self.added) + len(self.replaced)
         return len(self.nodes) + facts + len(self.values) + len(self.removed_nodes)
 
     def then(self, later: Delta) -> Delta:
-        """This change followed by `later`, as one change.
+        """Return this change followed by `later`, as one change.
 
-        A replacement that names a thing which `later` removes is forgotten with it.
+        The removal of a thing in `later` also removes the replacements that name it.
         """
         undone, gone = set(later.removed), set(later.removed_nodes)
         anew = {(r.predicate, r.args[:-1]) for r in later.replaced}
@@ -94,16 +109,75 @@ class Delta:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What one committed transaction really changed (facts already so are not in it).
+    """The effect of one committed transaction, without the facts that were so before.
 
     Attributes:
         version: the knowledge base's version after it; versions count up by one.
-        author: who changed it, e.g. a component's name.
+        author: the author, e.g. a component's name.
         delta: the effective change.
-        time: when, in seconds of the knowledge base's clock; it never runs backwards. Not compared.
+        time: its time, in seconds of the knowledge base's clock; it never runs backwards. Not compared.
     """
 
     version: int
     author: str
     delta: Delta
     time: float = field(default=0.0, compare=False)
+
+
+def require_content(content: object, result: str, what: object, place: Place | None = None) -> None:
+    """Raise an error unless `content` may be the value of a function with this result.
+
+    Args:
+        content: the value.
+        result: the type of the function's result, one of `UNSET`.
+        what: the function with its arguments, for messages.
+        place: the place of the content in a text.
+
+    Raises:
+        SchemaError: it is of another type.
+        InputError: a number that is not finite, or a text that no file can hold.
+    """
+    if not _is(content, result):
+        raise SchemaError(f"{what} is {_SAID[result]}, not {content!r}", place=place)
+    numbers = content if isinstance(content, tuple) else (content,)
+    for number in numbers:
+        if isinstance(number, str):
+            require_writable(number, what, place)
+        else:
+            require_finite(number, what, place)
+
+
+def require_writable(text: str, what: object, place: Place | None = None) -> None:
+    """Raise `InputError` for a text with half characters (surrogates), which UTF-8 cannot encode."""
+    if text.isascii():
+        return
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise InputError(f"{what} is text that can be written to a file, not {text!a}", place=place) from None
+
+
+def require_finite(number: float, what: object, place: Place | None = None) -> None:
+    """Raise `InputError` for an infinity, a NaN, and an integer that no file can hold."""
+    try:
+        if math.isfinite(number):
+            return
+    except OverflowError:
+        raise InputError(f"{what} is a number of at most 1e308", place=place) from None
+    raise InputError(f"{what} is a finite number, not {number}", place=place)
+
+
+def _is(content: object, result: str) -> bool:
+    match result:
+        case "number":
+            return _is_number(content)
+        case "text":
+            return isinstance(content, str)
+        case "boolean":
+            return isinstance(content, bool)
+        case _:
+            return isinstance(content, tuple) and len(content) <= MOST_NUMBERS and all(map(_is_number, content))
+
+
+def _is_number(content: object) -> bool:
+    return isinstance(content, int | float) and not isinstance(content, bool)

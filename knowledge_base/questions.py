@@ -1,4 +1,4 @@
-"""Questions by their text: parsed and checked once, then evaluated."""
+"""Questions: parsed and checked once by their text, and prepared ones that take other values each time."""
 
 from __future__ import annotations
 
@@ -6,20 +6,23 @@ from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import TypeVar
 
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
 from knowledge_base.language.checking.check import Free, check
-from knowledge_base.language.checking.inputs import fitted_names, require_condition, require_params
+from knowledge_base.language.checking.inputs import fitted_names, require_condition, require_params, shown
 from knowledge_base.language.evaluation.evaluator import Asked, Queried, asked, queried, rows
 from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.expression import Expression, free_variables
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.world.read_write_lock import ReadWriteLock
+from knowledge_base.world.state import WorldState
 
-_parsed = lru_cache(maxsize=1024)(parse_condition)
-
+Binding = dict[str, Value]
+"""One answer of a query: names of variables (without `?`) with their values."""
 
 _MOST_KEPT = 4096
-
+_parsed = lru_cache(maxsize=1024)(parse_condition)
 _Key = tuple[str | int, ...]
 """A text, or the identity of an expression, and the names of the parameters."""
 _K = TypeVar("_K")
@@ -33,9 +36,9 @@ def _keep(kept: dict[_K, _T], key: _K, made: _T) -> None:
 
 
 class Questions:
-    """Parses texts and checks them against the schema and the known things; always of the same schema.
+    """Parses texts and checks them against one schema and the known things.
 
-    A question that passed is not checked again. A thing that it names may be removed later; then nothing holds of it.
+    A question that passed is not checked again. After the removal of a thing that it names, no fact about it is true.
     """
 
     def __init__(self) -> None:
@@ -47,11 +50,11 @@ class Questions:
     def given(
         self, text: str | Expression, params: Mapping[str, Value] | None, world: World, free: Free
     ) -> Mapping[str, Value]:
-        """Parameters by the names that the question has for them; fitted once for each set of names.
+        """Return the parameters by the names of the question's variables; fitted once for each set of names.
 
         Raises:
             UnknownNameError: the question has no such variable.
-            InputError: as for `condition` or `query`; or these are no parameters.
+            InputError: as for `condition` or `query`; or the parameters are not a mapping to values.
         """
         if params is None:
             return {}
@@ -64,7 +67,7 @@ class Questions:
             require_condition(text)
             e = _parsed(text) if isinstance(text, str) else text
             known = [name if name in free_variables(e) else name.lower() for name in params]
-            self._checked(e, dict.fromkeys(known, ""), world, free)  # what is wrong with the text comes first
+            self._checked(e, dict.fromkeys(known, ""), world, free)  # mistakes of the text come first
             names = fitted_names(e, params)
             found = e, None if names == tuple(params) else names
             _keep(self._given, key, found)
@@ -73,15 +76,15 @@ class Questions:
 
     def ask(self, text: str | Expression, params: Mapping[str, Value], world: World) -> bool:
         """Whether the condition is true of `world`; errors as for `condition`."""
-        key = text if isinstance(text, str) else id(text)  # which parameters are missing it finds out itself
+        key = text if isinstance(text, str) else id(text)  # the evaluation checks the parameters
         found = self._asked.get(key)
         if found is None:
             found = asked(self.condition(text, params, world), world.schema)
             _keep(self._asked, key, found)
         return found.holds(world, params)
 
-    def answers(self, text: str | Expression, params: Mapping[str, Value], world: World) -> list[dict[str, Value]]:
-        """The values that make the query true of `world`; errors as for `query`."""
+    def answers(self, text: str | Expression, params: Mapping[str, Value], world: World) -> list[Binding]:
+        """Return the values that make the query true of `world`; errors as for `query`."""
         key = (text if isinstance(text, str) else id(text), *params)
         found = self._queried.get(key)
         if found is None:
@@ -89,12 +92,12 @@ class Questions:
             _keep(self._queried, key, found)
         return found.answers(world, params)
 
-    def rows(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Iterator[dict[str, Value]]:
-        """The answers one by one; errors as for `query`."""
+    def rows(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Iterator[Binding]:
+        """Return the answers one by one; errors as for `query`."""
         return rows(self.query(text, params, world), world, params)
 
     def condition(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
-        """The condition, all of whose free variables are in `params`.
+        """Return the condition; `params` must have all its free variables.
 
         Raises:
             ParseError: the text is no condition.
@@ -104,7 +107,7 @@ class Questions:
         return self._checked(text, params, world, "error")
 
     def query(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
-        """The query, which asks for its free variables that are not in `params`.
+        """Return the query for the free variables that are not in `params`.
 
         Raises:
             InputError: as for `condition`, or a variable occurs only under `not` or in a comparison.
@@ -124,8 +127,76 @@ class Questions:
         return e
 
 
+class Prepared:
+    """A question with parameters, made by `View.prepare`.
+
+    Args:
+        text: the question.
+        parameters: the variables that get a value each time, in this order.
+        state: the world; it stays the same object while it changes.
+        lock: lock of the world.
+        questions: parses and checks the text.
+
+    Raises:
+        ParseError, UnknownNameError, SchemaError, InputError: as for `View.query`.
+    """
+
+    def __init__(
+        self,
+        text: str | Expression,
+        parameters: tuple[str, ...],
+        state: WorldState,
+        lock: ReadWriteLock,
+        questions: Questions,
+    ) -> None:
+        params = dict.fromkeys(parameters, "")
+        require_params(params)
+        if len(params) < len(parameters):
+            raise InputError(f"the parameters are named once each, not {shown(parameters)}")
+        with lock:
+            given = questions.given(text, params, state, "answers")
+            e = questions.query(text, given, state)
+        self.text = text
+        self.parameters = parameters
+        self._names = tuple(given)
+        self._state = state
+        self._lock = lock
+        condition = asked(e, state.schema)
+        self._holds = condition.test if condition.free.issubset(given) else condition.holds
+        self._query = queried(e, state.schema, given)
+
+    def ask(self, *values: Value) -> bool:
+        """Whether the question is true for these values of its parameters.
+
+        Raises:
+            UnknownNameError: it has other free variables.
+            InputError, SchemaError: too few or too many values, or something else than a value.
+        """
+        given = self._given(values)
+        with self._lock:
+            return self._holds(self._state, given)
+
+    def query(self, *values: Value) -> list[Binding]:
+        """Return the values of its other free variables as `View.query` does; errors for the values as for `ask`."""
+        given = self._given(values)
+        with self._lock:
+            return self._query.answers(self._state, given)
+
+    def _given(self, values: tuple[Value, ...]) -> dict[str, Value]:
+        """Return the values by the names of the parameters, checked."""
+        if len(self._names) != len(values):
+            names = ", ".join(f"?{name}" for name in self._names) or "none"
+            raise InputError(f"the question takes the values of its parameters ({names}), not {len(values)} values")
+        given = dict(zip(self._names, values))  # noqa: B905  `strict` costs as much as the rest
+        for value in values:
+            if type(value) is not str:
+                require_params(given)
+                break
+        return given
+
+
 class _Things(Mapping[str, str]):
-    """The things of a world with their types, looked up one by one."""
+    """The things of a world with their types, each found when it is needed."""
 
     def __init__(self, world: World) -> None:
         self._world = world

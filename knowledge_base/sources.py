@@ -12,9 +12,8 @@ from typing import Self
 
 from knowledge_base.conditions.installed import Installed
 from knowledge_base.conditions.notification import Notifier
-from knowledge_base.content import require_content
 from knowledge_base.errors import ConflictError, InputError, SchemaError
-from knowledge_base.facts import Content, Fact
+from knowledge_base.facts import Content, Fact, require_content
 from knowledge_base.world.graph import WorldGraph
 from knowledge_base.world.overlay import check_fluent
 from knowledge_base.world.state import WorldState

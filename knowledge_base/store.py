@@ -20,7 +20,6 @@ from knowledge_base.conditions.watch import Watch
 from knowledge_base.errors import ConflictError, HistoryError, InputError, StoreError
 from knowledge_base.exchange import read_json
 from knowledge_base.facts import Change, Delta, Fact, Value
-from knowledge_base.group_commit import GroupCommit
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.file import Durability, located
 from knowledge_base.journal.history import History, MemoryHistory, Version, Writer, gone
@@ -28,7 +27,7 @@ from knowledge_base.journal.journal import Journal
 from knowledge_base.language.checking.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.sources import DataSource, Sources
-from knowledge_base.transaction import Transaction
+from knowledge_base.transaction import GroupCommit, Transaction
 from knowledge_base.view import View
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.schema import Schema

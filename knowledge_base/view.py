@@ -15,8 +15,7 @@ from knowledge_base.language.evaluation.world import BoundedWorld, Bounds, Meter
 from knowledge_base.language.syntax.expression import TRUE, Expression
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.pddl.writer import problem_to_text
-from knowledge_base.prepared import Binding, Prepared
-from knowledge_base.questions import Questions
+from knowledge_base.questions import Binding, Prepared, Questions
 from knowledge_base.world.graph import Graph, WorldGraph
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.read_write_lock import ReadWriteLock

@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from knowledge_base.content import UNSET
 from knowledge_base.errors import ParseError, Place, nearest
+from knowledge_base.facts import UNSET
 from knowledge_base.language.syntax.expression import Expression, TypedVariable
 from knowledge_base.language.syntax.sexpr import Group, Node, TypedName, Word, parse_names, read, typed_variables
 from knowledge_base.language.syntax.text import parse_condition

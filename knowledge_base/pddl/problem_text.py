@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, Protocol
 
-from knowledge_base.content import GEOMETRY, require_content
 from knowledge_base.errors import ParseError, Place, SchemaError, UnknownNameError
-from knowledge_base.facts import Content, Delta, Fact, Value
+from knowledge_base.facts import GEOMETRY, Content, Delta, Fact, Value, require_content
 from knowledge_base.language.checking.check import check
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Signature, Vocabulary
 from knowledge_base.language.syntax.expression import (

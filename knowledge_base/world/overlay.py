@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from knowledge_base.content import require_content, require_finite, require_writable
 from knowledge_base.errors import MAX_NAME, InputError, SchemaError, UnknownNameError, shortened
-from knowledge_base.facts import Content, Delta, Fact, Value
+from knowledge_base.facts import Content, Delta, Fact, Value, require_content, require_finite, require_writable
 from knowledge_base.language.checking.check import check_arity, value_fits
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature, Vocabulary
 from knowledge_base.language.evaluation.world import World

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from knowledge_base.content import GEOMETRY, UNSET
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
-from knowledge_base.facts import Content
+from knowledge_base.facts import GEOMETRY, UNSET, Content
 from knowledge_base.language.checking.check import check_reads
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature
 from knowledge_base.language.syntax.expression import KEYWORDS

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Literal
 
-from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
-from knowledge_base.facts import Value
+from knowledge_base.facts import GEOMETRY, Value
 from knowledge_base.language.checking.binding import check_answers, unbound_error
 from knowledge_base.language.checking.vocabulary import Computing, Signature, Vocabulary
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When, check_depth

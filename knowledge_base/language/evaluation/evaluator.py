@@ -11,9 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from knowledge_base.content import require_content
 from knowledge_base.errors import SchemaError
-from knowledge_base.facts import VALUE_TYPES, Content, Delta, Fact, Value
+from knowledge_base.facts import VALUE_TYPES, Content, Delta, Fact, Value, require_content
 from knowledge_base.language.checking.binding import check_answers, check_bound
 from knowledge_base.language.checking.check import check_arity
 from knowledge_base.language.checking.vocabulary import Vocabulary

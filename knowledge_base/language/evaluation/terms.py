@@ -8,9 +8,8 @@ from math import isfinite
 from operator import itemgetter
 from typing import cast
 
-from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import InputError, Place, SchemaError
-from knowledge_base.facts import Content, Value
+from knowledge_base.facts import GEOMETRY, Content, Value
 from knowledge_base.language.checking.check import check_arity
 from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.world import World

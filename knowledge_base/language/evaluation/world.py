@@ -40,7 +40,7 @@ class World(Protocol):
         """The arguments of all facts that agree with `pattern`; `None` is open; in order of insertion."""
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """The value of the function; until it is set, the value in `content.UNSET`."""
+        """The value of the function; until it is set, the value in `facts.UNSET`."""
 
     def objects(self, type_name: str) -> Iterable[str]:
         """The things of that type or a subtype, in order of insertion."""

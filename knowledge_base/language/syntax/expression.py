@@ -11,9 +11,8 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import overload
 
-from knowledge_base.content import GEOMETRY
 from knowledge_base.errors import Place
-from knowledge_base.facts import Value
+from knowledge_base.facts import GEOMETRY, Value
 from knowledge_base.spelling import is_plain_name
 
 

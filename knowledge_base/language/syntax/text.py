@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from knowledge_base.content import GEOMETRY, MOST_NUMBERS
 from knowledge_base.errors import ParseError, Place, nearest
+from knowledge_base.facts import GEOMETRY, MOST_NUMBERS
 from knowledge_base.language.syntax.effect import (
     ASSIGNMENTS,
     EFFECT_KEYWORDS,
