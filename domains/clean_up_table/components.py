@@ -9,8 +9,8 @@ outcomes that the plots use, with other implementations; `vent` is its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Callable, Coroutine, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from domains.clean_up_table.items import PLACES, distance
 from domains.clean_up_table.observations import Result, learned
@@ -21,7 +21,6 @@ from dsc.skills import skill
 
 if TYPE_CHECKING:
     from domains.clean_up_table.table_world import TableWorld
-    from dsc.skills import AfterCrash
 
 
 def seconds(default: float) -> Parameter:
@@ -29,60 +28,32 @@ def seconds(default: float) -> Parameter:
     return Parameter("number", default=default, least=0.1, most=60.0, changed_by="profile")
 
 
-ITEM_AT = {"item": "item", "surface": "surface"}
-ITEM_IN = {"item": "item", "carrier": "item", "surface": "surface"}
-CARRIER_AT = {"carrier": "item", "surface": "surface"}
-NOT_POSSIBLE: dict[str, str | None] = {"reason": None}
-ONCE: AfterCrash = "same_id"
-"""The world executes each action id once."""
+Body = TypeVar("Body", bound=Callable[..., Coroutine[Any, Any, Outcome]])
+Attributes = Mapping[str, str | None]
 
-drives = skill(
-    outcomes={
-        "arrived": {"to": "place"},
-        "no_path": {"to": "place"},
-        "slipped": {"item": "item", "surface": "surface", "to": "place"},
-        "not_possible": NOT_POSSIBLE,
-    },
-    types={"to": "place"},
-    after_crash=ONCE,
-)
+TO = {"to": "place"}
+AT = {"surface": "surface"}
+ITEM_AT = {"item": "item", **AT}
+ITEM_IN = {"item": "item", "carrier": "item", **AT}
+CARRIER_AT = {"carrier": "item", **AT}
+THROWN = {"item": "item", "destination": "destination"}
+
+
+def acts(types: Mapping[str, str], **outcomes: Attributes) -> Callable[[Body], Body]:
+    """Declare a skill that acts on the world, with these types of its parameters and these outcomes.
+
+    It may also end with `not_possible`. The world executes each action id once.
+    """
+    return skill({**outcomes, "not_possible": {"reason": None}}, types, after_crash="same_id")
+
+
+drives = acts(TO, arrived=TO, no_path=TO, slipped={**ITEM_AT, **TO})
 """The declaration of every base's `drive`."""
-
-picks_up = skill(
-    outcomes={
-        "picked_up": ITEM_AT,
-        "grasp_failed": ITEM_AT,
-        "no_ik": ITEM_AT,
-        "gone": ITEM_AT,
-        "not_possible": NOT_POSSIBLE,
-    },
-    types=ITEM_AT,
-    after_crash=ONCE,
-)
+picks_up = acts(ITEM_AT, picked_up=ITEM_AT, grasp_failed=ITEM_AT, no_ik=ITEM_AT, gone=ITEM_AT)
 """The declaration of every arm's `pick_up`."""
-
-takes_out = skill(
-    outcomes={
-        "taken_out": ITEM_IN,
-        "grasp_failed": ITEM_IN,
-        "no_ik": ITEM_IN,
-        "gone": ITEM_AT,
-        "not_possible": NOT_POSSIBLE,
-    },
-    types=ITEM_IN,
-    after_crash=ONCE,
-)
+takes_out = acts(ITEM_IN, taken_out=ITEM_IN, grasp_failed=ITEM_IN, no_ik=ITEM_IN, gone=ITEM_AT)
 """The declaration of every arm's `take_out`."""
-
-recognises = skill(
-    outcomes={
-        "recognised": {"surface": "surface", "count": None},
-        "nothing_found": {"surface": "surface"},
-        "not_possible": NOT_POSSIBLE,
-    },
-    types={"surface": "surface"},
-    after_crash=ONCE,
-)
+recognises = acts(AT, recognised={**AT, "count": None}, nothing_found=AT)
 """The declaration of every camera's `recognise`."""
 
 
@@ -141,22 +112,13 @@ class Arm(TablePart):
         await call.clock.sleep(self.parameters["grasping"])
         return outcome_of(self.world.pick_up(call.action_id, item, surface))
 
-    @skill(outcomes={"put_down": ITEM_AT, "not_possible": NOT_POSSIBLE}, types=ITEM_AT, after_crash=ONCE)
+    @acts(ITEM_AT, put_down=ITEM_AT)
     async def put_down(self, call: SkillCall, item: str, surface: str) -> Outcome:
         """Put the held item on a surface."""
         await call.clock.sleep(self.parameters["putting"])
         return outcome_of(self.world.put_down(call.action_id, item, surface))
 
-    @skill(
-        outcomes={
-            "stacked": ITEM_IN,
-            "stack_fell": {**ITEM_IN, "items": None},
-            "gone": ITEM_AT,
-            "not_possible": NOT_POSSIBLE,
-        },
-        types=ITEM_IN,
-        after_crash=ONCE,
-    )
+    @acts(ITEM_IN, stacked=ITEM_IN, stack_fell={**ITEM_IN, "items": None}, gone=ITEM_AT)
     async def stack(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
         """Put the held item into a carrier on a surface; `gone` names the carrier."""
         await call.clock.sleep(self.parameters["stacking"])
@@ -168,14 +130,7 @@ class Arm(TablePart):
         await call.clock.sleep(self.parameters["grasping"])
         return outcome_of(self.world.take_out(call.action_id, item, carrier, surface))
 
-    @skill(
-        outcomes={
-            "thrown_away": {"item": "item", "destination": "destination"},
-            "not_possible": NOT_POSSIBLE,
-        },
-        types={"item": "item", "destination": "destination"},
-        after_crash=ONCE,
-    )
+    @acts(THROWN, thrown_away=THROWN)
     async def throw_away(self, call: SkillCall, item: str, destination: str) -> Outcome:
         """Throw the held item, with everything in it, into its destination."""
         await call.clock.sleep(self.parameters["throwing"])
@@ -194,11 +149,7 @@ class Camera(TablePart):
         await call.clock.sleep(self.parameters["recognising"])
         return outcome_of(self.world.recognise(call.action_id, surface))
 
-    @skill(
-        outcomes={"looked": CARRIER_AT, "gone": ITEM_AT, "not_possible": NOT_POSSIBLE},
-        types=CARRIER_AT,
-        after_crash=ONCE,
-    )
+    @acts(CARRIER_AT, looked=CARRIER_AT, gone=ITEM_AT)
     async def look_into(self, call: SkillCall, carrier: str, surface: str) -> Outcome:
         """Look into a carrier on a surface, which closes one unit of its room; `gone` names the carrier."""
         await call.clock.sleep(self.parameters["looking"])
@@ -213,7 +164,7 @@ class Voice(TablePart):
         "pace": Parameter("number", default=15.0, least=1.0, most=100.0),  # characters a second
     }
 
-    @skill(outcomes={"said": {"text": None}}, after_crash=ONCE)
+    @skill({"said": {"text": None}}, after_crash="same_id")
     async def say(self, call: SkillCall, text: str) -> Outcome:
         """Tell the operator something."""
         await call.clock.sleep(1.0 + len(text) / self.parameters["pace"])

@@ -172,10 +172,6 @@ def _taken_out(notes: _Notes, result: Result) -> None:
     _rooms(notes, result)
 
 
-def _looked(notes: _Notes, result: Result) -> None:
-    _rooms(notes, result)
-
-
 def _thrown_away(notes: _Notes, result: Result) -> None:
     (item,) = _names(result, "item")
     _let_go(notes, item)
@@ -273,7 +269,7 @@ _LEARNED = {
     "put_down": _put_down,
     "stacked": _stacked,
     "taken_out": _taken_out,
-    "looked": _looked,
+    "looked": _rooms,
     "thrown_away": _thrown_away,
     "stack_fell": _stack_fell,
     "grasp_failed": _failed_grasp,
