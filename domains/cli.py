@@ -147,7 +147,7 @@ def run(
         }  # fmt: skip
         given = [name for name, value in beginning.items() if value is not None] + ["--real-time"] * real_time
         if given:
-            raise InputError(f"a run is resumed as it was begun: --resume does not go with {', '.join(given)}")
+            raise InputError(f"--resume continues a run as it began, without {', '.join(given)}")
         deployed = resumed(resume, durability=durability.value)
     else:
         if world is None:

@@ -170,7 +170,7 @@ class PlanningDomain:
         """
         if self.schema.computed:
             computed = next(iter(self.schema.computed))
-            raise InputError(f"the predicate '{computed}' is computed by Python, which PDDL cannot say", found=computed)
+            raise InputError(f"Python computes the predicate '{computed}', which PDDL cannot express", found=computed)
         return domain_to_text(self.to_text())
 
     def statements(self) -> dict[str, str]:

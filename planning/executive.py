@@ -95,7 +95,7 @@ class Executive:
         if any(component.name == PlanningComponent.name for component in self.components):
             raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)
         if knowledge is not None and store is not None:
-            raise InputError("with a store the knowledge is the store's; none can be given with it")
+            raise InputError("a store provides the knowledge: give a store or knowledge, not both")
         if knowledge is not None:
             require_extension(self.domain.schema, knowledge.schema)
         self._store = None if store is None else located(store)

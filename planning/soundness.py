@@ -105,4 +105,4 @@ def _require_able(part: object, method: str, what: str) -> None:
     if isinstance(part, type):
         raise InputError(f"{what} is an object, not a class; an instance is made by {part.__name__}()")
     if not callable(getattr(part, method, None)):
-        raise InputError(f"{what} has a method '{method}', which {shown(part)[:60]} has not")
+        raise InputError(f"{what} needs a method '{method}', which {shown(part)[:60]} lacks")

@@ -197,7 +197,7 @@ class Problem:
             try:
                 state, numbers = action.apply(state), action.count(numbers)
             except ArithmeticError as error:
-                return f"what {action.step} changes cannot be computed: {error}"
+                return f"the effect of {action.step} cannot be computed: {error}"
         missing_goals = [wanted for wanted in self.goal if wanted not in state]
         missing_bounds = [bound for bound in self.bounds if not bound.holds(numbers)]
         if missing_goals or missing_bounds:

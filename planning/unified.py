@@ -32,7 +32,7 @@ def from_unified(problem: UpProblem) -> tuple[PlanningDomain, ProblemText]:
         UnsupportedConstructError: no engine here supports a part of it.
     """
     if not isinstance(problem, UpProblem):
-        raise InputError(f"a problem of unified-planning that PDDL can say is a Problem, not {type(problem).__name__}")
+        raise InputError(f"from_unified takes a Problem of unified-planning, not {type(problem).__name__}")
     name = problem.name or "problem"
     try:
         writer = PDDLWriter(problem)

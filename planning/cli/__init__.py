@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-
-from planning.cli.solving import plan_command as plan_command
 
 if TYPE_CHECKING:
     from planning.bundles import Bundle
@@ -103,3 +102,33 @@ def _engine_table(engines: list[dict[str, Any]]) -> Any:
         races = "races" if one["races"] else "by name only"
         table.add_row(one["name"], version, ", ".join(one["can_do"]), plans, races, one["licence"])
     return table
+
+
+def plan_command(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DOMAIN... PROBLEM", help="PDDL: the domain, in one file or several, and the problem.",
+            show_default=False,
+        ),
+    ],
+    engine: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The engine.  [default: a race of those that suit the problem]")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.0, help="Stop after this number of seconds.")] = 10.0,
+    parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can run concurrently.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete; - is standard output.")
+    ] = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Explain each step's purpose, or why there is no plan.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:  # fmt: skip
+    """Find a plan and print its steps.
+
+    Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
+    """
+    from planning.cli.solving import plan
+
+    plan(files, engine, seconds, plot, parallel=parallel, explain=explain, as_json=as_json)

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NoReturn
+from pathlib import Path
+from typing import Any, NoReturn
 
 import typer
 
 from knowledge_base.facts import Fact
 from knowledge_base.language.syntax.effect import AllOf, Effect, NumericEffect, When, effect_conditions
 from knowledge_base.language.syntax.expression import Call, Constant, Expression, Term, parts_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from pathlib import Path
-
-    from knowledge_base.pddl import ProblemText
-    from planning.domain import PlanningDomain
-    from planning.ordering.partial_order import PartialOrder
-    from planning.plan import Plan, PlanningOutcome
-
+from knowledge_base.language.syntax.text import to_text
+from knowledge_base.pddl import ProblemText
+from planning.domain import PlanningDomain
+from planning.ordering.partial_order import PartialOrder, chains
+from planning.plan import (
+    EngineFailed,
+    NobodyCan,
+    NoneFound,
+    Plan,
+    PlanFound,
+    PlanningOutcome,
+    ProvenUnsolvable,
+    TimedOut,
+)
 
 FOUND, UNSOLVABLE, TIMED_OUT, FAILED = 0, 1, 3, 4
 """Exit statuses; 2 is bad input, for every command."""
@@ -36,8 +42,6 @@ def end(status: int, answer: dict[str, Any], notes: list[str], *, as_json: bool)
 
 def answer_of(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
     """Return the exit status and the answer to print."""
-    from planning.plan import EngineFailed, NobodyCan, NoneFound, PlanFound, ProvenUnsolvable, TimedOut
-
     match outcome:
         case PlanFound(plan=plan, engine=engine, seconds=seconds, cost=cost):
             found: dict[str, Any] = {"outcome": "plan", "steps": [str(step) for step in plan.steps]}
@@ -58,8 +62,6 @@ def answer_of(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
 
 def ordered(order: PartialOrder) -> dict[str, Any]:
     """Return the concurrent chains, and the steps that each step waits for; steps are numbered from 1."""
-    from planning.ordering.partial_order import chains
-
     linked = {(link.provider, link.user) for link in order.links}
     found = chains(order.earlier, lambda one, other: (one, other) in linked)
     waits = {number: list(earlier) for number, earlier in order.waits_for.items()}
@@ -68,8 +70,6 @@ def ordered(order: PartialOrder) -> dict[str, Any]:
 
 def purposes(order: PartialOrder) -> dict[str, Any]:
     """Return the facts that each step establishes, each with its user; 0 is the goal."""
-    from knowledge_base.language.syntax.text import to_text
-
     purposes: dict[int, list[dict[str, Any]]] = {number: [] for number in range(1, len(order.steps) + 1)}
     for link in order.links:
         if link.provider:
@@ -122,7 +122,7 @@ def without_derived(read: ProblemText, domain: PlanningDomain, file: Path) -> Pr
     """Return the problem without facts of derived predicates, with a note for each predicate."""
     derived = {axiom.predicate for axiom in domain.axioms}
     said = dict.fromkeys(fact.predicate for fact in read.init if fact.predicate in derived)
-    notes = [f"{file}: what :init says of '{name}' is not heeded: it is derived" for name in said]
+    notes = [f"{file}: facts of '{name}' in :init are ignored, since it is derived" for name in said]
     kept = tuple(fact for fact in read.init if fact.predicate not in derived)
     return replace(read, init=kept, notes=(*read.notes, *notes))
 

@@ -1,63 +1,52 @@
-"""Command `dsc plan`: read files, plan, wait for a cheaper plan, explain why there is none."""
+"""The work of `dsc plan`: read files, plan, wait for a cheaper plan, explain why there is none."""
 
 from __future__ import annotations
 
+import asyncio
 import sys
-from contextlib import AbstractContextManager, nullcontext
+import time
+from contextlib import AbstractContextManager, aclosing, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Any, NoReturn
 
-import typer
-
+from knowledge_base.errors import InputError, Place, UnknownNameError
+from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.output_files import Output
+from knowledge_base.pddl import ProblemText, read_problem
+from knowledge_base.store import KnowledgeBase
+from planning.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.cli.plan_report import TIMED_OUT, answer_of, end, ordered, purposes, valueless, without_derived
-
-if TYPE_CHECKING:
-    from knowledge_base.language.syntax.expression import Expression
-    from knowledge_base.pddl import ProblemText
-    from knowledge_base.store import KnowledgeBase
-    from planning.domain import PlanningDomain
-    from planning.engines.planner import PlannerProcess
-    from planning.engines.race import PlannerRace
-    from planning.ordering.partial_order import PartialOrder
-    from planning.plan import Plan, PlanningOutcome
-    from planning.strips import Problem
+from planning.domain import PlanningDomain
+from planning.engines.planner import PlannerProcess
+from planning.engines.race import PlannerRace
+from planning.engines.registry import ENGINES, able, chosen, timing
+from planning.explanation import why_unsolvable
+from planning.ordering.causal_tracing import deordered
+from planning.ordering.partial_order import PartialOrder, in_sequence
+from planning.ordering.timed_links import linked
+from planning.plan import NobodyCan, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
+from planning.problem.axioms import Derivable
+from planning.problem.construction import build_problem
+from planning.problem.relevance import why_no_engine
+from planning.strips import Problem
 
 PLOT_NAME = "plan"
 PATIENCE, PATIENT_SECONDS = 3.0, 2.0
 """The wait for a cheaper plan: a factor on the time of the first one, and the minimum in seconds."""
 
 
-def plan_command(
-    files: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="DOMAIN... PROBLEM", help="PDDL: the domain, in one file or several, and the problem.",
-            show_default=False,
-        ),
-    ],
-    engine: Annotated[
-        str | None, typer.Option(metavar="NAME", help="The engine.  [default: a race of those that suit the problem]")
-    ] = None,
-    seconds: Annotated[float, typer.Option(min=0.0, help="Stop after this number of seconds.")] = 10.0,
-    parallel: Annotated[bool, typer.Option("--parallel", help="Show which steps can run concurrently.")] = False,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write it as a plot (YAML) to complete; - is standard output.")
-    ] = None,
-    explain: Annotated[
-        bool, typer.Option("--explain", help="Explain each step's purpose, or why there is no plan.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-) -> None:  # fmt: skip
-    """Find a plan and print its steps.
-
-    Exit status: 0 a plan, 1 there is none, 2 bad input, 3 out of time, 4 the planner failed.
-    """
-    from knowledge_base.output_files import Output
-    from planning.cancellable_work import WorkLimitError
-    from planning.plan import NobodyCan, PlanFound, ProvenUnsolvable
-    from planning.problem.relevance import why_no_engine
-
+def plan(
+    files: list[Path],
+    engine: str | None,
+    seconds: float,
+    plot: Path | None,
+    *,
+    parallel: bool,
+    explain: bool,
+    as_json: bool,
+) -> NoReturn:
+    """Find a plan, print it, and exit; for the arguments see `planning.cli.plan_command`."""
     output = None if plot is None else Output(plot, "--plot", *files)
     domain, read, world = read_files(files)
     notes = [*domain.notes, *read.notes]
@@ -85,11 +74,6 @@ def plan_command(
 
 
 def _order(plan: Plan, domain: PlanningDomain, world: KnowledgeBase, goal: Expression) -> PartialOrder:
-    from planning.ordering.causal_tracing import deordered
-    from planning.ordering.partial_order import in_sequence
-    from planning.ordering.timed_links import linked
-    from planning.problem.axioms import Derivable
-
     if Derivable.of(domain) is not None:
         return in_sequence(plan)
     return (linked if plan.schedule else deordered)(plan, domain, world, goal)
@@ -97,8 +81,6 @@ def _order(plan: Plan, domain: PlanningDomain, world: KnowledgeBase, goal: Expre
 
 def _untraced(domain: PlanningDomain) -> list[str]:
     """Return a note if plans are only for display."""
-    from planning.problem.axioms import Derivable
-
     form = Derivable.of(domain)
     names = ", ".join(f"'{one}'" for one in sorted(form.predicates)) if form else ""
     why = "planning actions change what it follows from, itself included"
@@ -106,7 +88,7 @@ def _untraced(domain: PlanningDomain) -> list[str]:
 
 
 def _plot_text(plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> str:
-    from dsc.text.plot_files import plot_to_yaml
+    from dsc.text.plot_files import plot_to_yaml  # only here: plots take a while to import
     from planning.generation.plan_to_plot import plot_from_plan
 
     return plot_to_yaml(plot_from_plan(plan, domain, None, name=PLOT_NAME, order=order))
@@ -118,11 +100,6 @@ def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, Knowledg
     Raises:
         InputError: a file cannot be read or has a mistake, or there is no problem or no goal.
     """
-    from knowledge_base.errors import InputError, Place
-    from knowledge_base.pddl import read_problem
-    from knowledge_base.store import KnowledgeBase
-    from planning.domain import PlanningDomain
-
     if len(files) < 2:
         raise InputError(f"dsc plan takes a domain and a problem, there is only '{files[0]}'")
     *fragments, file = files
@@ -143,14 +120,6 @@ def solved(
     Raises:
         WorkLimitError: the time was up during problem construction.
     """
-    import asyncio
-
-    from planning.cancellable_work import WorkLimit, aside
-    from planning.engines.registry import chosen, timing
-    from planning.plan import TimedOut
-    from planning.problem.axioms import Derivable
-    from planning.problem.construction import build_problem
-
     patience = WorkLimit(seconds)
     durations = bool(timing()) or engine is not None
 
@@ -177,12 +146,6 @@ def solved(
 
 def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, seconds: float) -> list[str]:
     """Return why there is no plan, one sentence a line, or that the explanation timed out."""
-    import asyncio
-
-    from planning.cancellable_work import WorkLimit, WorkLimitError, aside
-    from planning.explanation import why_unsolvable
-    from planning.problem.axioms import Derivable
-
     patience = WorkLimit(seconds)
 
     def why() -> tuple[str, ...]:
@@ -193,17 +156,11 @@ def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, se
     try:
         return list(asyncio.run(aside(why, patience)))
     except WorkLimitError:
-        return [f"what is missing was not found out within {seconds:g} s"]
+        return [f"the search for the missing conditions takes more than {seconds:g} s"]
 
 
 async def _cheapest(planner: PlannerProcess | PlannerRace, problem: Problem, seconds: float) -> PlanningOutcome:
     """Return the first outcome; if actions have costs, the cheapest plan within some more time."""
-    import asyncio
-    import time
-    from contextlib import aclosing, suppress
-
-    from planning.plan import PlanFound
-
     started = time.monotonic()
     async with aclosing(planner.plans(problem, seconds)) as plans:
         best = await anext(plans)
@@ -218,11 +175,6 @@ async def _cheapest(planner: PlannerProcess | PlannerRace, problem: Problem, sec
 
 def _planner(problem: Problem, engine: str | None) -> PlannerProcess | PlannerRace:
     """Return the named engine if it supports the problem and is installed; without a name, a race."""
-    from knowledge_base.errors import InputError, UnknownNameError
-    from planning.engines.planner import PlannerProcess
-    from planning.engines.race import PlannerRace
-    from planning.engines.registry import ENGINES, able
-
     if engine is None:
         return PlannerRace()
     forms = [problem, *([problem.timed] if problem.timed else ())]

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from knowledge_base.language.syntax.expression import Expression
     from planning.execution.planner_call import Improvements
-    from planning.ordering.partial_order import PartialOrder
     from planning.plan import PlanFound
     from planning.problem.derived import Settled
 
@@ -147,12 +146,6 @@ class Successor:
     name: str | None = None
     kept: int = 0
     found: Found | None = field(default=None, compare=False)
-
-    def order(self, steps: tuple[PlanStep, ...], version: int) -> PartialOrder | None:
-        """The order of `steps`, if the search found it for these steps at this version of the knowledge."""
-        found = self.found
-        known = found is not None and found.version == version and found.steps == steps
-        return found.order if found is not None and known else None
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -96,7 +96,7 @@ async def _stopped(task: asyncio.Future[Any], name: str) -> bool:
 
 def _throw_away(task: asyncio.Future[Any], name: str) -> None:
     """Abandon work that ignores its cancellation."""
-    blame(name, "it goes on although it was told to stop")
+    blame(name, "it ignores its cancellation")
     task.add_done_callback(lambda task: task.cancelled() or task.exception())  # marks its exception as retrieved
     if isinstance(task, asyncio.Task):
         with contextlib.suppress(Exception):
@@ -184,7 +184,7 @@ class PlannerCalls:
         except LateError as late:
             if late.obeyed:
                 return TimedOut(engine, seconds)
-            return EngineFailed(engine, "no answer in time, and it goes on although it was told to stop")
+            return EngineFailed(engine, "no answer in time, and it ignores its cancellation")
         except Exception as error:  # noqa: BLE001  no fault of a planner may end the run
             return EngineFailed(engine, described(error))
         if isinstance(answer, PlanningOutcome):

@@ -236,7 +236,7 @@ class PlanningComponent(Component):
             if isinstance(found, NotFound):
                 return self._none(found.kind, found.reason)
             now = self._derivation.at(self._knowledge)
-            known = found.order if found.version == self._knowledge.version else None
+            known = found.known_order(found.steps, self._knowledge.version)
             progress = PlanProgress(found.steps, now.domain, now.condition(wanted))
             attempt = Attempt() if before is None else before.attempt
             run = PlanRun(self._runs.new_name(), wanted, progress, attempt, holder, seconds, replans, found.better)

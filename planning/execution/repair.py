@@ -219,7 +219,8 @@ class Escalation:
     def _continued(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None) -> Outcome:
         """Continue with `steps` without a planner call; their first one prefers other candidates to `instead_of`."""
         name = self._recorded(run, steps, why, instead_of)
-        known = None if run.successor is None else run.successor.order(steps, self._knowledge.version)
+        found = None if run.successor is None else run.successor.found
+        known = None if found is None else found.known_order(steps, self._knowledge.version)
         progress = PlanProgress(steps, run.progress.domain, run.progress.goal)
         again = PlanRun(name, run.goal, progress, run.attempt, run.holder, run.seconds, run.replans, replaces=run.name)
         return self.bound(again, *self.plotting.plotted(again, Plan(steps), known, instead_of))

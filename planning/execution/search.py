@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from knowledge_base.errors import InputError
 from planning.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.engines.registry import timing
 from planning.execution.plan_progress import local_repair
-from planning.execution.planner_call import Answer, PlannerCalls
+from planning.execution.planner_call import Answer, Improvements, PlannerCalls
 from planning.explanation import why_unsolvable
 from planning.ordering.causal_tracing import deordered
+from planning.ordering.partial_order import PartialOrder
 from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
 from planning.problem.construction import build_problem
 from planning.problem.relevance import why_no_engine
@@ -33,11 +34,7 @@ if TYPE_CHECKING:
     from planning.engines.planner import Planner
     from planning.execution.plan_progress import PlanProgress
     from planning.execution.plan_records import PlanRecords
-    from planning.execution.planner_call import Improvements
-    from planning.ordering.partial_order import PartialOrder
-    from planning.plan import Plan
     from planning.strips import Problem
-    from planning.validation import Validation
 
 
 class Foresight(Protocol):
@@ -52,13 +49,15 @@ class Foresight(Protocol):
         ...
 
 
+_Result = TypeVar("_Result")
+
 EXCLUDED_SECONDS = 120.0
 """Seconds of run time for which new plans omit a step that failed repeatedly."""
 MAX_ATTEMPTS = 3
 """The number of searches for one plan while the world changes."""
 MAX_REJECTED = 5
 """The number of plans that the simulation may reject."""
-_IN_CONCERT = "there is only a plan with several steps at a time that need each other, which is not carried out yet"
+_IN_CONCERT = "the only plan has concurrent steps that need each other, which no plot executes yet"
 LOCAL_REPAIR_SECONDS = 2.0
 """Bound of real time for a local repair."""
 
@@ -85,6 +84,10 @@ class Found:
     def steps(self) -> tuple[PlanStep, ...]:
         """The plan's steps."""
         return self.answer.plan.steps
+
+    def known_order(self, steps: tuple[PlanStep, ...], version: int) -> PartialOrder | None:
+        """The order, if the plan has these steps, at this version of the knowledge."""
+        return self.order if self.version == version and self.steps == steps else None
 
     async def close(self) -> None:
         """Close the better plans."""
@@ -163,12 +166,12 @@ class Search:
             if self._clock.simulated:
                 await sleep(found.answer.simulated_seconds)
             verdict, order = self._judged(found.answer.plan, goal)
-            if verdict.valid and found.answer.plan.schedule:
-                alone = validate(Plan(found.steps), self._domain, self._knowledge, goal)
-                if not alone.valid:
-                    await found.close()
-                    return NotFound("failed", f"{_IN_CONCERT}: {alone.why} ({found.answer.engine})")
             if verdict.valid:
+                if found.answer.plan.schedule:
+                    alone = validate(Plan(found.steps), self._domain, self._knowledge, goal)
+                    if not alone.valid:
+                        await found.close()
+                        return NotFound("failed", f"{_IN_CONCERT}: {alone.why} ({found.answer.engine})")
                 found = replace(found, order=order, version=self._knowledge.version)
                 verdict = await self._foreseen(found)
                 if verdict.valid:
@@ -215,8 +218,11 @@ class Search:
         repaired = None if before is None else await self._repaired(goal, seconds / 2, before, snapshot)
         if isinstance(repaired, Found):
             return repaired
+        patience, durations = WorkLimit(budget.left), not self._clock.simulated and bool(timing())
         try:
-            problem = await self._posed(goal, snapshot, WorkLimit(budget.left))
+            problem = await self._aside(
+                lambda: build_problem(self._domain, snapshot, goal, durations=durations, patience=patience), patience
+            )
         except WorkLimitError as error:
             return NotFound("timed_out", f"no plan within {seconds:g} s (while {error.doing})")
         answer, better = await self._answer(problem, budget.left, rejected)
@@ -228,21 +234,16 @@ class Search:
         if rejected:
             reasons = "; ".join(f"{step}: {why}" for step, why in rejected.items())
             return NotFound("unsolvable", f"the simulation foresees that every plan fails: {reasons}")
-        missing = await self._why_not(goal, snapshot, WorkLimit(budget.left))
+        missing: tuple[str, ...] = ()
+        left = WorkLimit(budget.left)
+        with contextlib.suppress(WorkLimitError):  # the search for the missing conditions takes too long
+            missing = await self._aside(lambda: why_unsolvable(self._domain, snapshot, goal, left), left)
         return NotFound("unsolvable", "; ".join(missing) or answer.reason)
 
-    async def _posed(self, goal: Expression, snapshot: WorldState, patience: WorkLimit) -> Problem:
-        durations = not self._clock.simulated and bool(timing())
-        with self._clock.hold():  # a thread, so that a cancellation ends the wait
-            return await aside(
-                lambda: build_problem(self._domain, snapshot, goal, durations=durations, patience=patience), patience
-            )
-
-    async def _why_not(self, goal: Expression, snapshot: WorldState, patience: WorkLimit) -> tuple[str, ...]:
-        """The conditions missing for the goal; none if their search takes too long."""
-        with self._clock.hold(), contextlib.suppress(WorkLimitError):
-            return await aside(lambda: why_unsolvable(self._domain, snapshot, goal, patience), patience)
-        return ()
+    async def _aside(self, work: Callable[[], _Result], patience: WorkLimit | None = None) -> _Result:
+        """Do the work in a thread, so that a cancellation ends the wait; simulated time does not pass meanwhile."""
+        with self._clock.hold():
+            return await aside(work, patience)
 
     async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> Answer:
         """Return the planner's answer, without the excluded steps if a plan without them exists."""
@@ -260,10 +261,9 @@ class Search:
         """Return the local repair of the plan before; `TimedOut` at a limit of real time."""
         excluded, patience = self._excluded_now(), WorkLimit(seconds)
         try:
-            with self._clock.hold():
-                how = await aside(
-                    lambda: local_repair(before, excluded, self._domain, snapshot, goal, patience), patience
-                )
+            how = await self._aside(
+                lambda: local_repair(before, excluded, self._domain, snapshot, goal, patience), patience
+            )
         except WorkLimitError:
             return TimedOut("local repair", seconds)
         if how is None:
@@ -284,9 +284,8 @@ class Search:
         foresight = self._foresight
         if foresight is None:
             return Validation(valid=True)
-        with self._clock.hold():
-            world, plan = self._knowledge.snapshot(), found.answer.plan
-            verdict = await aside(lambda: foresight.foresee(plan, world))
+        world, plan = self._knowledge.snapshot(), found.answer.plan
+        verdict = await self._aside(lambda: foresight.foresee(plan, world))
         if not verdict.valid:
             step = None if verdict.failing_step is None else plan.steps[verdict.failing_step]
             self._records.rejected(step, verdict.why, found.answer.engine)

@@ -195,7 +195,7 @@ def test_the_command_keeps_a_run_resumes_it_and_tells_what_happened(whole, tmp_p
         (["run"], "a run needs a world, or a store to --resume; valid: clean-up-table"),
         (
             ["run", "--resume", "x.kb", "--seed", "1"],
-            "a run is resumed as it was begun: --resume does not go with --seed",
+            "--resume continues a run as it began, without --seed",
         ),
         (["run", "--resume", "x.kb", "--real-time"], "does not go with --real-time"),
         (["run", "--resume", "x.kb"], "there is no store 'x.kb'"),

@@ -46,7 +46,7 @@ LINES = [
     "look", "plan with 1 steps (fake)", "step   1  (pick cup)", "rule  slipped: pick, retry",
     "no plan, timed_out: no plan within 5 s", "the plan no longer holds: (on cup) is false",
     "the plan resumes at (pick cup): no_path", "skipped (pick cup), (put cup): the goal holds",
-    "for 120 s no plan with (pick cup): no_path", "no plan without (pick cup)",
+    "(pick cup) is excluded for 120 s: no_path", "(pick cup) may be planned again: there is no plan without",
     "a plan fails in the simulation: (pick cup) ends in gone: gone",
     "gave up: the budget of 2 new plans is used up: no_path",
     "ended early: nobody handles 'x'",

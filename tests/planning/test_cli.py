@@ -349,7 +349,7 @@ ERRAND = """(define (domain errand) (:types place) (:predicates (at ?p - place) 
         ("", ["(left) has no value and counts as 0", "(toll a) has no value and counts as 0"]),
         (
             "(= (left) 0) (= (toll a) 2) (near a)",
-            ["problem.pddl: what :init says of 'near' is not heeded: it is derived"],
+            ["problem.pddl: facts of 'near' in :init are ignored, since it is derived"],
         ),
     ],
 )

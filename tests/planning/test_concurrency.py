@@ -245,7 +245,7 @@ def test_a_robot_says_that_it_cannot_carry_out_what_needs_two_at_once():
         end = robot.achieve(GOAL)
     [outcome] = end.emitted
     assert outcome.name == "no_plan"
-    assert "several steps at a time" in outcome.attributes["reason"]
+    assert "concurrent steps that need each other" in outcome.attributes["reason"]
 
 
 FLAT = """(define (domain flat) (:predicates (p) (q) (r))

@@ -76,7 +76,7 @@ def run(planner, *, simulated=False, prepare=None):
 @pytest.mark.parametrize("simulated", [True, False])
 def test_a_planner_that_cannot_be_cancelled_ends_in_no_plan(simulated):
     how = run(Stubborn(), simulated=simulated)
-    assert how == "Stubborn: no answer in time, and it goes on although it was told to stop"
+    assert how == "Stubborn: no answer in time, and it ignores its cancellation"
 
 
 @pytest.mark.parametrize("simulated", [True, False])
@@ -90,14 +90,14 @@ def test_a_stop_does_not_wait_for_a_planner_that_cannot_be_cancelled(simulated, 
         sequencer.post(Event("stop"))
 
     assert run(planner, simulated=simulated, prepare=when_asked(stop_when_it_works)) == "stopped"
-    assert "planner Stubborn: it goes on although it was told to stop" in caplog.text
+    assert "planner Stubborn: it ignores its cancellation" in caplog.text
 
 
 @pytest.mark.parametrize(
     ("where", "said"),
     [
-        ("looking", "planner StubbornLater: it goes on although it was told to stop"),
-        ("ending", "planner StubbornLater: it goes on although it was told to stop"),
+        ("looking", "planner StubbornLater: it ignores its cancellation"),
+        ("ending", "planner StubbornLater: it ignores its cancellation"),
         ("failing", ""),
         ("", ""),
     ],
@@ -111,7 +111,7 @@ def test_a_planner_that_cannot_be_closed_keeps_no_run_from_ending(where, said, c
 def test_a_planner_without_an_answer_that_cannot_be_closed_is_named(caplog):
     with caplog.at_level(logging.ERROR, "asyncio"):
         assert run(StubbornLater(EngineFailed("fake", "killed"), "ending")) == "fake: killed"
-    assert "planner StubbornLater: it goes on although it was told to stop" in caplog.text
+    assert "planner StubbornLater: it ignores its cancellation" in caplog.text
 
 
 class Tidy:
