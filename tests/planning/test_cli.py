@@ -145,7 +145,7 @@ def test_the_plan_can_be_written_as_a_plot(run, tmp_path):
 
 
 def test_a_place_where_no_plot_can_be_written_is_refused_before_any_search(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("planning.engines.race.PlannerRace", None)
+    monkeypatch.setattr("planning.cli.solving.PlannerRace", None)
     with pytest.raises(InputError, match=r"--plot: cannot write .*there is no folder '.*nowhere'"):
         run("--plot", str(tmp_path / "nowhere" / "plan.yaml"))
     with pytest.raises(InputError, match=r"--plot: cannot write .*it is a folder"):
@@ -215,7 +215,7 @@ def test_a_failed_engine_has_a_status_of_its_own(run, monkeypatch):
         async def close(self):
             pass
 
-    monkeypatch.setattr("planning.engines.race.PlannerRace", Broken)
+    monkeypatch.setattr("planning.cli.solving.PlannerRace", Broken)
     result = run()
     assert result.exit_code == 4
     assert "it fell over" in result.stderr
@@ -255,7 +255,7 @@ class Anytime:
     [("total-cost", 2, "cost 6, engine anytime"), ("driven", 1, "cost 1, engine anytime")],
 )
 def test_where_actions_have_costs_a_cheaper_plan_is_waited_for(run, tmp_path, monkeypatch, function, steps, cost):
-    monkeypatch.setattr("planning.engines.race.PlannerRace", Anytime)
+    monkeypatch.setattr("planning.cli.solving.PlannerRace", Anytime)
     monkeypatch.setattr("planning.cli.solving.PATIENT_SECONDS", 0.05)
     monkeypatch.setattr(Anytime, "stopped", False)
     (tmp_path / "tolls.pddl").write_text(TOLLS.replace("total-cost", function))
