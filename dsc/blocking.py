@@ -1,8 +1,8 @@
-"""Skills that block: in a thread, or in a process of their own. Cancellation and a deadline always arrive.
+"""Skills that block: in a thread, or in a new process. Cancellation and deadline always take effect.
 
-Simulated time stands still meanwhile, so the seconds of the deadline are real ones here. Threads are daemons: one that
-does not stop is left alone after `STOPPING` seconds and does not keep the program alive. A process is ended; it also
-ends as soon as the program is gone, however that died, so that nothing moves beside a program that takes the run up.
+While a body blocks, simulated time stands still, so deadlines count real seconds. Threads are daemons: one that does
+not stop is abandoned after `STOPPING` seconds and does not keep the program alive. A process is ended, also when the
+program dies. So nothing moves while another program resumes the run.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from knowledge_base.errors import described
 from knowledge_base.facts import Delta
 
 STOPPING = 2.0
-"""Real seconds for a body that was told to stop."""
+"""Real seconds for a body to stop after the request."""
 _KILLING = 3
-"""How often `STOPPING` passes until a process is left alone: first it is told to end, then it is killed."""
+"""Multiples of `STOPPING` until a process is abandoned: it is terminated, then killed."""
 _POLL = 0.02
-"""Real seconds after which a body's supervisor looks again whether it shall stop."""
+"""Real seconds between two checks for a stop request."""
 MOST_REPORTED = 1_000
 """Reports that the loop has not taken; the body waits before the next one."""
 _PR_SET_PDEATHSIG = 1
@@ -44,7 +44,7 @@ class DeadlineError(TimeoutError):
 
 
 class StoppedError(BaseException):
-    """A blocking body was told to stop; no `Exception`, so that it is not caught by mistake."""
+    """A blocking body must stop; not an `Exception`, so that no handler catches it by mistake."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class BlockingCall:
         report: as in `SkillCall`; may be used from the thread or process that the body runs in. It waits while
             `MOST_REPORTED` are on their way, and raises as `sleep`.
         seconds: real seconds that the body has at most.
-        stopping: is set when the body shall stop; in a process never, since that is ended.
+        stopping: is set when the body must stop; never in a process, which is ended instead.
     """
 
     action_id: str
@@ -119,15 +119,15 @@ def _blocking(call: SkillCall) -> BlockingCall:
 async def _supervised(
     work: Callable[[], Outcome], blocking: BlockingCall, call: SkillCall, what: str, stopping: float
 ) -> Outcome:
-    """Run work in a daemon thread; tell it to stop when we are cancelled or its time is over.
+    """Run work in a daemon thread; request its stop at the cancellation of the skill or at its deadline.
 
-    If it has not stopped after `stopping` real seconds, `what` the body runs in is left alone, and that is said.
+    If it has not stopped after `stopping` real seconds, `what` the body runs in is abandoned and reported.
     """
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[Outcome] = loop.create_future()
 
     def post(tell: Callable[[Any], None], value: object) -> None:
-        with suppress(RuntimeError):  # the loop is closed: we were left alone, and nobody listens
+        with suppress(RuntimeError):  # the loop is closed: this work was abandoned
             loop.call_soon_threadsafe(lambda: None if ended.done() else tell(value))
 
     def run() -> None:
@@ -160,7 +160,7 @@ async def _supervised(
 
 
 def _carried_over(error: BaseException) -> Exception:
-    """What a thread raised, as a future takes it: no `StopIteration`, and nothing that would end the program."""
+    """A thread's error in a form for a future: not `StopIteration`, and not one that would end the program."""
     with suppress(BaseException):  # an exception may fail when it is asked for its class
         if isinstance(error, Exception) and not isinstance(error, StopIteration | type):
             return error
@@ -207,7 +207,7 @@ def _in_child(body: Callable[..., Outcome], name: str, blocking: BlockingCall, a
 
 
 def _heard(ours: Connection, process: BaseProcess, blocking: BlockingCall) -> Outcome:
-    """What the child says, until it says how it ended."""
+    """Pass on the child's reports until its end; return its outcome."""
     while True:
         while not ours.poll(_POLL):
             blocking.sleep()
@@ -230,7 +230,7 @@ def _end(process: BaseProcess) -> None:
     process.join(STOPPING)
     if process.is_alive():
         process.kill()
-        process.join()  # where it hangs in a device, even that takes its time: we are left alone then
+        process.join()  # a process that hangs in a device takes time even then: it is abandoned
     process.close()
 
 
@@ -241,16 +241,16 @@ def _child(
     call = BlockingCall(action_id, lambda outcome: theirs.send(("report", outcome)), seconds)
     try:
         theirs.send(("ended", body(call, **arguments)))
-    except BaseException as error:  # noqa: BLE001  # whatever it is goes to the parent, in words
+    except BaseException as error:  # noqa: BLE001  # any error reaches the parent as text
         with suppress(OSError):  # the parent is gone
             theirs.send(("error", described(error)))
 
 
 def _end_with_parent() -> None:
-    """End this process as soon as the one that began it is gone: it knows of no deadline, and a resumed run acts anew.
+    """End this process with its parent: it has no deadline itself, and a resumed run acts again.
 
-    Linux's kernel sees to that also while the body never lets another thread of this process run. It does so when the
-    thread dies that began us, which lives as long as it supervises us.
+    Linux's kernel does so also while the body blocks all other threads of this process. It reacts to the death of the
+    thread that started this process, which lives as long as its supervision.
     """
     parent = multiprocessing.parent_process()
     assert parent is not None  # noqa: S101

@@ -1,4 +1,4 @@
-"""What passes between the sequencer and a component: a call, how it ended, and what is known of it after a crash."""
+"""Calls of skills: arguments of a component's skill, its reports, its outcome, and its status after a crash."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from knowledge_base.facts import Delta
 
 OBSERVED = "(observed)"
-"""What `SkillCall.observe` reports instead of an event; no event can be called so in a chart."""
+"""The event of a report by `SkillCall.observe`; no event of a chart can have this name."""
 
 
 class Clock(Protocol):
@@ -28,7 +28,7 @@ class Clock(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a skill ended: its outcome event, the event's attributes, and what was observed meanwhile.
+    """The end of a skill: its outcome event, the event's attributes, and its observations.
 
     `observed` is applied to the knowledge base, with the component as author, before the event is handled.
     """
@@ -45,13 +45,12 @@ class SkillCall:
     Attributes:
         action_id: names this execution; stable across restarts, never used for another one.
         clock: the only time a skill may use.
-        report: hands over an intermediate event while the skill goes on (e.g. progress, a perception).
+        report: posts an intermediate event while the skill continues (e.g. progress, a perception).
         deadline: second of run time at which the skill is cancelled.
-        give_up: says that something of the skill goes on that cannot be stopped.
+        give_up: reports a part of the skill that continues and cannot be stopped.
 
-    When a run is resumed after a crash, a call may come again with the same id. Its clock then begins when the
-    action was started, and what was reported before is not heard twice: a skill that acts once for an id simply
-    goes the same way.
+    After a crash, a resumed run may repeat a call with the same id. Its clock then begins at the start of the action,
+    and repeated reports are dropped. So a skill that acts once for an id executes the same steps again.
     """
 
     action_id: str
@@ -61,7 +60,7 @@ class SkillCall:
     give_up: Callable[[str], None] = lambda _: None
 
     def observe(self, observed: Delta) -> None:
-        """Hand over at once what was observed: it is known however the skill ends, and no event for the chart."""
+        """Assert an observation immediately, regardless of the outcome and without an event for the chart."""
         self.report(Outcome(OBSERVED, observed=observed))
 
     @property
@@ -71,7 +70,7 @@ class SkillCall:
 
 
 class Status(Enum):
-    """What a component says about an action that may have been under way when the run was broken off."""
+    """A component's report about an action that may have been running when the run was interrupted."""
 
     RUNNING = "running"
     UNKNOWN = "unknown"
@@ -80,25 +79,25 @@ class Status(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """The action came to its end, and how."""
+    """The action has ended, with this outcome."""
 
     outcome: Outcome
 
 
 MOST_WAITING = 5_000
-"""Reports of one action that wait to be taken; 750 bytes each, and a run takes some 10,000 in a second."""
+"""Reports of one action that wait to be taken; each has 750 bytes, and a run takes about 10,000 in a second."""
 _AT_ONCE = 250
-"""Observations that become one change together: each such merge takes as long as the change is large."""
+"""Observations that become one change together; the duration of each merge grows with the change."""
 
 
 class Reports:
-    """Posts reports in their order, at most `MOST_WAITING` that were not taken.
+    """Intermediate events of one action: posts reports in order, at most `MOST_WAITING` that were not taken.
 
-    Of further ones the newest of each event waits aside. Their observations become one change, so that no knowledge is
-    lost. All of it is posted when half of the others are taken, or at the end.
+    Further reports are conflated: the newest of each event waits, and their observations become one change, so that no
+    knowledge is lost. They are posted when half of the others are taken, or at the end.
 
     Args:
-        post: receives a report, and how many older ones of its event it stands for.
+        post: receives a report, and the number of older ones of its event that it replaces.
     """
 
     __slots__ = ("_aside", "_observed", "_post", "_waiting")
@@ -123,13 +122,13 @@ class Reports:
                 self._observed = [_as_one(self._observed)]
 
     def taken(self) -> None:
-        """One that was posted waits no more."""
+        """A posted report was taken."""
         self._waiting -= 1
         if self._aside and self._waiting <= MOST_WAITING // 2:
             self.flush()
 
     def flush(self) -> None:
-        """Post what waits aside; what was observed comes with the first of them."""
+        """Post the conflated reports; the first has their observations."""
         if not self._aside:
             return
         aside, self._aside = self._aside, {}
@@ -141,7 +140,7 @@ class Reports:
 
 
 def _as_one(observed: list[Delta]) -> Delta:
-    """One change after the other as a single one; halves first, as most are small."""
+    """Merge consecutive changes; halves first, as most are small."""
     if len(observed) < 2:
         return observed[0] if observed else Delta()
     half = len(observed) // 2

@@ -23,7 +23,7 @@ class Finding:
 
     @property
     def place(self) -> Place | None:
-        """Where it stands."""
+        """Its place in the text."""
         return self.error.place
 
     def __str__(self) -> str:

@@ -19,37 +19,37 @@ NO_CANDIDATE = "no_candidate"
 NO_PLAN = "no_plan"
 """A dynamic state's goal cannot be planned for."""
 GAVE_UP = "gave_up"
-"""A dynamic state's goal was given up: a rule said so, or the budget was spent."""
+"""A dynamic state's goal was abandoned by a rule, or because its budget was spent."""
 TIMED_OUT = "timed_out"
 """A skill did not end within its time and was cancelled."""
 SKILL_ERROR = "skill_error"
-"""A skill raised, or said what cannot be, instead of ending with one of its outcomes."""
+"""A skill raised an exception, or ended without a valid outcome."""
 ERROR = "error"
 """An action or guard could not be evaluated."""
 DONE_STATE = "done.state."
-"""What `done` is called in dialect `scxml`, with the state's name after it (SCXML 3.13)."""
+"""The name of `done` in dialect `scxml`, with the state's name as suffix (SCXML 3.13)."""
 EXECUTION_ERROR = "error.execution"
-"""What `error` is called in dialect `scxml` (SCXML 3.13)."""
+"""The name of `error` in dialect `scxml` (SCXML 3.13)."""
 FAILURES = frozenset({SKILL_ERROR, TIMED_OUT})
-"""How any skill may end. What no state of its plot takes goes outwards, to the states that hold plots."""
+"""Ends of any skill. If no state of its plot takes one, the states around the plot may."""
 LED_AWAY = "then."
-"""What the outcomes of generated plots begin with that lead to a state of the plot which holds the goal."""
+"""Prefix of outcomes of generated plots that lead to a state of the plot with the goal."""
 ERRORS = frozenset({ERROR, EXECUTION_ERROR})
 
 TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
-"""What the executive's clock says to one state; no transition has them under `on`."""
+"""Events of the executive's clock for one state; no transition has them under `on`."""
 RESERVED = TIMERS | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, SKILL_ERROR, ERROR}
-"""Events the executive fires itself. Nobody else declares any of them, except that plots and skills that plan may end
-with `no_plan` and `gave_up`."""
+"""Events that only the executive fires, except that plots and skills for planning may end with `no_plan` and
+`gave_up`."""
 EXECUTIVES = RESERVED - {NO_PLAN, GAVE_UP}
-"""Events that are nobody else's; the other two are passed on by who plans."""
+"""Events that only the executive fires, without exception."""
 
 NO_ATTRIBUTES: Mapping[str, Any] = MappingProxyType({})
-"""Of most events; shared, as nobody can change it."""
+"""Of most events; shared, as it is immutable."""
 
 
 def goes_outwards(event: str) -> bool:
-    """Whether what no state of a plot takes is offered to the states that hold plots around it."""
+    """Whether the states around a plot may take the event if no state inside does."""
     return event in FAILURES or event.startswith(LED_AWAY)
 
 
@@ -57,13 +57,13 @@ class Event(NamedTuple):
     """Something that happened; a named tuple, since many are made and a frozen dataclass takes four times as long.
 
     Attributes:
-        name: what transitions are labelled with.
+        name: the label of transitions.
         attributes: data, read in charts as `?event.attribute`.
-        to: the activation (serial number of one entry into one state) it is for; the state and the states
-            around it in the same plot see it, nobody else. An event for a state that was left is dropped.
+        to: the activation (serial number of one entry into one state) that it is for. Only that state and the states
+            around it in the same plot see it. An event for a state that was left is dropped.
         exact: with `to`: that state alone may take it.
-        frame: the plot instance inside which it is visible; with neither, everybody sees it.
-        number: which of the state's timeouts or periods.
+        frame: the plot instance inside which it is visible; without `to` and `frame`, it is visible everywhere.
+        number: the index of the state's timeout or period.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""A profile brought to the components and plots that it is about, everything checked before anything changes."""
+"""Settings profiles: apply one to components and plots, after validation of all its values."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from knowledge_base.facts import Value
 
 
 def configure(components: Iterable[Component], profile: Profile | None = None) -> None:
-    """Give the components' parameters the values that the profile says.
+    """Set the components' parameters to the values of the profile.
 
     Args:
-        components: of one robot; each instance has values of its own.
-        profile: with none, everything is as its builder says.
+        components: of one robot; each instance has separate values.
+        profile: its settings; without one, the defaults are effective.
 
     Raises:
         UnknownNameError: there is no such component or parameter.
-        SchemaError: a value is of another type or out of range, the builder allows nobody to change it, a relation does
-            not hold, or a parameter that has to be bound has no value. The message has the place and the range.
+        SchemaError: a value is of another type, out of range or not for profiles, a relation is violated, or a
+            parameter has no value. The message has the place and the range.
     """
     by_name = {component.name: component for component in components}
     settings = {} if profile is None else profile.components
@@ -40,7 +40,7 @@ def adapted(plots: Iterable[ActionPlot], profile: Profile | None = None) -> tupl
 
     Raises:
         UnknownNameError: there is no such plot or parameter.
-        InputError: a value is of another type than the parameter or out of its range, or not for profiles to say.
+        InputError: a value is of another type than the parameter or out of its range, or a profile may not change it.
     """
     plots = tuple(plots)
     if profile is None or not profile.plots:

@@ -1,7 +1,7 @@
-"""The design in the knowledge base: plots, their rules, components and skills as things that can be asked about.
+"""The design in the knowledge base: plots, their rules, components and skills as objects of queries (S1.6, S1.13).
 
-What was modelled at design time is then there at run time, in the same graph and language as the world (S1.6,
-S1.13): which plots carry out a planning action, who offers a skill, what a failure is answered with.
+The run time has the design in the same graph and language as the world. It has the plots that implement a planning
+action, the components that offer a skill, and the rules that react to a failure.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ MODELS = Schema.parse(
     (leads-to ?r - rule ?next - text)))""",
     "models",
 )
-"""What can be said about the design; merge it into a world's own schema (`Schema.merged`)."""
+"""Predicates about the design; merge it into a world's own schema (`Schema.merged`)."""
 
 
 def design_facts(library: Library, skills: Iterable[SkillSignature] = ()) -> Delta:
     """The design as one change for a knowledge base whose schema has `MODELS`.
 
-    Things are named by kind and name, so that they never meet a thing of the world: `plot:search`, `skill:arm.grasp`,
-    `component:arm`, `action:pick-up`, `rule:search.1`, `handler:patrol.1`; the last two count from 1 in their plot. An
-    `answers` fact is a rule for an outcome; its response is what people call the rule. `concerns` has the steps that a
-    rule names, `leads-to` what follows its response.
+    A name has its kind as prefix, unlike names of the world: `plot:search`, `skill:arm.grasp`, `component:arm`,
+    `action:pick-up`, `rule:search.1`, `handler:patrol.1`. Rules and handlers count from 1 in their plot. An `answers`
+    fact is a rule for an outcome, with the rule's label. `concerns` has the steps that a rule names, `leads-to` the
+    continuation after its response.
 
     Args:
         library: the plots.

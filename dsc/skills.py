@@ -1,14 +1,14 @@
-"""What a robot can do, seen from the sequencer: components with typed skills, states and parameters.
+"""Skills: typed actions of components, and the smallest plot around one (S0.7, S0.8, S1.1).
 
-A component is configured (`configure`), switched between modes (`switch`) and triggered (a skill); it
-answers with outcome events and with what it observed, and it judges nothing (S0.7, S0.8, S1.1). A skill is
-one decorated coroutine:
+A skill ends with an outcome event and observations, which the plot interprets. It is one decorated coroutine:
 
-    class Gripper(Component):
-        @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}})
-        async def grasp(self, call: SkillCall, item: str) -> Outcome:
-            await call.clock.sleep(2.0)
-            return Outcome("grasped", observed=Delta(added=(fact("holding", item),)))
+```python
+class Gripper(Component):
+    @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}})
+    async def grasp(self, call: SkillCall, item: str) -> Outcome:
+        await call.clock.sleep(2.0)
+        return Outcome("grasped", observed=Delta(added=(fact("holding", item),)))
+```
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
 
 AfterCrash = Literal["repeat", "same_id", "sense"]
-"""What may be done about an action of which nothing is known: do it again, since twice is as once; do it with the
-same id, since the component does each id once; neither, since somebody has to look what happened first."""
+"""The reaction to an action with unknown effect. `repeat` it, as it is idempotent. Execute it with the `same_id`, which
+the component executes once. Or `sense` the world first, without a repetition."""
 
 SkillBody = Callable[..., Any]
-"""What is decorated: a coroutine function or, if it blocks, a plain one, that gives an `Outcome`."""
+"""The decorated function: a coroutine function or, if it blocks, a plain one, that returns an `Outcome`."""
 _Body = TypeVar("_Body", bound=SkillBody)
 Pattern = Literal["skill", "query", "event"]
-"""Which pattern of communication `trigger` uses: a skill ends by itself, a query with its answer, an event not at
-all: it is activated until the state is left (S1.1)."""
+"""The pattern of communication of a `trigger` (S1.1). A skill ends by itself, a query with its answer; an event stays
+active until the state is left."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +43,11 @@ class SkillSignature:
     """A skill's interface.
 
     Attributes:
-        component, name: how charts address it, `component.name`.
+        component, name: its name in charts is `component.name`.
         parameters: names with types (`None`: anything).
-        defaults: values of the parameters that may be left out.
+        defaults: values of optional parameters.
         outcomes: events it may end with or report, with their attributes and types.
-        pattern: how it communicates.
+        pattern: see `Pattern`.
         after_crash: see `AfterCrash`.
     """
 
@@ -61,19 +61,19 @@ class SkillSignature:
 
 
 CarryOut = Callable[[Any, SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
-"""How a decorated body is made to act: the component, the bound body, the call, the arguments."""
+"""Executes a decorated body; receives the component, the bound body, the call and the arguments."""
 
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """What a decorator notes about the body below it.
+    """The declaration of a decorated body.
 
     Attributes:
         types: types of parameters by name; others follow from the annotations `int`, `float` and `bool`.
         outcomes: as in `SkillSignature`.
-        carry_out: how a call reaches the body.
-        own: how many of the body's first parameters no chart gives.
-        pattern: how it communicates.
+        carry_out: passes a call to the body.
+        own: number of the body's first parameters without a value from charts.
+        pattern: see `Pattern`.
         after_crash: see `AfterCrash`.
     """
 
@@ -92,7 +92,7 @@ class Declared:
 
 
 DECLARED = "__dsc_skill__"
-"""Where `Declared` is noted."""
+"""The attribute of a body with its declaration."""
 _ANNOTATED: Mapping[Any, str] = {"int": "number", "float": "number", "bool": "boolean"} | {
     int: "number", float: "number", bool: "boolean",
 }  # fmt: skip
@@ -105,19 +105,18 @@ def skill(
     blocking: Literal["thread", "process"] | None = None,
     after_crash: AfterCrash = "sense",
 ) -> Callable[[_Body], _Body]:
-    """Declare a component's method, or a function of its own (see `dsc.components.robot`), as a skill.
+    """Declare a component's method, or a function (see `dsc.components.robot`), as a skill.
 
     Args:
         outcomes: every event it may end with or report, with the event's attributes and their types.
         types: types of its parameters by name; others follow from the annotations `int`, `float` and `bool`, and
             what is left takes any value.
-        blocking: the body is no coroutine and blocks: it runs in a thread, with a `BlockingCall` to be asked now and
-            then whether it shall stop; or in a process, which is ended when it shall stop. What goes to a process
-            and comes back is pickled, the component itself included.
-        after_crash: what may be done when a run is resumed and the component does not know what became of it.
+        blocking: the body is a plain function that blocks. It runs in a thread, with a `BlockingCall` for periodic
+            checks; or in a process, which is ended instead. Arguments, outcome and component are pickled for it.
+        after_crash: the reaction if a run is resumed and the component does not know the action's result.
 
     Raises:
-        InputError: the outcomes are no mapping, or it blocks in no way that there is.
+        InputError: the outcomes are not a mapping, or `blocking` has another value.
     """
     require_names(outcomes, "the outcomes of a skill", "@skill(outcomes={'grasped': {}})")
     for event, attributes in outcomes.items():
@@ -138,7 +137,7 @@ def require_names(declared: object, what: str, example: str) -> None:
 async def _awaited(_: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
     coming = body(call, **arguments)
     if not inspect.isawaitable(coming):
-        raise SchemaError("it is no coroutine: write `async def`, or say that it is `blocking`")
+        raise SchemaError("it is not a coroutine: write `async def`, or declare it `blocking`")
     return cast(Outcome, await coming)
 
 
@@ -219,8 +218,8 @@ def primitive_plot(
     Args:
         skill: the skill's signature, e.g. `arm.skills()["grasp"]`.
         done: the outcome that completes the plot.
-        name: the plot's name; the skill's if left out.
-        implements: the planning action it carries out; its parameters must be named as the action's.
+        name: the plot's name; by default the skill's.
+        implements: the planning action that it executes; both have the same names of parameters.
         when: as a candidate, the condition under which it fits.
         effects: whether the action's effects are observed by the skill or assumed after `done`.
 

@@ -16,7 +16,7 @@ from pydantic_core import PydanticSerializationError, to_json
 FORMAT = "dsc-trace"
 VERSION = 2
 BEGINS = f'{{"format": "{FORMAT}"'
-"""How each trace file begins."""
+"""The beginning of each trace file."""
 
 
 class Record(NamedTuple):
@@ -28,7 +28,7 @@ class Record(NamedTuple):
         type: `world`, `plot`, `event`, `step`, `rule`, `decision`, `knowledge`, `action`, `log`, `end`, or an upper
             room's (`plan.found`, `scene`, …).
         cause: seq of the record that led to it; `None` for the first.
-        data: what there is to say, plain data.
+        data: its content, plain data.
     """
 
     seq: int
@@ -45,13 +45,13 @@ class Record(NamedTuple):
 
     @staticmethod
     def from_line(line: str) -> Record:
-        """The inverse of `to_line`, as far as the time is written."""
+        """The inverse of `to_line`; the time is rounded."""
         data = json.loads(line)
         return Record(data.pop("seq"), data.pop("t"), data.pop("type"), data.pop("cause"), data)
 
 
 Listener = Callable[[Record], None]
-"""Is told every record as it happens; must not block. It may keep the record, whose data nobody changes."""
+"""Receives every record immediately; must not block. It may keep the record, which is immutable."""
 
 
 class Trace:
@@ -59,7 +59,7 @@ class Trace:
 
     Args:
         now: tells the seconds of run time.
-        last: number of the last record there is already, of a run that is taken up again.
+        last: number of the last record of a run that is resumed.
     """
 
     def __init__(self, now: Callable[[], float], last: int = 0) -> None:
@@ -70,7 +70,7 @@ class Trace:
 
     @property
     def heard(self) -> bool:
-        """Whether anybody listens."""
+        """Whether there is a listener."""
         return bool(self._listeners)
 
     def listen(self, listener: Listener) -> None:
@@ -106,7 +106,7 @@ def text_of(value: Any) -> str:
     """JSON without spaces, on one line; numbers that JSON lacks (`Infinity`) are written as Python reads them.
 
     Raises:
-        TypeError: something in it is no plain data.
+        TypeError: a part of it is not plain data.
         RecursionError: it is nested too deeply.
     """
     try:

@@ -1,1 +1,1 @@
-"""What components are made of: ports, life cycle, dependencies, activation, and how they are reached from afar."""
+"""Components: skills and ports, parameters, life cycle, streams, and their use over a transport."""

@@ -1,14 +1,16 @@
 """A behaviour tree as a skill (S4.7), through the extra `bt` (py_trees): it is ticked only while the skill is active.
 
-    class Butler(Component):
-        @tree_skill(success="served", failure="not_served", outcomes={"not_served": {}, "served": {}})
-        def serve(self, call: SkillCall, item: str) -> Behaviour:
-            return sequence(
-                retry(action("grasp", lambda: self.arm.grasp(call, item), ends={"grasped"}), 3),
-                fallback(condition("open", lambda: self.door), action("open", lambda: self.arm.push(call), {"pushed"})),
-            )
+```python
+class Butler(Component):
+    @tree_skill(success="served", failure="not_served", outcomes={"not_served": {}, "served": {}})
+    def serve(self, call: SkillCall, item: str) -> Behaviour:
+        return sequence(
+            retry(action("grasp", lambda: self.arm.grasp(call, item), ends={"grasped"}), 3),
+            fallback(condition("open", lambda: self.door), action("open", lambda: self.arm.push(call), {"pushed"})),
+        )
+```
 
-py_trees is met here alone. Its trees are used as they are: any `Behaviour` may stand among these.
+No other module imports py_trees. Any `Behaviour` of py_trees may be a child.
 """
 
 from __future__ import annotations
@@ -33,9 +35,9 @@ from knowledge_base.language.checking.inputs import shown
 PERIOD = 0.1
 """Seconds between two ticks."""
 FOREVER = -1
-"""How often `repeat` repeats without end."""
+"""Number of repetitions without end."""
 _observe: ContextVar[Callable[[Delta], None]] = ContextVar("observe")
-"""Where the actions of a tree hand over what they have observed: each skill has a context of its own."""
+"""Receives the observations of a tree's actions; each skill runs in a separate context."""
 _Body = TypeVar("_Body", bound=Callable[..., Behaviour])
 
 
@@ -47,21 +49,21 @@ def tree_skill(
     period: float = PERIOD,
     after_crash: AfterCrash = "sense",
 ) -> Callable[[_Body], _Body]:
-    """Declare a method that makes a behaviour tree as a skill; each call makes a fresh tree.
+    """Declare a method that returns a behaviour tree as a skill; each call makes a new tree.
 
-    What an action in the tree has observed is handed over when it ends, so it is known however the skill ends.
+    An action's observation is asserted when the action ends, regardless of the skill's outcome.
 
     Args:
         success: the outcome when the root succeeds.
         failure: the outcome when it fails.
-        outcomes: these two, and what else actions report; neither has attributes.
+        outcomes: these two without attributes, and those that actions report.
         types: of the parameters, as for `skill`.
         period: seconds of run time between two ticks.
-        after_crash: as for `skill`; the tree begins anew then.
+        after_crash: as for `skill`; the tree then starts again.
 
     Raises:
         UnknownNameError: success or failure is not among the outcomes.
-        InputError: it is, and has attributes; or the outcomes are no mapping.
+        InputError: it has attributes, or the outcomes are not a mapping.
     """
     require_names(outcomes, "the outcomes of a tree", "outcomes={'served': {}, 'not_served': {}}")
     for end in (success, failure):
@@ -92,38 +94,38 @@ def _require_bare(end: str, outcomes: Mapping[str, Mapping[str, str | None]]) ->
 
 
 def sequence(*children: Behaviour, name: str = "sequence", reactive: bool = False) -> Behaviour:
-    """One after the other, until one fails; if `reactive`, earlier ones are tried anew at each tick.
+    """Run the children in order, until one fails; if `reactive`, each tick starts with the first child.
 
-    So a condition before an action holds when it begins or, if `reactive`, as long as it runs; an action before
-    another one is then begun anew, too.
+    A condition before an action holds when the action begins or, if `reactive`, while it runs. An action before another
+    one is then started again, too.
     """
     return Sequence(name, memory=not reactive, children=list(children))
 
 
 def fallback(*children: Behaviour, name: str = "fallback", reactive: bool = False) -> Behaviour:
-    """One after the other, until one succeeds; if `reactive`, earlier ones are tried anew at each tick."""
+    """Run the children in order, until one succeeds; if `reactive`, each tick starts with the first child."""
     return Selector(name, memory=not reactive, children=list(children))
 
 
 def repeat(child: Behaviour, times: int = FOREVER) -> Behaviour:
-    """The child again, until it has succeeded so many times; it fails when the child fails."""
+    """Run the child that many times; fail when it fails."""
     return Repeat(f"repeat {child.name}", child, times)
 
 
 def retry(child: Behaviour, times: int) -> Behaviour:
-    """The child again when it fails, so many times in all."""
+    """Run the child until it succeeds, at most that many times."""
     return Retry(f"retry {child.name}", child, times)
 
 
 def condition(name: str, holds: Callable[[], bool]) -> Behaviour:
-    """Succeeds if the test holds when it is ticked, else fails."""
+    """Succeed if the test is true at the tick, else fail."""
     return _Condition(name, holds)
 
 
 def action(name: str, begin: Callable[[], Awaitable[Outcome]], ends: Collection[str]) -> Behaviour:
-    """Runs while a coroutine does, e.g. another skill; succeeds if it ends with one of these outcomes, else fails.
+    """Run a coroutine, e.g. another skill; succeed if it ends with one of these outcomes, else fail.
 
-    What the coroutine raises ends the whole skill. When the tree turns elsewhere, it is cancelled.
+    An exception of the coroutine ends the whole skill. When the tree leaves the action, the coroutine is cancelled.
     """
     return _Action(name, begin, frozenset(ends))
 
@@ -152,7 +154,7 @@ class _Action(Behaviour):
         with contained():
             outcome = await self._begin()
         if not isinstance(outcome, Outcome):
-            raise InputError(f"the action '{self.name}' ended with {shown(outcome)}, which is no outcome")
+            raise InputError(f"the action '{self.name}' ended with {shown(outcome)}, which is not an outcome")
         if outcome.observed:
             _observe.get()(outcome.observed)
         return outcome
@@ -169,7 +171,7 @@ class _Action(Behaviour):
 
 
 async def _halt(root: Behaviour) -> None:
-    """Cancel what still runs in the tree, and wait for it."""
+    """Cancel the running actions of the tree, and wait for them."""
     if root.status is Status.RUNNING:
         root.stop(Status.INVALID)
     stopping = [task for one in root.iterate() if isinstance(one, _Action) for task in one.stopping]

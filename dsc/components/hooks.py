@@ -37,10 +37,10 @@ class contained:  # noqa: N801  # a context manager, as `suppress`
 
 
 def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:
-    """Whether the hook itself raised it; else somebody cancels the task, closes its coroutine, or pressed Ctrl-C.
+    """Whether the hook itself raised it, rather than a cancellation, the end of its coroutine, or Ctrl-C.
 
     Args:
-        error: what came out of the hook.
+        error: raised inside the hook.
         task: the task that runs the hook, `None` outside any.
     """
     kind = type(error)  # `isinstance` would ask the exception for its class, which may fail
@@ -76,11 +76,11 @@ _ON_SIGINT: Any = getattr(Runner, "_on_sigint", None)  # it has no public name
 
 
 GRACE = 30.0
-"""Seconds of loop time for cancelled work to put things in order."""
+"""Seconds of loop time for a cancelled task to clean up."""
 
 
 def give_up_after(task: asyncio.Task[Any], seconds: float, say: Callable[[], None]) -> None:
-    """If the task is not over in so many seconds of loop time, nobody waits for it any more, and `say` is called."""
+    """Abandon the task if it is not over after that many seconds of loop time, and call `say`."""
 
     def overdue() -> None:
         give_up(task)
@@ -91,10 +91,9 @@ def give_up_after(task: asyncio.Task[Any], seconds: float, say: Callable[[], Non
 
 
 def give_up(task: asyncio.Task[Any]) -> None:
-    """Let a task be: the loop does not wait for it when it closes.
+    """Abandon a task: the loop does not wait for it when it closes.
 
-    Asyncio waits for every task it knows of, for ever if one swallows its cancellation; the way out is the one its
-    documentation names for those who extend it.
+    Asyncio waits without end for a task that ignores its cancellation. Its documentation names this way for extensions.
     """
     task._log_destroy_pending = False  # type: ignore[attr-defined]  # noqa: SLF001  # it is known to be pending
     asyncio.tasks._unregister_task(task)  # noqa: SLF001  # documented under "Extending"

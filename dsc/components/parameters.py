@@ -34,8 +34,8 @@ class Parameter:
         default: its value until another one is set; without a default, a profile must set it.
         least, most: the range of a number.
         among: the permitted values; empty means any.
-        changed_by: the role that may change it, each with the rights of those before it: `nobody`; a `profile`, before
-            a run; an `operator`, during a run; the `rules` of plots, after a failure; `plots` anywhere.
+        changed_by: the role that may change it: `nobody`; a `profile`, before a run; an `operator`, during a run; the
+            `rules` of plots, after a failure; `plots` anywhere. Each role includes those before it.
         follows: instead of a default, a term over other parameters, as `(* 0.5 ?cycle)`.
         depends_on: parameters that its value depends on, besides those that it follows. A new value of one of them
             resets it: to its default, to the value of its term, or to no value.
@@ -209,8 +209,8 @@ def check_declarations(
         module: the module of the class, for messages.
 
     Raises:
-        InputError: a type, `changed_by` or name in a relation is unknown, a range has no values, a default is outside
-            it, or a relation is not a condition. The message has the file, the parameter, the value found and the
+        InputError: a type, role or name is unknown, a range is empty, a default is outside it, or a relation is not a
+            condition. The message has the file, the parameter, the value found and the
             nearest name.
     """
     try:

@@ -1,15 +1,17 @@
 """Ports of a component next to its skills: events, queries and one-way messages, as decorators (S1.1).
 
-    class Battery(Component):
-        @event({"level": "number"})
-        def low(self, level: float, below: float = 20.0) -> dict[str, Any] | None:
-            return {"level": level} if level < below else None
+```python
+class Battery(Component):
+    @event({"level": "number"})
+    def low(self, level: float, below: float = 20.0) -> dict[str, Any] | None:
+        return {"level": level} if level < below else None
 
-        @query({"hours": "number"})
-        async def lasts(self, watts: float) -> dict[str, Any]: ...
+    @query({"hours": "number"})
+    async def lasts(self, watts: float) -> dict[str, Any]: ...
 
-        @takes
-        async def calibrate(self, full: float) -> None: ...
+    @takes
+    async def calibrate(self, full: float) -> None: ...
+```
 
 `self.update("low", 17.5)` tests a new value for each activation of the event.
 """

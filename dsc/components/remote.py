@@ -77,7 +77,7 @@ class RemoteComponent(Component):
             remote._condition.take(said["condition"])
         except Exception as error:
             await endpoint.close()
-            raise RefusedError(f"'{name}' says of itself what cannot be read: {described(error)}") from error
+            raise RefusedError(f"the description of '{name}' cannot be read: {described(error)}") from error
         return remote
 
     def skills(self) -> dict[str, SkillSignature]:
@@ -142,7 +142,7 @@ class RemoteComponent(Component):
                 for need in needs:
                     require_text(need, "the name of a component that is needed")
             case _:
-                raise InputError(f"'{self.name}' says of its condition what cannot be read: {text_of(condition, repr)}")
+                raise InputError(f"the condition of '{self.name}' cannot be read: {text_of(condition, repr)}")
         if self._working and not self.life.starting:
             if self.life.state is Life.SHUTDOWN and life != Life.SHUTDOWN:
                 self.life.become(Life.INIT)

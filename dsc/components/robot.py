@@ -117,8 +117,9 @@ def _require_needs(component: Component) -> None:
     modes = (NEUTRAL, *component.modes)
     for mode, needed in needs.items():
         if not isinstance(needed, tuple) or not all(isinstance(one, str) for one in needed):
-            when = f"in its mode '{mode}'" if mode else "always"
-            raise InputError(f"what component '{name}' needs {when} is a tuple, as in {_EXAMPLE}, not {shown(needed)}")
+            when = f" in its mode '{mode}'" if mode else ""
+            message = f"the needs of component '{name}'{when} are a tuple, as in {_EXAMPLE}, not {shown(needed)}"
+            raise InputError(message)
         if mode != ALWAYS and component.modes and mode not in modes:
             message = f"component '{name}' needs something in its mode '{mode}', which it does not have"
             raise UnknownNameError(message, found=mode, valid=modes)

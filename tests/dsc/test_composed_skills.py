@@ -183,7 +183,7 @@ def test_how_a_tree_ends_is_declared(success, outcomes, why):
 def test_an_action_of_a_tree_that_ends_with_no_outcome_is_a_skill_error():
     ran = serve("says_nothing", Butler())
     (reason,) = [event["attributes"].get("reason") for event in ran.of_type("event")]
-    assert reason == "arm.says_nothing: InputError: the action 'mute' ended with None, which is no outcome"
+    assert reason == "arm.says_nothing: InputError: the action 'mute' ended with None, which is not an outcome"
 
 
 @pytest.mark.parametrize(

@@ -155,7 +155,7 @@ def test_frames_that_are_none_are_counted():
         transport.deliver("x", "server", b'{"what":"push","kind":"news","n":1,"low":1,"life":"l","body":{}}')
         return server.dropped
 
-    assert run_simulated(main()) == {"no frame": 4, "push 'news' that nobody could take": 1}
+    assert run_simulated(main()) == {"no frame": 4, "push 'news' that cannot be read": 1}
 
 
 # -- bounds ------------------------------------------------------------------------------------------------

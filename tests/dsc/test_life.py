@@ -265,8 +265,11 @@ def test_a_start_that_was_broken_off_is_begun_by_who_waits_for_it():
 @pytest.mark.parametrize(
     ("needs", "said"),
     [
-        ({"scanning": "base"}, "in its mode 'scanning' is a tuple, as in needs = {'scanning': ('power',)}, not 'base'"),
-        ({ALWAYS: [1]}, "needs always is a tuple"),
+        (
+            {"scanning": "base"},
+            "in its mode 'scanning' are a tuple, as in needs = {'scanning': ('power',)}, not 'base'",
+        ),
+        ({ALWAYS: [1]}, "needs of component 'laser' are a tuple"),
         (("base",), "is a mapping of modes, as in needs = {'scanning': ('power',)}, not"),
         ({"scaning": ("base",)}, "in its mode 'scaning', which it does not have; did you mean 'scanning'?"),
     ],

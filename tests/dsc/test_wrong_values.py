@@ -121,7 +121,7 @@ def sequencer_of(**other):
         (lambda: skill(outcomes={}, blocking="tread"), "blocks in a thread or a process, not 'tread'; did you mean 'thread'?"),
         (lambda: query(["hours"]), "the values of an answer are a mapping of names"),
         (lambda: event(5), "the attributes of an event are a mapping of names"),
-        (lambda: component_of("arm", "go"), "'go' is no skill: decorate a function with `skill`"),
+        (lambda: component_of("arm", "go"), "'go' is not a skill: decorate a function with `skill`"),
         (lambda: primitive_plot(Arm().skills()["go"], done="okk"), "no outcome 'okk'; did you mean 'ok'?"),
         (executive([Arm]), "an instance is made by Arm()"),
         (executive(["arm"]), "a component is an instance of a subclass of Component, not 'arm'"),
@@ -156,4 +156,4 @@ def test_a_skill_that_is_no_coroutine_says_what_to_write():
         ).run("q")
 
     (why,) = run_simulated(main()).emitted
-    assert "it is no coroutine: write `async def`, or say that it is `blocking`" in why.attributes["why"]
+    assert "it is not a coroutine: write `async def`, or declare it `blocking`" in why.attributes["why"]
