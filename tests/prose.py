@@ -95,7 +95,7 @@ WORDS = {
 """Private or archaic words (patterns), and the words to use instead."""
 
 PENDING = {
-    "dsc/sequencer", "knowledge_base", "knowledge_base/world",
+    "knowledge_base", "knowledge_base/world",
 }  # fmt: skip
 """Rooms that are not rewritten yet: pages, and folders without the folders inside. The list only shrinks."""
 

@@ -1,7 +1,7 @@
-"""Time, injected: real seconds, or simulated ones that jump to the next thing that is due.
+"""Time, injected: real seconds, or simulated ones that jump to the next timer.
 
-In simulated time the whole asyncio loop runs on the simulated clock, so that a skill may simply sleep. While
-a real answer is awaited (a planner in another process) the clock is held: nothing else becomes due.
+In simulated time the whole asyncio loop runs on the simulated clock, so that a skill may sleep as in real time. A hold
+stops the clock during the wait for a real answer, e.g. of a planner in another process.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from typing import Any, NamedTuple, TypeVar, TypeVarTuple, Unpack
 _Result = TypeVar("_Result")
 _Args = TypeVarTuple("_Args")
 _DIGITS = 9
-"""Of a second: what is due closer together is due at one moment, as for every asyncio loop."""
+"""Decimal places of a second: calls that are due closer together are due at one moment, as in every asyncio loop."""
 _FEW = 100
-"""So many cancelled calls may wait until they would be due, however few others there are."""
+"""Upper bound of cancelled calls that wait for their time, unless they are less than half of all."""
 
 
 class LoopClock:
     """A `Clock` on the running asyncio loop's time, which is real or simulated.
 
     Args:
-        at: what it shows when it is made, in seconds; a run that is taken up again goes on from there.
+        at: its first time, in seconds; a resumed run continues from there.
     """
 
     def __init__(self, at: float = 0.0) -> None:
@@ -44,7 +44,7 @@ class LoopClock:
         await asyncio.sleep(seconds)
 
     async def sleep_until(self, due: float) -> None:
-        """Let run time pass until `due`, if that is still to come."""
+        """Let run time pass until `due`, if that is in the future."""
         passed = asyncio.Event()
         handle = self.call_at(due, passed.set)
         try:
@@ -53,11 +53,11 @@ class LoopClock:
             handle.cancel()
 
     def call_at(self, due: float, call: Callable[[], object]) -> asyncio.TimerHandle:
-        """Let the loop make a call at that run time, or soon if it is over."""
+        """Let the loop make a call at that run time, or soon if that is past."""
         return asyncio.get_running_loop().call_at(due + self._start, call)
 
     def timeout_at(self, due: float) -> asyncio.Timeout:
-        """A bound for the waiting in a block: `TimeoutError` at that run time; none if it never comes."""
+        """Return a bound for the waits in a block: `TimeoutError` at that run time; `math.inf` means no bound."""
         return asyncio.timeout_at(due + self._start if math.isfinite(due) else None)
 
     @property
@@ -66,12 +66,12 @@ class LoopClock:
         return isinstance(asyncio.get_running_loop(), SimulatedEventLoop)
 
     async def settled(self) -> None:
-        """Wait until nothing more happens at this moment of simulated time; in real time, for no time."""
+        """Wait until the loop has no work at this moment of simulated time; in real time, for one turn."""
         loop = asyncio.get_running_loop()
         await (loop.settled() if isinstance(loop, SimulatedEventLoop) else asyncio.sleep(0))
 
     def hold(self) -> AbstractContextManager[None]:
-        """Simulated time stands still inside; real time goes on, of course."""
+        """Stop simulated time inside the block; real time continues."""
         loop = asyncio.get_running_loop()
         return loop.hold() if isinstance(loop, SimulatedEventLoop) else _no_hold()
 
@@ -108,43 +108,43 @@ class PastClock:
         await self._clock.sleep_until(due)
 
     def hold(self) -> AbstractContextManager[None]:
-        """Simulated time stands still inside."""
+        """Stop simulated time inside the block."""
         return self._clock.hold()
 
 
 def released() -> AbstractContextManager[None]:
-    """Inside, one hold on simulated time does not count: its owner waits in simulated time for what comes."""
+    """Suspend one hold on simulated time inside the block: its owner waits in simulated time."""
     loop = asyncio.get_running_loop()
     return loop.release() if isinstance(loop, SimulatedEventLoop) else _no_hold()
 
 
 class SimulatedEventLoop(asyncio.SelectorEventLoop):
-    """An asyncio loop whose time jumps to what is due next once nothing is ready.
+    """An asyncio loop whose time jumps to the next call that is due when no call is ready.
 
-    What is due at one moment comes in the order in which it was asked for; asyncio's own queue leaves that open.
+    Calls that are due at one moment keep the order of their requests; the queue of asyncio leaves that open.
 
     Args:
-        at: its time when it is made, in simulated seconds.
+        at: its first time, in simulated seconds.
     """
 
     def __init__(self, at: float = 0.0) -> None:
         self._simulated_now = at
         self._due: list[_Due] = []
         self._asked = 0
-        self._cancelled = 0  # at most so many of those that are due
+        self._cancelled = 0  # an upper bound of the cancelled calls in `_due`
         self._holds = 0
         self._settling: list[asyncio.Future[None]] = []
         super().__init__(_IdleSelector(self._go_on))
 
     def time(self) -> float:
-        """Simulated seconds."""
+        """Return the simulated seconds."""
         return self._simulated_now
 
     def call_at(
         self, when: float, callback: Callable[[Unpack[_Args]], object], *args: *_Args,
         context: Context | None = None,
     ) -> asyncio.TimerHandle:  # fmt: skip
-        """As every loop's."""
+        """See `asyncio.loop.call_at`."""
         context = context or copy_context()
         timer = asyncio.TimerHandle(when, callback, args, self, context)
         call = partial(_unless_cancelled, timer, callback, *args)
@@ -156,7 +156,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         return timer
 
     def _timer_handle_cancelled(self, handle: asyncio.TimerHandle) -> None:
-        """Asyncio's loops are told so; when most of what waits was cancelled, that is forgotten."""
+        """Count a cancelled call, as asyncio requires; drop the cancelled calls when they are the majority."""
         self._cancelled += handle.when() > self._simulated_now  # else it has left the queue
         if self._cancelled > max(_FEW, len(self._due) // 2):
             self._due = [due for due in self._due if not due.timer.cancelled()]
@@ -164,14 +164,14 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
             self._cancelled = 0
 
     async def settled(self) -> None:
-        """Wait until nothing more happens at this moment, without letting it pass."""
+        """Wait until the loop has no work at this moment; time does not pass."""
         waits = self.create_future()
         self._settling.append(waits)
         await waits
 
     @contextmanager
     def hold(self) -> Iterator[None]:
-        """Inside, time stands still and the loop waits for real input."""
+        """Stop time inside the block; the loop waits for real input."""
         self._holds += 1
         try:
             yield
@@ -180,7 +180,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
 
     @contextmanager
     def release(self) -> Iterator[None]:
-        """Inside, one `hold` does not count."""
+        """Suspend one `hold` inside the block."""
         self._holds -= 1
         try:
             yield
@@ -188,7 +188,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
             self._holds += 1
 
     def _go_on(self) -> bool:
-        """Nothing is ready: let time jump, if it may; whether anything is ready now."""
+        """Let time jump, unless it is held, as no call is ready; return whether one is ready now."""
         settling, self._settling = self._settling, []
         for waits in settling:
             if not waits.done():
@@ -209,7 +209,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
 
 
 class _Due(NamedTuple):
-    """A call that is to come, ordered by its moment and then by its number; no two have the same."""
+    """A future call, ordered by its moment and then by its unique number."""
 
     moment: float
     number: int
@@ -219,13 +219,13 @@ class _Due(NamedTuple):
 
 
 def _unless_cancelled(timer: asyncio.TimerHandle, callback: Callable[[Unpack[_Args]], object], *args: *_Args) -> None:
-    """What was due together with it may have cancelled it."""
+    """Make the call, unless another call of the same moment has cancelled it."""
     if not timer.cancelled():
         callback(*args)
 
 
 class _IdleSelector(selectors.DefaultSelector):
-    """Asks what to do instead when the loop would wait; waits for real input only if that is nothing."""
+    """Lets simulated time jump where the loop would wait; waits for real input if it cannot jump."""
 
     def __init__(self, go_on: Callable[[], bool]) -> None:
         super().__init__()
@@ -239,9 +239,9 @@ class _IdleSelector(selectors.DefaultSelector):
 
 
 def run_simulated(main: Coroutine[Any, Any, _Result], at: float = 0.0) -> _Result:
-    """Run a coroutine in simulated time that begins at `at`; a clock made with the same time then counts like before.
+    """Run a coroutine in simulated time that begins at `at`; a clock with the same `at` then shows the same times.
 
-    The loop's own time is what is due at equal times compared by: it must not be off by a rounding error.
+    Equal due times are compared in the loop's own time, which therefore must have no rounding error.
     """
     with asyncio.Runner(loop_factory=lambda: SimulatedEventLoop(at)) as runner:
         return runner.run(main)

@@ -44,11 +44,11 @@ from dsc.supervision.skill_dependencies import SkillDependencies
 from knowledge_base.errors import InputError, UnknownNameError, described
 
 DEFAULT_WITHIN = 300.0
-"""Seconds a skill may take if the trigger does not say: every wait has a bound."""
+"""Seconds that a skill may take without `within` in its trigger: every wait has a bound."""
 UNKNOWN_SKILL = SkillSignature("", "", {}, {}, {}, after_crash="repeat")
-"""Of a skill that the component does not have: its execution fails."""
+"""The signature of a skill that the component lacks: its execution fails."""
 _MOST_FAULTS = 100
-"""Faults that the end of a run reports."""
+"""Upper bound of the faults that the end of a run reports."""
 
 
 class Dispatcher:
@@ -97,18 +97,18 @@ class Dispatcher:
 
     @property
     def in_use(self) -> frozenset[str]:
-        """Names of the components with skills that run, the root's needs in an activation tree."""
+        """Names of the components with running skills: the needs of the root in an activation tree."""
         return frozenset(one.start.component for one in self._running.values())
 
     def _in_use(self) -> Iterable[str]:
-        """The components in use, and those whose cancelled skills still clean up."""
+        """Return the components in use, and those with cancelled skills that clean up."""
         return (*self.in_use, *self._cleanups.pending)
 
     @property
     def waiting(self) -> bool:
         """Whether an answer or timeout is pending.
 
-        Periods do not count, as they are always pending, nor do events without a bound, as they may never come.
+        Periods do not count, as they are always pending. Skills without a bound do not count, as they may never end.
         """
         return self.timers.waiting or any(math.isfinite(one.due) for one in self._running.values())
 
@@ -158,7 +158,7 @@ class Dispatcher:
                     yield component.name, memory
 
     def _fault(self, what: str) -> None:
-        """Report a fault at the end of the run, one time; of very many the first `_MOST_FAULTS`."""
+        """Report a fault at the end of the run, one time; at most the first `_MOST_FAULTS`."""
         if what not in self._faults and len(self._faults) < _MOST_FAULTS:
             self._faults.append(what)
 

@@ -1,4 +1,4 @@
-"""Outbox: parameters, modes and messages on their way to components, to each in the order of dispatch."""
+"""Outbox delivers parameters, modes and messages to components, to each in the order of dispatch."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from dsc.sequencer.message_checks import encoded
 from knowledge_base.errors import described
 
 CLOSING = GRACE
-"""Seconds for components to take what they were last told, and for cancelled skills to stop."""
+"""Seconds for components to take their last outputs, and for cancelled skills to stop."""
 _MOST_REFUSED = 1000
-"""Refusals to remember; a run without a store never asks for them."""
+"""Upper bound of remembered refusals; a run without a store never reads them."""
 
 
 class Outbox:
@@ -41,7 +41,7 @@ class Outbox:
 
     def refused(self) -> Collection[Told]:
         """Outputs that components have refused since the last call."""
-        if not self._refused:  # asked with each macrostep that is kept
+        if not self._refused:  # the common case; each stored macrostep reads it
             return ()
         refused = tuple(self._refused)
         self._refused.clear()
@@ -95,11 +95,11 @@ class Outbox:
             await asyncio.wait(self.untaken.values(), timeout=CLOSING)
 
     def tasks(self) -> Iterable[asyncio.Task[None]]:
-        """The deliveries to wait for at the end."""
+        """Return the deliveries to wait for at the end."""
         return self.untaken.values()
 
     def failures(self) -> list[str]:
-        """The failed deliveries that failed no skill."""
+        """Return the reasons of failed deliveries that failed no skill."""
         return [_untaken(name, task) for name, task in self.untaken.items() if not _succeeded(task)]
 
     def _in_turn(self, name: str, take: Callable[[], Awaitable[None]]) -> None:
@@ -127,12 +127,12 @@ async def _take(component: Component, told: Told) -> None:
 
 
 async def _restore_mode(component: Component, mode: str) -> None:
-    """A component that was to start again has done so."""
+    """Restore a component's mode; for `Init`, start the component instead."""
     await (component.life.come_alive(component.start) if mode == Life.INIT else component.change_mode(mode))
 
 
 def failure(task: asyncio.Task[None]) -> BaseException | None:
-    """The error of a task that is done, or `None`."""
+    """Return the error of a task that is done, or `None`."""
     return None if task.cancelled() else task.exception()
 
 
@@ -143,4 +143,4 @@ def _succeeded(task: asyncio.Task[None]) -> bool:
 def _untaken(component: str, task: asyncio.Task[None]) -> str:
     why = failure(task) if task.done() else None
     reason = described(why) if why is not None else f"no answer within {CLOSING:g} s"
-    return f"component '{component}' did not take what it was told: {reason}"
+    return f"component '{component}' did not take its last output: {reason}"

@@ -1,7 +1,7 @@
-"""A plot as a skill: a component of its own runs it, with components and a world model of its own (S2.6, S0.9).
+"""A plot as a skill: a component runs it, with separate components and a separate world model (S2.6, S0.9).
 
-A plot in the same run is better `use`d: it sees the same knowledge, and its states are part of the chart. As a skill a
-plot is closed: what it knows it was given, what it found out it emits or hands back. So it can be hosted elsewhere.
+Prefer `use` for a plot in the same run: it sees the same knowledge, and its states are part of the chart. As a skill, a
+plot is closed: its data are its arguments, outcomes and outputs. Therefore another process can host it.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 
 COMPLETED = "completed"
-"""The outcome of a plot that has outputs, which are its attributes, or that emits nothing as it comes to its end."""
+"""The outcome of a plot with outputs, which are its attributes, or of one that emits no event at its end."""
 
 
 class PlotComponent(Component):
     """A component whose skills are plots.
 
     Args:
-        name: how charts address it.
-        library: the plots; each is a skill, whose outcomes are what it emits, and `completed`.
-        components: what the plots use.
-        knowledge: makes the world model for one execution; empty if left out.
-        after_crash: what may be done about a plot that was under way: it begins anew, and so do the actions in it, with
-            the same ids as far as it goes the same way.
+        name: its name in charts.
+        library: the plots; each is a skill, with its events and `completed` as outcomes.
+        components: the components that the plots use.
+        knowledge: makes the world model for one execution; by default an empty one.
+        after_crash: the treatment of an interrupted plot. A repeated one starts again, and so do its actions, with the
+            same ids while its choices are the same.
     """
 
     def __init__(
@@ -53,16 +53,16 @@ class PlotComponent(Component):
         self._signatures = {plot.name: _signature(self.name, plot, after_crash) for plot in library}
 
     def skills(self) -> dict[str, SkillSignature]:
-        """A signature for each plot."""
+        """Return a signature for each plot."""
         return dict(self._signatures)
 
     async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-        """Run the plot to its end; what it emits on the way is reported. Cancelled, it leaves its states.
+        """Run the plot to its end and report the events that it emits before. A cancelled plot exits its states.
 
         Raises:
             UnknownNameError: there is no such plot.
             InputError: an argument is missing or unknown.
-            RuntimeError: it ended otherwise than by reaching its end.
+            RuntimeError: it ended before its final state.
         """
         if skill_name not in self._signatures:
             message = f"component '{self.name}' has no skill '{skill_name}'"

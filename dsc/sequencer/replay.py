@@ -93,7 +93,7 @@ class _ReplayedRun:
 
     def take(self, step: StepRow) -> Divergence | None:
         """Repeat one macrostep; return its first result that differs."""
-        for change in self._past.changes(self._knowledge.version, step.before):  # made beside the run
+        for change in self._past.changes(self._knowledge.version, step.before):  # of other authors
             self._knowledge.apply(change.delta, change.author)
         action_id = step.message.get("action")
         if action_id not in (None, *self._started):

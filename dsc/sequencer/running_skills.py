@@ -157,7 +157,7 @@ class RunningSkill:
     def given_up(self) -> None:
         """Report as a fault that the skill ignored its cancellation."""
         skill = f"{self.start.component}.{self.start.skill}"
-        self._fault(f"skill '{skill}' went on for {GRACE:g} s after it was cancelled and was given up")
+        self._fault(f"skill '{skill}' ignored its cancellation for {GRACE:g} s and was abandoned")
 
 
 class PendingCleanups:

@@ -98,30 +98,30 @@ class Sequencer:
 
     @property
     def machine(self) -> Machine:
-        """The chart and the state it is in."""
+        """The chart with its present state."""
         return self._reactor.machine
 
     def listen(self, listener: StepListener) -> None:
-        """Tell `listener` every macrostep from now on, before its actions leave."""
+        """Call `listener` with every later macrostep, before its actions leave."""
         self._reactor.listeners.append(listener)
 
     def wait_before_events(self, wait: Callable[[], Awaitable[None]]) -> None:
-        """Await `wait` before each event is taken: how a run is held still, e.g. at a breakpoint."""
+        """Await `wait` before each event: a breakpoint holds a run so."""
         self._before_events.append(wait)
 
     def rearrange(self, order: Callable[[Iterable[Message]], Iterable[Message]]) -> None:
-        """Put what waits to be taken in another order; for tests."""
+        """Put the waiting messages in another order; for tests."""
         self._inbox.rearrange(order)
 
     def working_for(self, action_id: str) -> frozenset[str]:
-        """Names of the components whose skills run inside the state that started `action_id`."""
+        """Return the names of the components with skills inside the state that started `action_id`."""
         started = self.dispatcher.started()
         owner = next((start.activation for start in started if start.action_id == action_id), None)
         inside = frozenset() if owner is None else self.machine.state.activations_inside(owner)
         return frozenset(start.component for start in started if start.activation in inside)
 
     def diagnose(self) -> dict[str, Any]:
-        """The status of the run as plain data: active states, running actions, the number of waiting messages."""
+        """Return the status of the run as plain data: active states, running actions, number of waiting messages."""
         return {
             "component": "sequencer",
             "finished": self.machine.state.finished,
@@ -134,22 +134,22 @@ class Sequencer:
         }
 
     def post(self, event: Event, *, after: float = 0.0) -> None:
-        """Hand in an event from outside, e.g. an operator's `stop`; from the loop's own thread.
+        """Post an event from outside, e.g. an operator's `stop`; from the loop's own thread.
 
-        With a store, one that comes later is kept from now on, any other from when it is taken.
+        A store keeps a delayed event from now on, and any other from its macrostep on.
 
         Args:
             event: its name and attributes.
-            after: seconds until it comes; meanwhile the run does not end for want of things to come.
+            after: seconds until it arrives; meanwhile the run has no deadlock.
 
         Raises:
             InputError: only the executive itself fires the event, e.g. `done`, or an attribute is not plain data.
-            StoreError: it could not be kept.
+            StoreError: the store cannot be written.
         """
         self._hand_in(message_checks.checked_event(event), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
-        """Hand in a change of knowledge from outside; from the loop's own thread.
+        """Post a change of knowledge from outside; from the loop's own thread.
 
         Args:
             delta: the change.
@@ -157,16 +157,16 @@ class Sequencer:
             after: as for `post`.
 
         Raises:
-            InputError: the change contradicts the schema; nothing was changed.
-            StoreError: it could not be kept.
+            InputError: the change contradicts the schema; the knowledge is unchanged.
+            StoreError: the store cannot be written.
         """
         self._hand_in(message_checks.checked_change(delta, author, self.knowledge), after)
 
     def set_parameter(self, owner: str, name: str, value: object, *, after: float = 0.0) -> None:
-        """Hand in an operator's setting of a parameter; from the loop's own thread.
+        """Post an operator's setting of a parameter; from the loop's own thread.
 
         A component takes it before its next skill begins. A plot uses it at later entries without another value for
-        it. Both are kept with the run.
+        it. A store keeps both.
 
         Args:
             owner: the component, or the plot, that has the parameter.
@@ -176,8 +176,8 @@ class Sequencer:
 
         Raises:
             UnknownNameError: there is no such component or plot, or it declares no such parameter.
-            InputError: the value is out of range, breaks a relation, or is not for operators to say.
-            StoreError: it could not be kept.
+            InputError: the value is out of range, breaks a relation, or operators may not set it.
+            StoreError: the store cannot be written.
         """
         setting = message_checks.checked_setting(owner, name, value, self.dispatcher.components, self.library)
         self._hand_in(setting, after)
@@ -301,9 +301,9 @@ class Sequencer:
         self._carry_out(output)
 
     def _may_group(self, message: Message, output: Collection[Output]) -> bool:
-        """Whether the next macrostep may share the commit of this one.
+        """Return whether the next macrostep may share the commit of this one.
 
-        It does not if an output leaves between them, nor with answers of components, each of which is kept immediately.
+        It may not if an output leaves between them. Each answer of a component has a separate commit.
         """
         waiting = self._inbox.waiting
         if output or self._before_events or not waiting:

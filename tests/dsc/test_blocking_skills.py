@@ -285,7 +285,7 @@ SWALLOWS = """
 def test_a_skill_that_swallows_its_cancellation_holds_nothing_up_and_is_said(within):
     ran = Ran(SWALLOWS.replace("WITHIN", str(within)), arm=Worker())
     assert ran.end.finished
-    assert "skill 'arm.swallows' went on for 30 s after it was cancelled and was given up" in ran.end.problem
+    assert "skill 'arm.swallows' ignored its cancellation for 30 s and was abandoned" in ran.end.problem
     assert ran.at == pytest.approx(105)
 
 

@@ -488,7 +488,7 @@ def test_a_component_that_cannot_be_configured_is_told_also_when_no_skill_needs_
         arm=Arm(slow_to_configure=slow),
     )
     assert ran.end.finished
-    assert ran.end.problem == f"component 'arm' did not take what it was told: {why}"
+    assert ran.end.problem == f"component 'arm' did not take its last output: {why}"
 
 
 # -- components --------------------------------------------------------------------------------------------
@@ -590,5 +590,5 @@ def test_a_skill_waits_until_what_was_cancelled_there_has_put_things_in_order(ar
 def test_a_skill_waits_no_longer_than_until_what_was_cancelled_there_is_given_up():
     ran = Ran(HOLD_THEN.replace("NEXT", "close").replace("WITHIN", "100").replace("OUTCOME", "closed"), arm=Tidy(SLOW))
     assert ran.end.finished
-    assert "skill 'arm.hold' went on for 30 s after it was cancelled and was given up" in ran.end.problem
+    assert "skill 'arm.hold' ignored its cancellation for 30 s and was abandoned" in ran.end.problem
     assert ran.arm.log == ["closes at 32"]
