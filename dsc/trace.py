@@ -60,27 +60,28 @@ class Trace:
     Args:
         now: tells the seconds of run time.
         last: number of the last record of a run that is resumed.
+
+    Attributes:
+        heard: whether there is a listener.
+        cause: seq of the record that leads to the next ones.
     """
 
     def __init__(self, now: Callable[[], float], last: int = 0) -> None:
         self._now = now
         self._listeners: list[Listener] = []
         self._seq = last
+        self.heard = False
         self.cause: int | None = None
-
-    @property
-    def heard(self) -> bool:
-        """Whether there is a listener."""
-        return bool(self._listeners)
 
     def listen(self, listener: Listener) -> None:
         """Tell `listener` every record from now on."""
         self._listeners.append(listener)
+        self.heard = True
 
     def record(self, type_: str, /, **data: Any) -> int:
         """Add a record, caused by the current `cause`; returns its seq."""
         self._seq += 1
-        if not self._listeners:
+        if not self.heard:
             return self._seq
         made = Record(self._seq, self._now(), type_, self.cause, data)
         for listener in self._listeners:

@@ -122,6 +122,7 @@ class Component(ComponentHooks, RestartHooks):
     """
 
     _ports: ClassVar[Mapping[str, Push | Stream]] = {}
+    _functions: Mapping[str, SkillBody] = {}  # skills that are functions
 
     def __init_subclass__(cls, **named: Any) -> None:
         """Validate the declared parameters, and collect the ports; raises `InputError`."""
@@ -182,14 +183,9 @@ class Component(ComponentHooks, RestartHooks):
         check_arguments(signature, arguments)
         if self.declares:
             self.parameters.require_bound()
-        body = self._body(skill_name)
+        body = self._functions.get(skill_name) or getattr(self, skill_name)
         declared: Declared = getattr(body, DECLARED)
         return declared.carry_out(self, body, call, arguments)
-
-    def _body(self, skill_name: str) -> SkillBody:
-        """The function that executes a declared skill."""
-        body: SkillBody = getattr(self, skill_name)
-        return body
 
     async def configure_all(self, values: Mapping[str, Any]) -> None:
         """Restore the parameters of before a restart: validate them as one set, then `configure` each.

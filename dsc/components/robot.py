@@ -46,9 +46,6 @@ class _OfFunctions(Component):
         """The signatures of the functions."""
         return dict(self._signatures)
 
-    def _body(self, skill_name: str) -> SkillBody:
-        return self._functions[skill_name]
-
 
 def robot_of(named: str) -> tuple[Component, ...]:
     """The components of a robot, or those that its function without arguments returns.

@@ -15,6 +15,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager, suppress
+from functools import wraps
 from typing import Any, ClassVar
 
 import pytest
@@ -131,6 +132,16 @@ async def running(*work: Coroutine[Any, Any, None]) -> AsyncIterator[list[asynci
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
+def in_loop(test: Callable[[TransportSuite], Coroutine[Any, Any, None]]) -> Callable[[TransportSuite], None]:
+    """Make a test of a coroutine method, which the suite's `run` executes."""
+
+    @wraps(test)
+    def tested(suite: TransportSuite) -> None:
+        suite.run(test(suite))
+
+    return tested
+
+
 class TransportSuite:
     """The promises of the patterns.
 
@@ -146,193 +157,163 @@ class TransportSuite:
 
     # -- calls -------------------------------------------------------------------------------------------
 
-    def test_a_call_is_carried_out_once_and_answered(self) -> None:
+    @in_loop
+    async def test_a_call_is_carried_out_once_and_answered(self) -> None:
         """The number of its frames does not matter."""
+        transport, done = self.transport(), []
+        server, client = Endpoint("server", transport), Endpoint("client", transport)
 
-        async def main() -> None:
-            transport, done = self.transport(), []
-            server, client = Endpoint("server", transport), Endpoint("client", transport)
+        async def note(sender: str, body: Any) -> Any:
+            await asyncio.sleep(0.3)
+            done.append((sender, body))
+            return {"got": body}
 
-            async def note(sender: str, body: Any) -> Any:
-                await asyncio.sleep(0.3)
-                done.append((sender, body))
-                return {"got": body}
+        server.answer("note", note)
+        for n in range(20):
+            assert await client.call("server", "note", n, PATIENCE) == {"got": n}
+        assert done == [("client", n) for n in range(20)]
+        answers = await asyncio.gather(*(client.call("server", "note", n, PATIENCE) for n in range(20, 40)))
+        assert answers == [{"got": n} for n in range(20, 40)]
+        assert sorted(n for _, n in done) == list(range(40))
 
-            server.answer("note", note)
-            for n in range(20):
-                assert await client.call("server", "note", n, PATIENCE) == {"got": n}
-            assert done == [("client", n) for n in range(20)]
-            answers = await asyncio.gather(*(client.call("server", "note", n, PATIENCE) for n in range(20, 40)))
-            assert answers == [{"got": n} for n in range(20, 40)]
-            assert sorted(n for _, n in done) == list(range(40))
-
-        self.run(main())
-
-    def test_what_cannot_be_done_is_refused_with_the_reason(self) -> None:
+    @in_loop
+    async def test_what_cannot_be_done_is_refused_with_the_reason(self) -> None:
         """Cases: a handler that raises, an unknown kind, an answer other than plain data."""
+        transport = self.transport()
+        server, client = Endpoint("server", transport), Endpoint("client", transport)
 
-        async def main() -> None:
-            transport = self.transport()
-            server, client = Endpoint("server", transport), Endpoint("client", transport)
+        async def broken(_: str, __: Any) -> Any:
+            raise RuntimeError("it is stuck")
 
-            async def broken(_: str, __: Any) -> Any:
-                raise RuntimeError("it is stuck")
+        async def strange(_: str, __: Any) -> Any:
+            return object()
 
-            async def strange(_: str, __: Any) -> Any:
-                return object()
+        server.answer("broken", broken)
+        server.answer("strange", strange)
+        for kind, why in [("broken", "stuck"), ("strange", "plain data"), ("absent", "does not answer 'absent'")]:
+            with pytest.raises(RefusedError, match=why):
+                await client.call("server", kind, None, PATIENCE)
 
-            server.answer("broken", broken)
-            server.answer("strange", strange)
-            for kind, why in [("broken", "stuck"), ("strange", "plain data"), ("absent", "does not answer 'absent'")]:
-                with pytest.raises(RefusedError, match=why):
-                    await client.call("server", kind, None, PATIENCE)
-
-        self.run(main())
-
-    def test_a_call_has_a_timeout(self) -> None:
+    @in_loop
+    async def test_a_call_has_a_timeout(self) -> None:
         """Cases: a missing endpoint, and one that has left."""
+        transport = self.transport()
+        client, gone = Endpoint("client", transport), Endpoint("gone", transport)
+        await gone.close()
+        for to in ("nobody", "gone"):
+            began = asyncio.get_running_loop().time()
+            with pytest.raises(NoAnswerError, match=f"'{to}' has not answered 'x' within 1 s"):
+                await client.call(to, "x", None, 1.0)
+            assert asyncio.get_running_loop().time() - began >= 0.99
 
-        async def main() -> None:
-            transport = self.transport()
-            client, gone = Endpoint("client", transport), Endpoint("gone", transport)
-            await gone.close()
-            for to in ("nobody", "gone"):
-                began = asyncio.get_running_loop().time()
-                with pytest.raises(NoAnswerError, match=f"'{to}' has not answered 'x' within 1 s"):
-                    await client.call(to, "x", None, 1.0)
-                assert asyncio.get_running_loop().time() - began >= 0.99
-
-        self.run(main())
-
-    def test_nothing_is_shared_by_accident(self) -> None:
+    @in_loop
+    async def test_nothing_is_shared_by_accident(self) -> None:
         """Messages are encoded, at any distance."""
+        transport, kept = self.transport(), []
+        server, client = Endpoint("server", transport), Endpoint("client", transport)
 
-        async def main() -> None:
-            transport, kept = self.transport(), []
-            server, client = Endpoint("server", transport), Endpoint("client", transport)
+        async def keep(_: str, body: Any) -> Any:
+            kept.append(body)
 
-            async def keep(_: str, body: Any) -> Any:
-                kept.append(body)
+        server.answer("keep", keep)
+        mine = {"list": [1]}
+        await client.call("server", "keep", mine, PATIENCE)
+        mine["list"].append(2)
+        assert kept == [{"list": [1]}]
+        with pytest.raises(InputError, match="only plain data"):
+            await client.call("server", "keep", {"thing": object()}, PATIENCE)
 
-            server.answer("keep", keep)
-            mine = {"list": [1]}
-            await client.call("server", "keep", mine, PATIENCE)
-            mine["list"].append(2)
-            assert kept == [{"list": [1]}]
-            with pytest.raises(InputError, match="only plain data"):
-                await client.call("server", "keep", {"thing": object()}, PATIENCE)
-
-        self.run(main())
-
-    def test_who_came_back_is_somebody_new(self) -> None:
+    @in_loop
+    async def test_who_came_back_is_somebody_new(self) -> None:
         """Its calls are separate from those of its earlier life."""
+        transport, done = self.transport(), []
+        server = Endpoint("server", transport)
 
-        async def main() -> None:
-            transport, done = self.transport(), []
-            server = Endpoint("server", transport)
+        async def note(_: str, body: Any) -> Any:
+            done.append(body)
 
-            async def note(_: str, body: Any) -> Any:
-                done.append(body)
-
-            server.answer("note", note)
-            for life in ("first", "second"):
-                client = Endpoint("client", transport, life)
-                for n in range(3):
-                    await client.call("server", "note", f"{life} {n}", PATIENCE)
-                await client.close()
-            assert done == [f"{life} {n}" for life in ("first", "second") for n in range(3)]
-
-        self.run(main())
+        server.answer("note", note)
+        for life in ("first", "second"):
+            client = Endpoint("client", transport, life)
+            for n in range(3):
+                await client.call("server", "note", f"{life} {n}", PATIENCE)
+            await client.close()
+        assert done == [f"{life} {n}" for life in ("first", "second") for n in range(3)]
 
     # -- pushes ------------------------------------------------------------------------------------------
 
-    def test_the_newest_value_arrives_and_time_never_runs_backwards(self) -> None:
+    @in_loop
+    async def test_the_newest_value_arrives_and_time_never_runs_backwards(self) -> None:
         """*Push newest*: values may be lost, never go back, and the last one arrives."""
-
-        async def main() -> None:
-            transport = self.transport()
-            seen: list[int] = []
-            mine, theirs = Endpoint("user", transport), Endpoint("laser", transport)
-            subscription, publisher = Subscription(mine, "laser", "scan", seen.append), Publisher(theirs, "scan")
-            async with running(subscription.run()):
-                for n in range(50):
-                    publisher.put(n)
-                    await asyncio.sleep(0.1)
-                await until(lambda: subscription.value == 49)
-            assert seen == sorted(set(seen))
-
-        self.run(main())
-
-    def test_a_timed_push_comes_again_and_its_silence_is_noticed(self) -> None:
-        """*Push timed*, from one component to another."""
-
-        async def main() -> None:
-            transport, laser, mapper = self.transport(), Laser(), Mapper()
-            host, other = Host(laser, transport, LoopClock()), Host(mapper, transport, LoopClock())
-            laser.heat.put(celsius=20)
-            await until(lambda: mapper.heat.value == {"celsius": 20})
-            for _ in range(5):
-                await asyncio.sleep(2.0)
-                assert mapper.heat.age < 2.0
-            assert mapper.scan.value is None
-            await host.close()
-            await asyncio.sleep(2.0)  # messages in transit
-            with pytest.raises(NoAnswerError, match=r"nothing has come from 'laser\.heat' within 4 s"):
-                await mapper.heat.next(4.0)
-            assert mapper.heat.age > 3.0
-            await other.close()
-
-        self.run(main())
-
-    def test_a_component_that_pushes_is_one_like_any_other(self) -> None:
-        """Its ports share its address with its skills, and its users find them."""
-
-        async def main() -> None:
-            transport, laser, mapper = self.transport(), Laser(), Mapper()
-            host, other = Host(laser, transport, LoopClock()), Host(mapper, transport, LoopClock())
-            remote = await RemoteComponent.connect("laser", transport, PATIENCE)
-            here = Mapper()
-            wiring = Wiring({"laser": remote, "mapper": here})
-            for n in range(10):
-                laser.scan.put(metres=n)
+        transport = self.transport()
+        seen: list[int] = []
+        mine, theirs = Endpoint("user", transport), Endpoint("laser", transport)
+        subscription, publisher = Subscription(mine, "laser", "scan", seen.append), Publisher(theirs, "scan")
+        async with running(subscription.run()):
+            for n in range(50):
+                publisher.put(n)
                 await asyncio.sleep(0.1)
-            await until(lambda: mapper.scan.value == here.scan.value == {"metres": 9})
-            call = SkillCall("a8.0", LoopClock(), lambda _: None)
-            assert await remote.execute("measure", call, {}) == Outcome("answered", {"metres": 9})
-            wiring.close()
-            await host.close()
-            await other.close()
+            await until(lambda: subscription.value == 49)
+        assert seen == sorted(set(seen))
 
-        self.run(main())
+    @in_loop
+    async def test_a_timed_push_comes_again_and_its_silence_is_noticed(self) -> None:
+        """*Push timed*, from one component to another."""
+        transport, laser, mapper = self.transport(), Laser(), Mapper()
+        host, other = Host(laser, transport, LoopClock()), Host(mapper, transport, LoopClock())
+        laser.heat.put(celsius=20)
+        await until(lambda: mapper.heat.value == {"celsius": 20})
+        for _ in range(5):
+            await asyncio.sleep(2.0)
+            assert mapper.heat.age < 2.0
+        assert mapper.scan.value is None
+        await host.close()
+        await asyncio.sleep(2.0)  # messages in transit
+        with pytest.raises(NoAnswerError, match=r"nothing has come from 'laser\.heat' within 4 s"):
+            await mapper.heat.next(4.0)
+        assert mapper.heat.age > 3.0
+        await other.close()
 
-    def test_a_stream_of_something_else_is_refused_with_the_reason(self) -> None:
+    @in_loop
+    async def test_a_component_that_pushes_is_one_like_any_other(self) -> None:
+        """Its ports share its address with its skills, and its users find them."""
+        transport, laser, mapper = self.transport(), Laser(), Mapper()
+        host, other = Host(laser, transport, LoopClock()), Host(mapper, transport, LoopClock())
+        remote = await RemoteComponent.connect("laser", transport, PATIENCE)
+        here = Mapper()
+        wiring = Wiring({"laser": remote, "mapper": here})
+        for n in range(10):
+            laser.scan.put(metres=n)
+            await asyncio.sleep(0.1)
+        await until(lambda: mapper.scan.value == here.scan.value == {"metres": 9})
+        call = SkillCall("a8.0", LoopClock(), lambda _: None)
+        assert await remote.execute("measure", call, {}) == Outcome("answered", {"metres": 9})
+        wiring.close()
+        await host.close()
+        await other.close()
+
+    @in_loop
+    async def test_a_stream_of_something_else_is_refused_with_the_reason(self) -> None:
         """Case: the published type differs from the subscribed one."""
+        transport, mapper = self.transport(), Mapper()
+        mapper.scan = mapper.streams["scan"] = Stream("laser.scan", {"meters": "number"})
+        hosts = [Host(one, transport, LoopClock()) for one in (Laser(), mapper)]
+        with pytest.raises(NoAnswerError, match=r"'laser\.scan' pushes no 'meters'; did you mean 'metres'"):
+            await mapper.scan.next(PATIENCE / 2)
+        for host in hosts:
+            await host.close()
 
-        async def main() -> None:
-            transport, mapper = self.transport(), Mapper()
-            mapper.scan = mapper.streams["scan"] = Stream("laser.scan", {"meters": "number"})
-            hosts = [Host(one, transport, LoopClock()) for one in (Laser(), mapper)]
-            with pytest.raises(NoAnswerError, match=r"'laser\.scan' pushes no 'meters'; did you mean 'metres'"):
-                await mapper.scan.next(PATIENCE / 2)
-            for host in hosts:
-                await host.close()
-
-        self.run(main())
-
-    def test_a_publisher_that_came_back_is_heard(self) -> None:
+    @in_loop
+    async def test_a_publisher_that_came_back_is_heard(self) -> None:
         """It restarts its count; its subscribers find it."""
-
-        async def main() -> None:
-            transport = self.transport()
-            subscription = Subscription(Endpoint("user", transport), "laser", "scan")
-            async with running(subscription.run()):
-                for value in ("first", "second"):
-                    theirs = Endpoint("laser", transport)
-                    Publisher(theirs, "scan").put(value)
-                    await until(lambda value=value: subscription.value == value)  # type: ignore[misc]
-                    await theirs.close()
-
-        self.run(main())
+        transport = self.transport()
+        subscription = Subscription(Endpoint("user", transport), "laser", "scan")
+        async with running(subscription.run()):
+            for value in ("first", "second"):
+                theirs = Endpoint("laser", transport)
+                Publisher(theirs, "scan").put(value)
+                await until(lambda value=value: subscription.value == value)  # type: ignore[misc]
+                await theirs.close()
 
     # -- components --------------------------------------------------------------------------------------
 
@@ -347,241 +328,206 @@ class TransportSuite:
         finally:
             await host.close()
 
-    def test_a_skill_reports_in_order_and_ends_once(self) -> None:
+    @in_loop
+    async def test_a_skill_reports_in_order_and_ends_once(self) -> None:
         """The outcome has its observations; a repeated request with the same id executes nothing."""
+        async with self._robot() as (robot, remote, _):
+            assert remote.skills() == robot.skills()
+            assert robot.life.state is Life.ALIVE
+            reports: list[Outcome] = []
+            call = SkillCall("a1.0", LoopClock(), reports.append)
+            outcome = await remote.execute("go", call, {"to": "kitchen", "steps": 5})
+            assert outcome == Outcome("there", {"to": "kitchen"}, Delta(added=(fact("at", "kitchen"),)))
+            assert [one.attributes["n"] for one in reports] == list(range(5))
+            assert robot.log == ["go kitchen"]
 
-        async def main() -> None:
-            async with self._robot() as (robot, remote, _):
-                assert remote.skills() == robot.skills()
-                assert robot.life.state is Life.ALIVE
-                reports: list[Outcome] = []
-                call = SkillCall("a1.0", LoopClock(), reports.append)
-                outcome = await remote.execute("go", call, {"to": "kitchen", "steps": 5})
-                assert outcome == Outcome("there", {"to": "kitchen"}, Delta(added=(fact("at", "kitchen"),)))
-                assert [one.attributes["n"] for one in reports] == list(range(5))
-                assert robot.log == ["go kitchen"]
-
-        self.run(main())
-
-    def test_a_skill_that_fails_there_fails_here(self) -> None:
+    @in_loop
+    async def test_a_skill_that_fails_there_fails_here(self) -> None:
         """The failure has the reason."""
+        async with self._robot() as (_, remote, __):
+            with pytest.raises(RefusedError, match=r"RuntimeError: a2\.0 fell"):
+                await remote.execute("fall", SkillCall("a2.0", LoopClock(), lambda _: None), {})
 
-        async def main() -> None:
-            async with self._robot() as (_, remote, __):
-                with pytest.raises(RefusedError, match=r"RuntimeError: a2\.0 fell"):
-                    await remote.execute("fall", SkillCall("a2.0", LoopClock(), lambda _: None), {})
-
-        self.run(main())
-
-    def test_a_cancellation_arrives(self) -> None:
+    @in_loop
+    async def test_a_cancellation_arrives(self) -> None:
         """The cancellation has arrived before the caller continues."""
-
-        async def main() -> None:
-            async with self._robot() as (robot, remote, _):
-                call = SkillCall("a3.0", LoopClock(), lambda _: None)
-                task = asyncio.ensure_future(remote.execute("go", call, {"to": "kitchen", "steps": 1000}))
-                await until(lambda: bool(robot.log))
-                task.cancel()
-                with suppress(asyncio.CancelledError):
-                    await task
-                assert robot.log == ["go kitchen", "cancelled"]
-
-        self.run(main())
-
-    def test_a_silent_death_is_noticed_and_a_return_too(self) -> None:
-        """The skill fails, the component is in FatalError; the next skill finds it again."""
-
-        async def main() -> None:
-            transport, robot = self.transport(), SuiteRobot()
-            host = Host(robot, transport, LoopClock())
-            remote = await RemoteComponent.connect("robot", transport, PATIENCE)
-            await remote.life.come_alive(remote.start)
-            call = SkillCall("a4.0", LoopClock(), lambda _: None)
+        async with self._robot() as (robot, remote, _):
+            call = SkillCall("a3.0", LoopClock(), lambda _: None)
             task = asyncio.ensure_future(remote.execute("go", call, {"to": "kitchen", "steps": 1000}))
             await until(lambda: bool(robot.log))
-            await host.close()
-            with pytest.raises(NoAnswerError):
+            task.cancel()
+            with suppress(asyncio.CancelledError):
                 await task
-            assert remote.life.state == "fatal_error"
-            again = Host(SuiteRobot(), transport, LoopClock())
-            await remote.life.come_alive(remote.start)
-            assert remote.life.state == "alive"
-            assert await remote.execute("doubled", SkillCall("a5.0", LoopClock(), lambda _: None), {"n": 4}) == Outcome(
-                "answered", {"n": 8}
-            )
-            await again.close()
+            assert robot.log == ["go kitchen", "cancelled"]
 
-        self.run(main())
+    @in_loop
+    async def test_a_silent_death_is_noticed_and_a_return_too(self) -> None:
+        """The skill fails, the component is in FatalError; the next skill finds it again."""
+        transport, robot = self.transport(), SuiteRobot()
+        host = Host(robot, transport, LoopClock())
+        remote = await RemoteComponent.connect("robot", transport, PATIENCE)
+        await remote.life.come_alive(remote.start)
+        call = SkillCall("a4.0", LoopClock(), lambda _: None)
+        task = asyncio.ensure_future(remote.execute("go", call, {"to": "kitchen", "steps": 1000}))
+        await until(lambda: bool(robot.log))
+        await host.close()
+        with pytest.raises(NoAnswerError):
+            await task
+        assert remote.life.state == "fatal_error"
+        again = Host(SuiteRobot(), transport, LoopClock())
+        await remote.life.come_alive(remote.start)
+        assert remote.life.state == "alive"
+        assert await remote.execute("doubled", SkillCall("a5.0", LoopClock(), lambda _: None), {"n": 4}) == Outcome(
+            "answered", {"n": 8}
+        )
+        await again.close()
 
-    def test_what_a_component_is_told_arrives_once_in_order(self) -> None:
+    @in_loop
+    async def test_what_a_component_is_told_arrives_once_in_order(self) -> None:
         """*Param* and *send*, in sequence."""
+        async with self._robot() as (robot, remote, _):
+            for n in range(10):
+                await remote.configure("speed", n)
+                await remote.take("say", {"text": f"now {n}"})
+            assert robot.log == [one for n in range(10) for one in (("speed", n), f"now {n}")]
+            robot.log.clear()
+            await remote.configure_all({"speed": 3, "gear": 2})
+            assert robot.log == [("speed", 3), ("gear", 2)]
+            await remote.change_mode("resting")
+            assert (await remote.diagnose())["mode"] == "resting"
 
-        async def main() -> None:
-            async with self._robot() as (robot, remote, _):
-                for n in range(10):
-                    await remote.configure("speed", n)
-                    await remote.take("say", {"text": f"now {n}"})
-                assert robot.log == [one for n in range(10) for one in (("speed", n), f"now {n}")]
-                robot.log.clear()
-                await remote.configure_all({"speed": 3, "gear": 2})
-                assert robot.log == [("speed", 3), ("gear", 2)]
-                await remote.change_mode("resting")
-                assert (await remote.diagnose())["mode"] == "resting"
-
-        self.run(main())
-
-    def test_whom_a_component_needs_is_said_when_it_changes(self) -> None:
+    @in_loop
+    async def test_whom_a_component_needs_is_said_when_it_changes(self) -> None:
         """Either its user or the component itself has made the change."""
+        async with self._robot() as (robot, remote, _):
+            assert remote.needed() == ()
+            await remote.change_mode("scanning")
+            assert remote.needed() == ("power", "light")
+            await remote.life.become_active(1, remote.activate, active=True)  # otherwise the component is not watched
+            robot.mode = "resting"
+            await until(lambda: remote.mode == "resting")
+            assert remote.needed() == ()
+            await remote.life.become_active(1, remote.activate, active=False)
 
-        async def main() -> None:
-            async with self._robot() as (robot, remote, _):
-                assert remote.needed() == ()
-                await remote.change_mode("scanning")
-                assert remote.needed() == ("power", "light")
-                await remote.life.become_active(
-                    1, remote.activate, active=True
-                )  # otherwise the component is not watched
-                robot.mode = "resting"
-                await until(lambda: remote.mode == "resting")
-                assert remote.needed() == ()
-                await remote.life.become_active(1, remote.activate, active=False)
-
-        self.run(main())
-
-    def test_what_a_component_needs_is_waited_for_and_missed(self) -> None:
+    @in_loop
+    async def test_what_a_component_needs_is_waited_for_and_missed(self) -> None:
         """Cases: deployed here or with the component; late, lost without a message, and back again."""
-
-        async def main() -> None:
-            transport, robot, clock = self.transport(), SuiteRobot(), LoopClock()
-            robot.mode = "scanning"
-            host = Host(robot, transport, clock)
-            remote = await RemoteComponent.connect("robot", transport, PATIENCE)
-            registry = ComponentRegistry({"robot": remote, "light": Component("light")})
-            activity = ComponentActivation(registry, lambda: {"robot"})
+        transport, robot, clock = self.transport(), SuiteRobot(), LoopClock()
+        robot.mode = "scanning"
+        host = Host(robot, transport, clock)
+        remote = await RemoteComponent.connect("robot", transport, PATIENCE)
+        registry = ComponentRegistry({"robot": remote, "light": Component("light")})
+        activity = ComponentActivation(registry, lambda: {"robot"})
+        support = SkillDependencies(activity, remote)
+        waiting = asyncio.ensure_future(support.ready())
+        await asyncio.sleep(2.0)
+        assert not waiting.done()
+        for n in range(2):
+            power = Host(Component("power"), transport, clock)
+            await asyncio.wait_for(waiting, PATIENCE)
+            call = SkillCall(f"a7.{n}", clock, lambda _: None)
+            work = remote.execute("go", call, {"to": "kitchen", "steps": 1000})
+            working = asyncio.ensure_future(support.carrying(work))
+            await until(lambda n=n: len(robot.log) == 2 * n + 1)  # type: ignore[misc]
+            await power.close()
+            with pytest.raises(NotAliveError, match="it needs component 'power', which is in 'fatal_error'"):
+                await asyncio.wait_for(working, PATIENCE)
+            assert robot.log[-1] == "cancelled"
+            assert remote.life.state == "alive"
             support = SkillDependencies(activity, remote)
             waiting = asyncio.ensure_future(support.ready())
-            await asyncio.sleep(2.0)
-            assert not waiting.done()
-            for n in range(2):
-                power = Host(Component("power"), transport, clock)
-                await asyncio.wait_for(waiting, PATIENCE)
-                call = SkillCall(f"a7.{n}", clock, lambda _: None)
-                work = remote.execute("go", call, {"to": "kitchen", "steps": 1000})
-                working = asyncio.ensure_future(support.carrying(work))
-                await until(lambda n=n: len(robot.log) == 2 * n + 1)  # type: ignore[misc]
-                await power.close()
-                with pytest.raises(NotAliveError, match="it needs component 'power', which is in 'fatal_error'"):
-                    await asyncio.wait_for(working, PATIENCE)
-                assert robot.log[-1] == "cancelled"
-                assert remote.life.state == "alive"
-                support = SkillDependencies(activity, remote)
-                waiting = asyncio.ensure_future(support.ready())
-            waiting.cancel()
-            await host.close()
+        waiting.cancel()
+        await host.close()
 
-        self.run(main())
-
-    def test_an_event_comes_once_for_each_time_it_happens(self) -> None:
+    @in_loop
+    async def test_an_event_comes_once_for_each_time_it_happens(self) -> None:
         """Events come in order, until the deactivation."""
+        async with self._robot() as (robot, remote, _):
+            heard: list[Any] = []
+            call = SkillCall("a6.0", LoopClock(), lambda outcome: heard.append(outcome.attributes["level"]))
+            async with running(_watched(remote, call)):
+                await until(lambda: robot.activations.active("low"))
+                for level in (30, 19, 18, 25, 15, 10, 40, 5):
+                    robot.update("low", level)
+                await until(lambda: len(heard) == 3)
+            assert heard == [19, 15, 5]
+            assert not robot.activations.active("low")
 
-        async def main() -> None:
-            async with self._robot() as (robot, remote, _):
-                heard: list[Any] = []
-                call = SkillCall("a6.0", LoopClock(), lambda outcome: heard.append(outcome.attributes["level"]))
-                async with running(_watched(remote, call)):
-                    await until(lambda: robot.activations.active("low"))
-                    for level in (30, 19, 18, 25, 15, 10, 40, 5):
-                        robot.update("low", level)
-                    await until(lambda: len(heard) == 3)
-                assert heard == [19, 15, 5]
-                assert not robot.activations.active("low")
-
-        self.run(main())
-
-    def test_a_hosted_component_is_active_while_it_is_needed(self) -> None:
+    @in_loop
+    async def test_a_hosted_component_is_active_while_it_is_needed(self) -> None:
         """It takes its resources, and frees them."""
+        transport, told = self.transport(), []
 
-        async def main() -> None:
-            transport, told = self.transport(), []
+        class Camera(Component):
+            async def activate(self, active: bool) -> None:  # noqa: FBT001
+                told.append(active)
 
-            class Camera(Component):
-                async def activate(self, active: bool) -> None:  # noqa: FBT001
-                    told.append(active)
+        async def ignore(_: bool) -> None:  # noqa: FBT001
+            pass
 
-            async def ignore(_: bool) -> None:  # noqa: FBT001
-                pass
-
-            host = Host(Camera(), transport, LoopClock())
-            root = Heartbeat(Endpoint("sequencer", transport), lambda: ["camera"], ignore, root=True)
-            async with running(root.run()):
-                await until(lambda: told == [True])
-            await until(lambda: told == [True, False])
-            await host.close()
-
-        self.run(main())
+        host = Host(Camera(), transport, LoopClock())
+        root = Heartbeat(Endpoint("sequencer", transport), lambda: ["camera"], ignore, root=True)
+        async with running(root.run()):
+            await until(lambda: told == [True])
+        await until(lambda: told == [True, False])
+        await host.close()
 
     # -- activation trees --------------------------------------------------------------------------------
 
-    def test_components_are_active_while_somebody_active_needs_them(self) -> None:
+    @in_loop
+    async def test_components_are_active_while_somebody_active_needs_them(self) -> None:
         """Activation goes from the root down, in any order of arrival, and ends with the need or the activator."""
+        transport = self.transport()
+        active: set[str] = set()
+        needs = {"root": ["arm"], "arm": ["motor"], "motor": [], "camera": []}
+        hearts: dict[str, Heartbeat] = {}
 
-        async def main() -> None:
-            transport = self.transport()
-            active: set[str] = set()
-            needs = {"root": ["arm"], "arm": ["motor"], "motor": [], "camera": []}
-            hearts: dict[str, Heartbeat] = {}
+        def heart(name: str) -> Coroutine[Any, Any, None]:
+            async def changed(now: bool) -> None:  # noqa: FBT001
+                (active.add if now else active.discard)(name)
 
-            def heart(name: str) -> Coroutine[Any, Any, None]:
-                async def changed(now: bool) -> None:  # noqa: FBT001
-                    (active.add if now else active.discard)(name)
+            endpoint = Endpoint(name, transport)
+            hearts[name] = Heartbeat(endpoint, lambda: needs[name], changed, root=name == "root")
+            return hearts[name].run()
 
-                endpoint = Endpoint(name, transport)
-                hearts[name] = Heartbeat(endpoint, lambda: needs[name], changed, root=name == "root")
-                return hearts[name].run()
+        async with running(heart("root"), heart("motor"), heart("camera")) as tasks:
+            await asyncio.sleep(4 * BEAT)
+            assert active == {"root"}
+            async with running(heart("arm")):  # late
+                await until(lambda: active == {"root", "arm", "motor"})
+                await asyncio.sleep(3 * SILENCE)
+                assert active == {"root", "arm", "motor"}
+                assert hearts["motor"].activators == {"arm"}
+                needs["arm"] = ["camera"]  # another state of the arm
+                hearts["arm"].stir()
+                await until(lambda: active == {"root", "arm", "camera"})
+            await until(lambda: active == {"root"})
+            tasks[0].cancel()
+            await until(lambda: not active)
 
-            async with running(heart("root"), heart("motor"), heart("camera")) as tasks:
-                await asyncio.sleep(4 * BEAT)
-                assert active == {"root"}
-                async with running(heart("arm")):  # late
-                    await until(lambda: active == {"root", "arm", "motor"})
-                    await asyncio.sleep(3 * SILENCE)
-                    assert active == {"root", "arm", "motor"}
-                    assert hearts["motor"].activators == {"arm"}
-                    needs["arm"] = ["camera"]  # another state of the arm
-                    hearts["arm"].stir()
-                    await until(lambda: active == {"root", "arm", "camera"})
-                await until(lambda: active == {"root"})
-                tasks[0].cancel()
-                await until(lambda: not active)
-
-        self.run(main())
-
-    def test_a_silent_death_frees_what_the_dead_one_needed(self) -> None:
+    @in_loop
+    async def test_a_silent_death_frees_what_the_dead_one_needed(self) -> None:
         """The dead component sends no last message."""
+        transport, told = self.transport(), []
 
-        async def main() -> None:
-            transport, told = self.transport(), []
+        async def ignore(_: bool) -> None:  # noqa: FBT001
+            pass
 
-            async def ignore(_: bool) -> None:  # noqa: FBT001
-                pass
+        async def note(now: bool) -> None:  # noqa: FBT001
+            told.append(now)
 
-            async def note(now: bool) -> None:  # noqa: FBT001
-                told.append(now)
-
-            dying = Endpoint("arm", transport)
-            arm = Heartbeat(dying, lambda: ["motor"], ignore, root=True)
-            motor = Heartbeat(Endpoint("motor", transport), list, note)
-            async with running(motor.run()):
-                task = asyncio.ensure_future(arm.run())
-                await until(lambda: told == [True])
-                transport.detach("arm")
-                dying.broadcast = lambda *_: None  # type: ignore[method-assign]
-                assert motor.alive("arm")
-                await until(lambda: told == [True, False])
-                assert not motor.alive("arm")
-                task.cancel()
-
-        self.run(main())
+        dying = Endpoint("arm", transport)
+        arm = Heartbeat(dying, lambda: ["motor"], ignore, root=True)
+        motor = Heartbeat(Endpoint("motor", transport), list, note)
+        async with running(motor.run()):
+            task = asyncio.ensure_future(arm.run())
+            await until(lambda: told == [True])
+            transport.detach("arm")
+            dying.broadcast = lambda *_: None  # type: ignore[method-assign]
+            assert motor.alive("arm")
+            await until(lambda: told == [True, False])
+            assert not motor.alive("arm")
+            task.cancel()
 
 
 async def _watched(remote: RemoteComponent, call: SkillCall) -> None:
