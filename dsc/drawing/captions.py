@@ -1,4 +1,4 @@
-"""Captions of edges and states: triggers, guards and actions in short and in full."""
+"""Texts of plots: their interface, rules and handlers, and captions of edges and states in short and in full."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ from dsc.model.actions import (
     Trigger,
     Withdraw,
 )
+from dsc.model.plot import ActionPlot, PlotParameter, PlotVariable
+from dsc.model.rules import Handler, Rule
 from dsc.model.states import State
 from dsc.model.transitions import CHOICE, SelectState, TimedTransition, Transition, TransitionSource, case_value
 from knowledge_base.language.syntax.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable
@@ -223,3 +225,59 @@ def _values(arguments: Mapping[str, Term]) -> str:
 def content_text(use: str, arguments: Mapping[str, Term]) -> str:
     """Return a used plot with its arguments as text."""
     return use + (_values(arguments) if arguments else "")
+
+
+def signature(plot: ActionPlot) -> str:
+    """Return the plot's name and parameters."""
+    return f"{plot.name}({_declared(plot.parameters)})" if plot.parameters else plot.name
+
+
+def facts(plot: ActionPlot) -> list[str]:
+    """Return the rest of the interface, one fact a line."""
+    return [
+        f"{what}: {text}"
+        for what, text in (
+            ("implements", plot.implements or ""),
+            ("fits when", to_text(plot.when) if plot.when is not None else ""),
+            ("listens to", _events(plot.receives)),
+            ("outcomes", _events(plot.emits)),
+            ("outputs", _declared(plot.outputs)),
+            ("variables", _declared(plot.variables)),
+        )
+        if text
+    ]
+
+
+def _declared(names: Mapping[str, PlotParameter | PlotVariable]) -> str:
+    return ", ".join(f"{name}: {one.type}" for name, one in names.items())
+
+
+def _events(declared: Mapping[str, Mapping[str, str] | None]) -> str:
+    return ", ".join(
+        f"{name}({', '.join(attributes)})" if attributes else name for name, attributes in declared.items()
+    )
+
+
+def rule_text(rule: Rule) -> str:
+    """Return a rule on one line."""
+    response = rule.do
+    steps = [content_text(response.use, response.arguments)] if response.use else []
+    steps = [*(action_text(command) for command in response.command), *steps]
+    steps += ["tell"] if response.tell is not None else []
+    passed = f" with {', '.join(response.passed)}" if response.passed else ""
+    limit = f" (at most {response.limit} times)" if response.limit else ""
+    guard = f" [{to_text(rule.when)}]" if rule.when is not None else ""
+    about = rule.on or f"{rule.place} {', '.join(rule.steps)}"
+    of = f" of {', '.join(rule.of)}" if rule.of else ""
+    return f"{about}{of} → {', '.join([*steps, rule.then.replace('_', ' ')])}{passed}{limit}{guard}"
+
+
+def handler_text(handler: Handler) -> str:
+    """Return a handler on one line."""
+    do = handler.do
+    steps = [action_text(command) for command in do.command]
+    steps += [content_text(do.use, do.arguments)] if do.use else []
+    steps += ["tell"] if do.tell is not None else []
+    kind = "interrupted by" if handler.interrupt else "beside it"
+    guard = f" [{to_text(handler.when)}]" if handler.when is not None else ""
+    return f"{kind} {handler.on} → {', '.join(steps)}{guard}"

@@ -1,12 +1,21 @@
-"""Cards: one state as a box, with its name and actions; texts determine the size."""
+"""Cards: one state as a box with its name and actions, a plot's header, a list of rules; texts determine the size."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from dsc.drawing.captions import action_text, block_texts, captions, content_text, labelled, seconds_text
-from dsc.drawing.layout import LINE_HEIGHT, Box, BoxKind, Text, TextStyle, shorten, text_width
+from dsc.drawing.captions import (
+    action_text,
+    block_texts,
+    captions,
+    content_text,
+    facts,
+    labelled,
+    seconds_text,
+    signature,
+)
+from dsc.drawing.layout import LINE_HEIGHT, Box, BoxKind, Text, TextStyle, column, pack, shorten, text_width
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, FinalState, HistoryState, State, SubmachineState
@@ -25,6 +34,9 @@ FINAL_SIZE = 20.0
 DIAMOND_HEIGHT = 44.0
 """Height of a diamond with one line."""
 DOT_SIZE = 14.0
+HEADER_SIDE = 16.0
+HEADER_WIDTH = 340.0
+"""Least width for the lines of a header."""
 CIRCLE_SIZE = 24.0
 
 
@@ -35,6 +47,32 @@ class CardRow:
     text: str
     style: TextStyle = TextStyle.DETAIL
     full: str = ""
+
+
+def _column(rows: Iterable[CardRow | Text], x: float, y: float, *, centred: bool = False) -> tuple[Text, ...]:
+    return column(((row.text, row.style) for row in rows), x, y, centred=centred)
+
+
+def header(plot: ActionPlot, width: float) -> Box:
+    """Return name, parameters, purpose and interface of a plot as the top of a frame of about that width."""
+    room = max(width, HEADER_WIDTH)
+    known, name = facts(plot), signature(plot)
+    lines = [(line, TextStyle.ABOUT) for line in pack((plot.about or "").split(), TextStyle.ABOUT, room)]
+    lines += [(shorten(fact, TextStyle.DETAIL, room), TextStyle.DETAIL) for fact in known]
+    texts = (Text(HEADER_SIDE, 28.0, name, TextStyle.TITLE), *column(lines, HEADER_SIDE, 46.0))
+    used = max(text_width(text.text, text.style) for text in texts) + 2 * HEADER_SIDE
+    kind = BoxKind.GENERATED if plot.generated else BoxKind.PLOT
+    title = "\n".join(filter(None, [name, plot.about, *known]))
+    return Box(kind, plot.name, 0, 0, used, 38.0 + LINE_HEIGHT * len(lines), texts, title=title)
+
+
+def rules_note(rows: Sequence[str], about: str) -> Box:
+    """Return a box that lists rules and handlers without an edge."""
+    listed = column([(shorten(row, TextStyle.RULE, 480.0), TextStyle.RULE) for row in rows], 12.0, 37.0)
+    texts = (Text(12.0, 20.0, about, TextStyle.ABOUT), *listed)
+    width = max(text_width(text.text, text.style) for text in texts) + 24
+    height = 30.0 + LINE_HEIGHT * len(rows)
+    return Box(BoxKind.NOTE, "", 0, 0, width, height, texts, title="\n".join(rows))
 
 
 def dot() -> Box:
@@ -48,15 +86,11 @@ def card(
     """Return a box with a name and rows of text."""
     title_room = text_width(name, TextStyle.NAME) + 2 * SIDE + 2 * MARK * mark
     width = max(LEAST_WIDTH, title_room, *(text_width(row.text, row.style) + 2 * SIDE for row in rows))
-    texts = [Text(width / 2, 20.0, name, TextStyle.NAME, centred=True)]
-    texts += [
-        Text(SIDE, NAME_HEIGHT + 2 + LINE_HEIGHT * number, row.text, row.style)
-        for number, row in enumerate(rows, start=1)
-    ]
+    texts = (Text(width / 2, 20.0, name, TextStyle.NAME, centred=True), *_column(rows, SIDE, 47.0))
     height = NAME_HEIGHT + (LINE_HEIGHT * len(rows) + 9 if rows else 2)
     title = "\n".join(filter(None, [name, about, *(row.full for row in rows)]))
     lines = (NAME_HEIGHT,) if rows else ()
-    return Box(kind, name, 0, 0, width, height, tuple(texts), lines, title, rule)
+    return Box(kind, name, 0, 0, width, height, texts, lines, title, rule)
 
 
 def final_card(name: str, state: FinalState) -> Box:
@@ -65,10 +99,7 @@ def final_card(name: str, state: FinalState) -> Box:
     if state.emit is not None:
         rows.append((f"^{state.emit}", TextStyle.DETAIL))
     width = max(FINAL_SIZE, *(text_width(*row) for row in rows))
-    texts = tuple(
-        Text(width / 2, FINAL_SIZE + LINE_HEIGHT * number, *row, centred=True)
-        for number, row in enumerate(rows, start=1)
-    )
+    texts = column(rows, width / 2, FINAL_SIZE + LINE_HEIGHT, centred=True)
     fired = f"^{content_text(state.emit, state.arguments)}" if state.emit is not None else ""
     title = "\n".join(filter(None, [name, state.about, fired]))
     eye = Box(BoxKind.BULLSEYE, "", (width - FINAL_SIZE) / 2, 0, FINAL_SIZE, FINAL_SIZE)
@@ -84,9 +115,7 @@ def history_card(name: str, state: HistoryState) -> Box:
     half = aside + max(text_width(row.text, row.style) for row in rows)
     height = max(CIRCLE_SIZE, LINE_HEIGHT * len(rows))
     top = (height - LINE_HEIGHT * len(rows)) / 2 + 11.5
-    texts = tuple(
-        Text(half + aside, top + LINE_HEIGHT * number, row.text, row.style) for number, row in enumerate(rows)
-    )
+    texts = _column(rows, half + aside, top)
     mark = "H*" if state.history == "deep" else "H"
     letter = Text(CIRCLE_SIZE / 2, CIRCLE_SIZE / 2 + 4, mark, TextStyle.DETAIL, centred=True)
     circle = Box(BoxKind.CIRCLE, "", 0, 0, CIRCLE_SIZE, CIRCLE_SIZE, (letter,))
@@ -100,10 +129,7 @@ def name_below(history: Box) -> Box:
     """Return a history with its texts below the circle, for edges that come from the left."""
     width = max(CIRCLE_SIZE, *(text_width(text.text, text.style) for text in history.texts))
     below = LINE_HEIGHT * len(history.texts)
-    texts = tuple(
-        replace(text, x=width / 2, y=below + CIRCLE_SIZE + 12 + LINE_HEIGHT * number, centred=True)
-        for number, text in enumerate(history.texts)
-    )
+    texts = _column(history.texts, width / 2, below + CIRCLE_SIZE + 12, centred=True)
     (circle,) = history.boxes
     circle = circle.moved((width - CIRCLE_SIZE) / 2 - circle.x, below - circle.y)
     return replace(history, width=width, height=CIRCLE_SIZE + 2 * below, texts=texts, boxes=(circle,))
@@ -119,10 +145,7 @@ def diamond(name: str, connector: Connector) -> Box:
     # A text fits if its share of the width and the lines' share of the height sum to at most 1.
     width = (max(text_width(row.text, row.style) for row in rows) + SIDE) / (1 - block / height)
     first = (height - block) / 2 + 11.5
-    texts = tuple(
-        Text(width / 2, first + LINE_HEIGHT * number, row.text, row.style, centred=True)
-        for number, row in enumerate(rows)
-    )
+    texts = _column(rows, width / 2, first, centred=True)
     title = "\n".join(filter(None, [name, connector.about, *(row.full for row in rows[1:])]))
     return Box(BoxKind.CHOICE, name, 0, 0, width, height, texts, title=title)
 
@@ -131,10 +154,7 @@ def name_beside(final: Box) -> Box:
     """Return a final state with its texts right of the bullseye, for edges that come from the left."""
     height = max(FINAL_SIZE, LINE_HEIGHT * len(final.texts))
     top = (height - LINE_HEIGHT * len(final.texts)) / 2
-    texts = tuple(
-        replace(text, x=FINAL_SIZE + 7, y=top + 12 + LINE_HEIGHT * number, centred=False)
-        for number, text in enumerate(final.texts)
-    )
+    texts = _column(final.texts, FINAL_SIZE + 7, top + 12)
     eye = replace(final.boxes[0], x=0.0, y=(height - FINAL_SIZE) / 2)
     width = FINAL_SIZE + 7 + max(text_width(text.text, text.style) for text in texts)
     return replace(final, width=width, height=height, texts=texts, boxes=(eye,))

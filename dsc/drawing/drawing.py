@@ -6,18 +6,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
-from dsc.drawing.cards import action_rows, card, diamond, dot, final_card, history_card, leaf_card
+from dsc.drawing.captions import handler_text, rule_text
+from dsc.drawing.cards import action_rows, card, diamond, dot, final_card, header, history_card, leaf_card, rules_note
 from dsc.drawing.crossing import join, way_to
-from dsc.drawing.header import handler_text, header, rule_text, rules_note
 from dsc.drawing.layout import Box, BoxKind, Text, TextStyle
-from dsc.drawing.scopes import EdgeBundle, Inside, ScopeNesting, ScopeSpan, arranged, bundles, initial_bundle, widened
+from dsc.drawing.scopes import EdgeBundle, ScopeNesting, ScopeSpan, arranged, bundles, contents, initial_bundle, widened
 from dsc.drawing.svg import NO_MARKS, to_svg
 from dsc.dynamic.library import Library
+from dsc.dynamic.steps import is_planned
 from dsc.model.plot import ActionPlot, Path, Scope, initial_of
 from dsc.model.states import (
     AnyState,
     CompositeState,
-    DynamicState,
     FinalState,
     HistoryState,
     OrthogonalState,
@@ -32,28 +32,9 @@ REGION_TITLE = 22.0
 HULLS = frozenset({BoxKind.COMPOSITE, BoxKind.ORTHOGONAL})
 
 
-def build(plot: ActionPlot, library: Library | None, *, rules: bool, sideways: bool) -> Box:
-    """Return the drawing of a plot.
-
-    Args:
-        plot: the plot.
-        library: provider of the plots it uses; without one, their details are omitted.
-        rules: whether to expand the plot's rules, which needs the library; otherwise they are listed.
-        sideways: from left to right instead of from top to bottom.
-
-    Raises:
-        UnknownNameError: a transition names a missing state, or a rule or state names a missing plot.
-    """
-    expanded = library.expanded(plot) if library is not None and rules else plot
-    added = {name for name, _, _ in expanded.walk()} - {name for name, _, _ in plot.walk()}
-    inside = _Builder(expanded, library, frozenset(added), sideways=sideways).scope(expanded, ())
-    notes = _notes(plot, shown=library is not None and rules)
-    return _frame(plot, inside, notes)
-
-
 def _notes(plot: ActionPlot, *, shown: bool) -> Box | None:
     """Return a list of the rules without an edge: unexpanded ones, and those for steps of future plans."""
-    planned = any(isinstance(state, DynamicState) and state.goal is not None for _, state, _ in plot.walk())
+    planned = any(is_planned(state) for _, state, _ in plot.walk())
     rows = [rule_text(rule) for rule in plot.rules] if planned or not shown else []
     rows += [handler_text(handler) for handler in plot.handlers] if not shown else []
     about = "rules and handlers" if plot.handlers and not shown else "rules"
@@ -61,21 +42,15 @@ def _notes(plot: ActionPlot, *, shown: bool) -> Box | None:
     return rules_note(rows, about) if rows else None
 
 
-def _frame(plot: ActionPlot, inside: Inside, notes: Box | None) -> Box:
+def _frame(plot: ActionPlot, inside: Box, notes: Box | None) -> Box:
     room = max(inside.width, notes.width if notes is not None else 0.0)
     top = header(plot, room)
     width = max(room + 2 * PAD, top.width)
-    content = _wrapped(inside).moved((width - inside.width) / 2, top.height + PAD)
+    content = inside.moved((width - inside.width) / 2, top.height + PAD)
     boxes, height = content.boxes, top.height + PAD + inside.height + PAD
     if notes is not None:
         boxes, height = (*boxes, notes.moved(PAD, height)), height + notes.height + PAD
-    kind = BoxKind.GENERATED if plot.generated else BoxKind.PLOT
-    frame = Box(kind, plot.name, 0, 0, width, height, top.texts, (top.height,), top.title)
-    return replace(frame, boxes=boxes, edges=content.edges)
-
-
-def _wrapped(inside: Inside) -> Box:
-    return Box(BoxKind.REGION, "", 0, 0, inside.width, inside.height, boxes=inside.boxes, edges=inside.edges)
+    return replace(top, width=width, height=height, lines=(top.height,), boxes=boxes, edges=content.edges)
 
 
 class _Builder:
@@ -99,7 +74,7 @@ class _Builder:
             scopes.setdefault(self._nesting.common_scope((one.source, *one.targets)), []).append(one)
         return scopes
 
-    def scope(self, scope: Scope, path: Path) -> Inside:
+    def scope(self, scope: Scope, path: Path) -> Box:
         """Return the layout of a scope's states with their edges."""
         initial = initial_of(scope)
         self._known(initial, self._nesting.inside(path), (*path, "initial"))
@@ -146,12 +121,12 @@ class _Builder:
             return diamond(name, state)
         return leaf_card(name, state, self._library, rule=name in self._added, told=self._plot.generated)
 
-    def _hull(self, kind: BoxKind, name: str, state: State, inside: Inside) -> Box:
+    def _hull(self, kind: BoxKind, name: str, state: State, inside: Box) -> Box:
         """Return a state's box around its content; regions reach up to its border, states do not."""
         pad = 0.0 if kind is BoxKind.ORTHOGONAL else PAD
         head = card(kind, name, action_rows(state), about=state.about or "")
         width = max(head.width, inside.width + 2 * pad)
-        moved = _wrapped(inside).moved((width - inside.width) / 2, head.height + pad)
+        moved = inside.moved((width - inside.width) / 2, head.height + pad)
         return replace(
             widened(head, width, head.height + inside.height + 2 * pad),
             lines=(*head.lines, head.height),
@@ -162,12 +137,12 @@ class _Builder:
     def _region(self, name: str, region: Region, path: Path) -> Box:
         inside = self.scope(region, path)
         title = Text(10.0, 16.0, name, TextStyle.ABOUT)
-        hull = _wrapped(inside).moved(PAD, REGION_TITLE + 4)
+        hull = inside.moved(PAD, REGION_TITLE + 4)
         width, height = inside.width + 2 * PAD, inside.height + REGION_TITLE + 4 + PAD
         return replace(hull, name=name, x=0, y=0, width=width, height=height, texts=(title,))
 
 
-def _side_by_side(regions: list[Box]) -> Inside:
+def _side_by_side(regions: list[Box]) -> Box:
     """Return regions in a row or in a column, as is closer to a square; all reach from border to border."""
     widths, heights = [one.width for one in regions], [one.height for one in regions]
     in_row = max(sum(widths), *heights) <= max(*widths, sum(heights))
@@ -178,10 +153,10 @@ def _side_by_side(regions: list[Box]) -> Inside:
         full = replace(one, height=height) if in_row else replace(one, width=width)
         boxes.append(full.moved(x, y))
         x, y = (x + one.width, y) if in_row else (x, y + one.height)
-    return Inside(width, height, tuple(boxes))
+    return contents(width, height, boxes)
 
 
-def _below(histories: Sequence[Box], regions: Inside) -> Inside:
+def _below(histories: Sequence[Box], regions: Box) -> Box:
     """Return regions placed below the histories of the orthogonal state."""
     if not histories:
         return regions
@@ -192,7 +167,7 @@ def _below(histories: Sequence[Box], regions: Inside) -> Inside:
     top = max(one.height for one in histories) + 2 * PAD
     stretch = max(x / regions.width, 1.0)
     boxes += [replace(one, width=one.width * stretch).moved(one.x * (stretch - 1), top) for one in regions.boxes]
-    return Inside(regions.width * stretch, regions.height + top, tuple(boxes))
+    return contents(regions.width * stretch, regions.height + top, boxes)
 
 
 Direction = Literal["down", "right"]
@@ -226,4 +201,7 @@ def lay_out(
     plot: ActionPlot, library: Library | None = None, *, rules: bool = True, direction: Direction = "down"
 ) -> Box:
     """Return the drawing as values, for other renderers; arguments and errors as for `draw`."""
-    return build(plot, library, rules=rules, sideways=direction == "right")
+    expanded = library.expanded(plot) if library is not None and rules else plot
+    added = {name for name, _, _ in expanded.walk()} - {name for name, _, _ in plot.walk()}
+    builder = _Builder(expanded, library, frozenset(added), sideways=direction == "right")
+    return _frame(plot, builder.scope(expanded, ()), _notes(plot, shown=library is not None and rules))

@@ -6,6 +6,7 @@ font in DejaVu Sans, the widest of the usual sans-serif fonts.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from unicodedata import east_asian_width
@@ -55,6 +56,11 @@ class Text:
     text: str
     style: TextStyle
     centred: bool = False
+
+
+def column(rows: Iterable[tuple[str, TextStyle]], x: float, y: float, *, centred: bool = False) -> tuple[Text, ...]:
+    """Return small texts below each other; `y` is the first baseline."""
+    return tuple(Text(x, y + LINE_HEIGHT * number, text, style, centred) for number, (text, style) in enumerate(rows))
 
 
 @dataclass(frozen=True, slots=True)

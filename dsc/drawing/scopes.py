@@ -25,9 +25,6 @@ class ScopeNesting:
     def __init__(self, plot: ActionPlot) -> None:
         self._holders = {name: dict(_holders(path)) for name, _, path in plot.walk()}
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._holders)
-
     def inside(self, scope: Path) -> list[str]:
         """Return all states in a scope, at any depth."""
         return [name for name, holders in self._holders.items() if scope in holders]
@@ -61,14 +58,9 @@ class ScopeSpan:
     end: str
 
 
-@dataclass(frozen=True, slots=True)
-class Inside:
-    """The contents of a scope, in a rectangle that begins at (0, 0)."""
-
-    width: float
-    height: float
-    boxes: tuple[Box, ...]
-    edges: tuple[DrawnEdge, ...] = ()
+def contents(width: float, height: float, boxes: Iterable[Box], edges: Iterable[DrawnEdge] = ()) -> Box:
+    """Return the contents of a scope, in a rectangle that begins at (0, 0)."""
+    return Box(BoxKind.REGION, "", 0, 0, width, height, boxes=tuple(boxes), edges=tuple(edges))
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,13 +72,13 @@ class Draft:
     boxes: tuple[Box, ...]
     edges: tuple[tuple[ScopeSpan, DrawnEdge], ...]
 
-    def finished(self) -> Inside:
+    def finished(self) -> Box:
         """Return the scope with all edges prolonged to their states."""
         boxes = {box.name: box for box in self.boxes}
         edges: list[DrawnEdge] = []
         for span, edge in self.edges:
             edges += prolonged(edge, boxes[span.start], boxes[span.end], span.bundle.also, edges)
-        return Inside(self.width, self.height, self.boxes, tuple(edges))
+        return contents(self.width, self.height, self.boxes, edges)
 
 
 def arranged(boxes: Mapping[str, Box], spans: Sequence[ScopeSpan], *, sideways: bool) -> Draft:

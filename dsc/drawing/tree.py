@@ -11,12 +11,15 @@ from dsc.drawing.captions import (
     Labelled,
     block_texts,
     content_text,
+    facts,
     full_text,
+    handler_text,
     labelled,
     labelled_by_value,
+    rule_text,
     seconds_text,
+    signature,
 )
-from dsc.drawing.header import facts, handler_text, rule_text, signature
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import (
     AnyState,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right, insort
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -260,18 +261,10 @@ def _crossings(grid: Grid) -> int:
 
 
 def _inversions(grid: Grid, layer: list[int], position: dict[int, int]) -> int:
-    """Return the crossings below a layer, counted with a Fenwick tree (Barth, Jünger, Mutzel 2002)."""
-    ends = [end for cell in layer for end in sorted(position[n] for n in grid.cells[cell].down)]
-    tree = [0] * (max(ends, default=0) + 2)
+    """Return the crossings below a layer: pairs of connections whose lower ends are in the opposite order."""
     count = 0
-    for already, end in enumerate(ends):
-        index, not_right = end + 1, 0
-        while index:
-            not_right += tree[index]
-            index &= index - 1
-        count += already - not_right
-        index = end + 1
-        while index < len(tree):
-            tree[index] += 1
-            index += index & -index
+    before: list[int] = []
+    for end in (end for cell in layer for end in sorted(position[n] for n in grid.cells[cell].down)):
+        count += len(before) - bisect_right(before, end)
+        insort(before, end)
     return count
