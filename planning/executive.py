@@ -20,7 +20,7 @@ from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Budget
 from dsc.profiles import configure
-from dsc.runs.encoding import Kept
+from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.sequencer.sequencer import RunEnd, Sequencer

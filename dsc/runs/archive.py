@@ -9,15 +9,19 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from dsc.engine.steps import Start
-from dsc.runs.snapshot import RunSnapshot, SnapshotRow, latest_snapshot
-from dsc.runs.tables import RunChain, RunSpan, StoredStep, require_tables_of_runs
+from dsc.runs.tables import CHAIN, RunSnapshot, SnapshotRow, latest_snapshot, require_tables_of_runs
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.file import is_there, located, reading
-from knowledge_base.journal.integrity import Ends, damaged, require_sound
+from knowledge_base.journal.integrity import NOTHING, Ends, Tip, damaged, require_link, require_sound
+
+_RUNS = "SELECT run, plot, arguments, version, header, plots, domain, digest, ended, steps, seal FROM runs ORDER BY run"
+_STEPS = """SELECT place, run, number, steps.time, before, version, serials, message, configuration, change, records,
+    knowledge, steps.digest, changes.digest FROM steps LEFT JOIN changes USING (version)"""
+_DIGEST = "SELECT digest FROM steps WHERE place = ?"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +36,8 @@ class RunRow:
         plots: the hashes of all plots of its library by name.
         domain: other things that plots rely on, as text by name.
         ended: its end (`finished`, `problem`); `None` while it has none.
+        first, last: its macrosteps follow place `first`, up to place `last`.
+        digest: digest of its row.
     """
 
     number: int
@@ -42,6 +48,9 @@ class RunRow:
     plots: Mapping[str, str]
     domain: Mapping[str, str]
     ended: Mapping[str, Any] | None
+    first: int
+    last: int
+    digest: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,23 +77,42 @@ class StepRow:
     records: tuple[Record, ...]
 
 
+class _StoredStep(NamedTuple):
+    """The row of a macrostep as stored; `made` is the digest of its version in the knowledge's own tables."""
+
+    place: int
+    run: int
+    number: int
+    time: float
+    before: int
+    version: int
+    serials: int
+    message: str
+    configuration: str
+    change: str
+    records: str
+    knowledge: bytes
+    digest: bytes
+    made: bytes | None
+
+
 class RunArchive:
     """The runs of a store, for readers; use it inside `archive`.
 
-    Methods raise `DamagedStoreError`, which names the row, if its digest does not fit.
+    It checks each row of runs and macrosteps by its digest. Methods raise `DamagedStoreError`, which names the row.
     """
 
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self.path = path
         self.connection = connection
-        self._chain = RunChain(connection, path)
         self._forms: dict[str, Any] = {}
         self._runs: list[RunRow] | None = None
+        self._worlds: dict[int, bytes] | None = None
 
     def runs(self) -> list[RunRow]:
-        """All runs, in order."""
+        """All runs in order; read once."""
         if self._runs is None:
-            self._runs = [_run(span) for span in self._chain.spans()]
+            self._runs = self._read_runs()
         return list(self._runs)
 
     def run(self, number: int | None = None) -> RunRow:
@@ -98,11 +126,11 @@ class RunArchive:
 
     def steps(self, run: int) -> Iterator[StepRow]:
         """The macrosteps of a run, in order."""
-        return map(_step, self._chain.steps(self.run(run).number))
+        return map(_step, self._steps(run))
 
     def last(self, run: int) -> StepRow:
         """The last macrostep of a run."""
-        return _step(next(self._chain.latest_steps(self.run(run).number)))
+        return _step(next(self._latest_steps(run)))
 
     def records(self, run: int, after: int = 0) -> Iterator[Record]:
         """The kept trace records of a run, in order; only those with a higher number than `after`."""
@@ -112,12 +140,11 @@ class RunArchive:
 
     def lines(self, run: int, since: int = 0) -> Iterator[tuple[int, str]]:
         """The lines of a run's trace from the macrostep at place `since` of the file on, each with its place there."""
-        rows = self._chain.steps(self.run(run).number, since)
-        return ((row.place, line) for row in rows for line in row.records.split("\n") if line)
+        return ((row.place, line) for row in self._steps(run, since) for line in row.records.split("\n") if line)
 
     def latest_snapshot(self) -> RunSnapshot:
         """The snapshot after the last macrostep of all runs."""
-        return latest_snapshot(row.change for row in self._chain.latest_steps(self.run().number))
+        return latest_snapshot(step.change for step in self._latest_steps(self.run().number))
 
     def under_way(self) -> list[tuple[Start, float]]:
         """The skills of the unfinished run that have not ended, with the second at which they were started."""
@@ -144,11 +171,93 @@ class RunArchive:
             DamagedStoreError: a row differs from the written one.
         """
         for run in self.runs():
-            for _ in self._chain.steps(run.number):
+            for _ in self._steps(run.number):
                 pass
         for (digest,) in self.connection.execute("SELECT hash FROM forms").fetchall():
             self.form(digest)
         return self.runs()
+
+    def _steps(self, number: int, since: int = 0) -> Iterator[_StoredStep]:
+        """The macrosteps of a run in order, from place `since` of the file on."""
+        run = self._with_steps(number)
+        place = max(run.first, since - 1)
+        digest: object = run.digest
+        if place > run.first:
+            (digest,) = self.connection.execute(_DIGEST, (place,)).fetchone() or (None,)
+        rows = self.connection.execute(f"{_STEPS} WHERE place > ? AND place <= ? ORDER BY place", (place, run.last))
+        for row in map(_StoredStep._make, rows):
+            place += 1
+            self._require_step(row, run, place, digest)
+            digest = row.digest
+            yield row
+        if place != run.last:
+            raise damaged(self.path, f"macrostep {place + 1 - run.first} of run {number} is missing")
+
+    def _latest_steps(self, number: int) -> Iterator[_StoredStep]:
+        """The macrosteps of a run, the last one first."""
+        run = self._with_steps(number)
+        rows = self.connection.execute(
+            f"{_STEPS} WHERE place > ? AND place <= ? ORDER BY place DESC", (run.first, run.last)
+        )
+        place, later = run.last, None
+        for row in map(_StoredStep._make, rows):
+            if later is not None:
+                self._require_step(later, run, place, row.digest)
+                yield later
+                place -= 1
+            later = row
+        if later is not None:
+            self._require_step(later, run, place, run.digest)
+            yield later
+
+    def _read_runs(self) -> list[RunRow]:
+        runs: list[RunRow] = []
+        (last,) = self.connection.execute("SELECT coalesce(max(place), 0) FROM steps").fetchone()
+        first, seal, unfinished = 0, NOTHING, False
+        for number, (*begun, own, ended, steps, found) in enumerate(self.connection.execute(_RUNS), 1):
+            name = f"run {number}"
+            digest = require_link(self.path, name, own, (seal,), *begun)
+            if begun[0] != number or unfinished:
+                raise damaged(self.path, f"{name} is missing, or follows one that has not ended")
+            unfinished = ended is None
+            if not unfinished:
+                (at,) = self.connection.execute(_DIGEST, (steps,)).fetchone() or (None,)
+                if at is None or steps <= first:
+                    raise damaged(self.path, f"{name} has ended, and its last macrostep is missing")
+                seal = require_link(self.path, f"the end of {name}", found, (at,), steps, ended)
+            _, plot, arguments, version, header, plots, domain = begun
+            runs.append(RunRow(
+                number, plot, json.loads(arguments), version, json.loads(header), json.loads(plots),
+                json.loads(domain), json.loads(ended) if ended else None, first, last if unfinished else steps, digest,
+            ))  # fmt: skip
+            first = runs[-1].last
+        if first != last:
+            raise damaged(self.path, f"the run of macrosteps after place {first} of the table 'steps' is missing")
+        ends = Ends(self.connection, self.path)
+        if CHAIN in ends.tips:
+            ends.require(CHAIN, Tip(last, seal))
+        return runs
+
+    def _with_steps(self, number: int) -> RunRow:
+        run = self.run(number)
+        if run.first >= run.last:
+            raise damaged(self.path, f"the macrosteps of run {number} are missing")
+        return run
+
+    def _require_step(self, row: _StoredStep, run: RunRow, place: int, before: object) -> None:
+        name = f"macrostep {place - run.first} of run {run.number}"
+        if (row.place, row.run) != (place, run.number) or row.number != place - run.first:
+            raise damaged(self.path, f"{name} is missing, or not in its place")
+        require_link(self.path, name, row.digest, (before, row.knowledge), *row[1:11])
+        made = row.made
+        if made is None:
+            if self._worlds is None:
+                self._worlds = dict(self.connection.execute("SELECT version, head FROM snapshots").fetchall())
+            made = self._worlds.get(row.version)
+            if made is None and row.version < min(self._worlds, default=0):  # forgotten since
+                return
+        if made != row.knowledge:
+            raise damaged(self.path, f"version {row.version} of the knowledge is not the one after {name}")
 
 
 @contextmanager
@@ -212,15 +321,7 @@ def unfinished(runs: RunArchive) -> RunRow:
     raise StoreError("there is no unfinished run in this store", place=Place(str(runs.path)))
 
 
-def _run(span: RunSpan) -> RunRow:
-    number, plot, arguments, version, header, plots, domain = span.begun
-    ended = None if span.ended is None else json.loads(span.ended)
-    return RunRow(
-        number, plot, json.loads(arguments), version, json.loads(header), json.loads(plots), json.loads(domain), ended
-    )
-
-
-def _step(row: StoredStep) -> StepRow:
+def _step(row: _StoredStep) -> StepRow:
     return StepRow(
         row.number, row.time, row.before, row.version, row.serials, json.loads(row.message),
         tuple(json.loads(row.configuration)),

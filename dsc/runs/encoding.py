@@ -9,11 +9,10 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from dsc.calls import Outcome
-from dsc.engine.machine_state import NOTHING, FrameState, MachineState
+from dsc.engine.machine_state import NOTHING, FrameState
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import NO_ATTRIBUTES, Event
 from dsc.messages import (
@@ -25,11 +24,9 @@ from dsc.messages import (
     SkillMessage,
     TimerMessage,
 )
-from dsc.runs.archive import RunRow
-from dsc.trace import Record
+from dsc.runs.tables import Form
 from knowledge_base.exchange import delta_form, delta_of
 
-Form = dict[str, Any]
 Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode | SendMessage
 """Pending items: a restart needs them. A parameter or mode is in effect until it is set again; a message is pending
 until the component has taken it."""
@@ -38,62 +35,6 @@ _BY_HASH = "$form"
 _MOST_REMEMBERED = 256
 _VISIBILITY = Event._fields[2:]
 _EVERYBODY = [Event._field_defaults[name] for name in _VISIBILITY]
-
-
-@dataclass(frozen=True, slots=True)
-class Pending:
-    """A pending item: an action, timer or message without its end yet, or a parameter or mode in effect.
-
-    Attributes:
-        place: of the row.
-        what: the output of the machine that asked for it, or a message from outside with a later time.
-        step: number of the macrostep that asked.
-        at: second of run time at which a skill was started, or at which another item is due.
-        reports: number of intermediate events of a skill so far; of a parameter or mode, 1 once it is in effect.
-        cause: number of the trace record about a skill's start.
-        cancelled: whether the last macrostep has cancelled the skill.
-    """
-
-    place: int
-    what: Awaited
-    step: int
-    at: float
-    reports: int = 0
-    cause: int = 0
-    cancelled: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Kept:
-    """A run after its last macrostep.
-
-    Attributes:
-        run: its row, with plot and arguments.
-        number: that of the macrostep.
-        time: its second of run time.
-        state: of the machine.
-        emitted, in_vain, problem, settings: as of `Reactor`.
-        pending: in the order in which it was asked for.
-        memory: of components, by name.
-        records: of the trace, so far.
-    """
-
-    run: RunRow
-    number: int
-    time: float
-    state: MachineState
-    emitted: tuple[Event, ...]
-    in_vain: frozenset[tuple[int, int]]
-    problem: str | None
-    settings: tuple[ParameterMessage, ...]
-    pending: tuple[Pending, ...]
-    memory: Mapping[str, Any]
-    records: tuple[Record, ...]
-
-    @property
-    def last_record(self) -> int:
-        """Number of the last kept record."""
-        return self.records[-1].seq if self.records else 0
 
 
 class Shortener:

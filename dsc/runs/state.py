@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import asdict
 from typing import Any, Protocol
 
 from dsc.components.life_cycle import Life
-from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
-from dsc.engine.machine_state import FrameState, MachineState
+from dsc.engine.machine_state import FrameState
 from dsc.engine.steps import (
     Cancel,
     Output,
@@ -24,21 +22,9 @@ from dsc.engine.steps import (
 )
 from dsc.events import Event
 from dsc.messages import LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage, Told
-from dsc.runs.archive import RunArchive, RunRow
-from dsc.runs.encoding import (
-    Awaited,
-    Form,
-    Kept,
-    Pending,
-    Shortener,
-    awaited_form,
-    awaited_of,
-    events_form,
-    events_of,
-    frame_form,
-    frame_news,
-)
-from dsc.runs.snapshot import SnapshotRow
+from dsc.runs.encoding import Awaited, Shortener, awaited_form, events_form, frame_news
+from dsc.runs.kept import Kept
+from dsc.runs.tables import Form, SnapshotRow
 from dsc.trace import text_of
 
 _Key = tuple[str, str]
@@ -249,39 +235,6 @@ class RunState:
             self._places[key] = places[most:]
         for place in places[:most]:
             self._drop_row(place)
-
-
-def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
-    """The unfinished run after its last kept macrostep.
-
-    Raises:
-        UnknownNameError: the library lacks one of the plots, or a plot one of the states.
-        DamagedStoreError: the run differs from the written one.
-    """
-    find = runs.form
-    steps = list(runs.steps(run.number))
-    last, now = steps[-1], runs.latest_snapshot()
-    reactor = now.reactor
-    root = None if reactor["root"] is None else frame_form(reactor["root"], now.frames, find)
-    state = {"root": root, "serials": last.serials, "finished": reactor["finished"]}
-    return Kept(
-        run=run,
-        number=last.number,
-        time=last.time,
-        state=MachineState.from_json(state, library),
-        emitted=events_of(reactor["emitted"], find),
-        in_vain=frozenset((activation, index) for activation, index in reactor["in_vain"]),
-        problem=reactor["problem"],
-        settings=tuple([ParameterMessage(**setting) for setting in reactor["settings"]]),
-        pending=tuple([_pending(place, SnapshotRow(*row), find) for place, row in sorted(now.pending.items())]),
-        memory={name: json.loads(memory) for name, memory in now.memory.items()},
-        records=tuple(record for step in steps for record in step.records),
-    )  # fmt: skip
-
-
-def _pending(place: int, row: SnapshotRow, find: Callable[[str], Any]) -> Pending:
-    what = awaited_of(row.kind, row.what, find)
-    return Pending(place, what, row.step, row.at, row.reports, row.cause, row.cancelled)
 
 
 def _by_serial(root: FrameState | None) -> dict[int, FrameState]:

@@ -16,7 +16,7 @@ from dsc.engine.steps import NO_CHANGE, Cancel, Output, SendLater, SetParameter,
 from dsc.errors import RunawayError
 from dsc.events import EVERY, FAILURES, Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
-from dsc.runs.encoding import Kept
+from dsc.runs.kept import Kept
 from dsc.sequencer.step_tracing import StepTracer
 from dsc.trace import Trace
 from knowledge_base.errors import InputError

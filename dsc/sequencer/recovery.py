@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dsc.components.hooks import contained
 from dsc.engine.steps import SendLater, SetParameter, Start, StartTimer, SwitchMode
 from dsc.messages import LateMessage, TimerMessage
-from dsc.runs.encoding import Kept, Pending
+from dsc.runs.kept import Kept, Pending
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.running_skills import InterruptedSkill
 from knowledge_base.errors import InputError, described

@@ -9,8 +9,8 @@ from pathlib import Path
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output, Start
 from dsc.runs.archive import RunArchive, RunRow, StepRow, archive
-from dsc.runs.design_changes import plots_of
 from dsc.runs.encoding import full, message_of
+from dsc.runs.kept import plots_of
 from dsc.sequencer.reactor import Reactor
 from dsc.trace import Trace, text_of
 from knowledge_base.exchange import delta_form

@@ -13,7 +13,7 @@ from dsc.engine.machine import Machine
 from dsc.engine.steps import Output
 from dsc.events import GAVE_UP, NO_PLAN, Event
 from dsc.messages import FromOutside, LateMessage, Message, SkillMessage
-from dsc.runs.encoding import Kept
+from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer import message_checks
 from dsc.sequencer.clock import LoopClock

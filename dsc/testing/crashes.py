@@ -18,7 +18,7 @@ from dsc.calls import Outcome, SkillCall
 from dsc.chance import choose, uniform
 from dsc.components.component import Component
 from dsc.runs.archive import archive
-from dsc.runs.writer import Boundary
+from dsc.runs.store import Boundary
 from dsc.sequencer.sequencer import Sequencer
 from knowledge_base.errors import StoreError
 

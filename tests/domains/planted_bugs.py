@@ -7,9 +7,8 @@ from types import SimpleNamespace
 
 from domains.clean_up_table.report import FAILURES
 from dsc.messages import SkillMessage
-from dsc.runs import writer
-from dsc.runs.store import RunStore
-from dsc.runs.writer import RunWriter
+from dsc.runs import store
+from dsc.runs.store import RunStore, RunWriter
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.sequencer import Sequencer
 
@@ -80,7 +79,7 @@ def _forgetting(take_up, later):
 def no_fence(monkeypatch):
     """Whoever writes a run goes on writing it, whoever has taken it over."""
     monkeypatch.setattr(RunWriter, "require_right", lambda self: None)
-    monkeypatch.setattr(writer, "_STEP", writer._STEP.replace("FROM fence WHERE epoch = ?", "WHERE ? > 0"))
+    monkeypatch.setattr(store, "_STEP", store._STEP.replace("FROM fence WHERE epoch = ?", "WHERE ? > 0"))
 
 
 def failures_not_recorded(monkeypatch):

@@ -17,8 +17,8 @@ from dsc.engine.steps import Cancel, Revoke, SendLater, SetParameter, Start, Sta
 from dsc.events import Event
 from dsc.messages import ParameterMessage, SkillMessage, TimerMessage
 from dsc.runs.encoding import Outcome, Shortener, frame_form
-from dsc.runs.snapshot import RunSnapshot, SnapshotRow, latest_snapshot
 from dsc.runs.state import RunState
+from dsc.runs.tables import RunSnapshot, SnapshotRow, latest_snapshot
 
 EVERY_KIND = st.one_of(libraries(depth=2), libraries(scxml=True, depth=2))
 
