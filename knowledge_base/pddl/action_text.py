@@ -46,7 +46,6 @@ _COMPARED = (
 _DURATION = Variable("duration")
 _START, _OVER_ALL, _END = "at start", "over all", "at end"
 _T = TypeVar("_T")
-_ByTime = dict[str, list[_T]]
 
 
 def read_duration(node: Node) -> Duration:
@@ -72,19 +71,14 @@ def read_timed(condition: Node | None, effect: Node | None, duration: Duration) 
         ParseError: the form is wrong, or a part does not say when.
         UnsupportedConstructError: an effect depends on a condition at another time, or on a chosen duration.
     """
-    needed: _ByTime[Expression] = {_START: [], _OVER_ALL: [], _END: []}
-    done: _ByTime[Effect] = {_START: [], _END: []}
-    if condition is not None:
-        _condition(condition, needed, lambda e: e)
-    if effect is not None:
-        _effect(effect, done, lambda e: e)
-    timed = {when: _all(AllOf, [_with_duration(e, duration) for e in parts]) for when, parts in done.items()}
+    needed = [] if condition is None else list(_conditions(condition))
+    done = [] if effect is None else [(when, _with_duration(e, duration)) for when, e in _effects(effect)]
     return DurativeParts(
-        start=_all(And, needed[_START]),
-        over_all=_all(And, needed[_OVER_ALL]),
-        end=_all(And, needed[_END]),
-        start_effect=timed[_START],
-        end_effect=timed[_END],
+        start=_at(_START, needed, And),
+        over_all=_at(_OVER_ALL, needed, And),
+        end=_at(_END, needed, And),
+        start_effect=_at(_START, done, AllOf),
+        end_effect=_at(_END, done, AllOf),
     )
 
 
@@ -111,19 +105,21 @@ def _bound(group: Group) -> tuple[str, Term]:
     return operator, parse_term(group.items[2])
 
 
-def _condition(node: Node, found: _ByTime[Expression], scope: Callable[[Expression], Expression]) -> None:
+def _conditions(node: Node) -> Iterator[tuple[str, Expression]]:
+    """The parts of a durative condition, each with its time."""
     group = _group(node, "a condition is written in parentheses")
     match group.head(), len(group.items):
         case None, 0:
             return
         case "and", _:
             for part in group.items[1:]:
-                _condition(part, found, scope)
+                yield from _conditions(part)
         case "forall", 3:
             variables = parse_variables(group.items[1])
-            _condition(group.items[2], found, lambda e: scope(Forall(variables, e, place=group.place)))
-        case (("at" | "over"), 3) if (when := _time(group)) in found:
-            found[when].append(scope(parse_condition(group.items[2])))
+            for when, e in _conditions(group.items[2]):
+                yield when, Forall(variables, e, place=group.place)
+        case (("at" | "over"), 3) if (when := _time(group)) in (_START, _OVER_ALL, _END):
+            yield when, parse_condition(group.items[2])
         case _:
             raise ParseError(
                 "a condition of a durative action says when: (at start CONDITION), (over all CONDITION) or"
@@ -132,37 +128,32 @@ def _condition(node: Node, found: _ByTime[Expression], scope: Callable[[Expressi
             )
 
 
-def _effect(node: Node, found: _ByTime[Effect], scope: Callable[[Effect], Effect]) -> None:
+def _effects(node: Node) -> Iterator[tuple[str, Effect]]:
+    """The parts of a durative effect, each with its time."""
     group = _group(node, "an effect is written in parentheses")
     match group.head(), len(group.items):
         case None, 0:
             return
         case "and", _:
             for part in group.items[1:]:
-                _effect(part, found, scope)
+                yield from _effects(part)
         case "forall", 3:
             variables = parse_variables(group.items[1])
-            _effect(group.items[2], found, lambda e: scope(ForEach(variables, e, place=group.place)))
+            for when, e in _effects(group.items[2]):
+                yield when, ForEach(variables, e, place=group.place)
         case "when", 3:
-            _conditional_effect(group, found, scope)
-        case "at", 3 if (when := _time(group)) in found:
-            found[when].append(scope(parse_effect(group.items[2])))
+            needed, done = list(_conditions(group.items[1])), list(_effects(group.items[2]))
+            times = {when for when, _ in (*needed, *done)}
+            if len(times) > 1 or _OVER_ALL in times:
+                raise refused(ACROSS_TIMES, "when", group.place)
+            for when in times:
+                yield when, When(_at(when, needed, And), _at(when, done, AllOf), place=group.place)
+        case "at", 3 if (when := _time(group)) in (_START, _END):
+            yield when, parse_effect(group.items[2])
         case _:
             raise ParseError(
                 "an effect of a durative action says when: (at start EFFECT) or (at end EFFECT)", place=group.place
             )
-
-
-def _conditional_effect(group: Group, found: _ByTime[Effect], scope: Callable[[Effect], Effect]) -> None:
-    needed: _ByTime[Expression] = {_START: [], _OVER_ALL: [], _END: []}
-    done: _ByTime[Effect] = {_START: [], _END: []}
-    _condition(group.items[1], needed, lambda e: e)
-    _effect(group.items[2], done, lambda e: e)
-    times = {when for by_time in (needed, done) for when, parts in by_time.items() if parts}
-    if len(times) > 1 or _OVER_ALL in times:
-        raise refused(ACROSS_TIMES, "when", group.place)
-    for when in times & done.keys():
-        found[when].append(scope(When(_all(And, needed[when]), _all(AllOf, done[when]), place=group.place)))
 
 
 def _time(group: Group) -> str:
@@ -176,8 +167,10 @@ def _group(node: Node, wanted: str) -> Group:
     return node
 
 
-def _all(join: Callable[[tuple[_T, ...]], _T], parts: list[_T]) -> _T:
-    return parts[0] if len(parts) == 1 else join(tuple(parts))
+def _at(when: str, parts: Iterable[tuple[str, _T]], join: Callable[[tuple[_T, ...]], _T]) -> _T:
+    """The parts of that time, joined unless there is just one."""
+    found = tuple(part for time, part in parts if time == when)
+    return found[0] if len(found) == 1 else join(found)
 
 
 def _with_duration(effect: Effect, duration: Duration) -> Effect:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 from knowledge_base.errors import ParseError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import GEOMETRY, Content, Delta, Fact, Value, require_content
 from knowledge_base.language.checking.check import check
-from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Signature, Vocabulary
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Vocabulary
 from knowledge_base.language.syntax.expression import (
     TRUE,
     Arithmetic,
@@ -31,15 +31,7 @@ from knowledge_base.spelling import is_number
 _SECTIONS = (":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length")
 TOTAL_TIME = Call("total-time")
 """The duration of the whole plan, in a metric. No domain declares it."""
-_TOTAL_TIME_DECLARED = Signature(TOTAL_TIME.function, result="number")
 _DIRECTIONS = ("minimize", "maximize")
-
-
-class DomainVocabulary(Vocabulary, Protocol):
-    """A vocabulary that a problem can extend; a `Schema` is one."""
-
-    def with_functions(self, *functions: Signature) -> Vocabulary:
-        """The vocabulary with these functions too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +74,7 @@ class ProblemText:
 
 
 def read_problem(
-    text_or_path: str | Path, schema: DomainVocabulary, source: str | None = None, domain: str | None = None
+    text_or_path: str | Path, schema: Vocabulary, source: str | None = None, domain: str | None = None
 ) -> ProblemText:
     """Read a PDDL problem: a `Path` or a file's name, or the text itself.
 
@@ -106,9 +98,7 @@ def read_problem(
     return parse_problem(text, schema, source, domain)
 
 
-def parse_problem(
-    text: str, schema: DomainVocabulary, source: str | None = None, domain: str | None = None
-) -> ProblemText:
+def parse_problem(text: str, schema: Vocabulary, source: str | None = None, domain: str | None = None) -> ProblemText:
     """Read a PDDL problem from its text; arguments and errors as for `read_problem`."""
     definition = read_definition(text, source, "problem", _SECTIONS)
     named = _domain(definition)
@@ -131,7 +121,7 @@ def _domain(definition: Definition) -> Word:
     return word(nodes[0], "the domain's name")
 
 
-def _problem(definition: Definition, named: Word, schema: DomainVocabulary) -> ProblemText:
+def _problem(definition: Definition, named: Word, schema: Vocabulary) -> ProblemText:
     objects = _objects(parse_names(definition.nodes(":objects")), schema)
     init = _Init(schema, {**schema.constants, **objects})
     for node in definition.nodes(":init"):
@@ -149,7 +139,7 @@ def _problem(definition: Definition, named: Word, schema: DomainVocabulary) -> P
     )
 
 
-def _objects(names: Sequence[TypedName], schema: DomainVocabulary) -> dict[str, str]:
+def _objects(names: Sequence[TypedName], schema: Vocabulary) -> dict[str, str]:
     objects: dict[str, str] = {}
     for name, types, place in names:
         if len(types) > 1:
@@ -163,7 +153,7 @@ def _objects(names: Sequence[TypedName], schema: DomainVocabulary) -> dict[str, 
     return objects
 
 
-def _goal(definition: Definition, schema: DomainVocabulary, objects: Mapping[str, str]) -> Expression:
+def _goal(definition: Definition, schema: Vocabulary, objects: Mapping[str, str]) -> Expression:
     nodes = definition.nodes(":goal")
     if not nodes:
         return TRUE
@@ -175,7 +165,7 @@ def _goal(definition: Definition, schema: DomainVocabulary, objects: Mapping[str
     return goal
 
 
-def _metric(definition: Definition, schema: DomainVocabulary, objects: Mapping[str, str]) -> Metric | None:
+def _metric(definition: Definition, schema: Vocabulary, objects: Mapping[str, str]) -> Metric | None:
     nodes = definition.nodes(":metric")
     if not nodes:
         return None
@@ -187,19 +177,19 @@ def _metric(definition: Definition, schema: DomainVocabulary, objects: Mapping[s
         )  # fmt: skip
     if len(nodes) != 2:
         raise ParseError("a metric is written (:metric minimize NUMBER)", place=direction.place)
-    term = _with_total_time(parse_term(nodes[1]))
-    checked = schema if TOTAL_TIME.function in schema.functions else schema.with_functions(_TOTAL_TIME_DECLARED)
-    check(Comparison("<=", term, Constant(0), place=definition.place), checked, objects=objects)
-    return Metric("minimize" if direction.folded() == "minimize" else "maximize", term)
+    term = parse_term(nodes[1])
+    without_total_time = _with_total_time(term, Constant(0))  # which no domain declares
+    check(Comparison("<=", without_total_time, Constant(0), place=definition.place), schema, objects=objects)
+    return Metric("minimize" if direction.folded() == "minimize" else "maximize", _with_total_time(term, TOTAL_TIME))
 
 
-def _with_total_time(term: Term) -> Term:
-    """The term, with `total-time` as a function also without parentheses."""
+def _with_total_time(term: Term, value: Call | Constant) -> Term:
+    """The term with `value` for `total-time`, which may have parentheses."""
     match term:
-        case Constant(TOTAL_TIME.function):
-            return replace(TOTAL_TIME, place=term.place)
+        case Constant(TOTAL_TIME.function) | Call(TOTAL_TIME.function, ()):
+            return replace(value, place=term.place)
         case Arithmetic(_, args):
-            return replace(term, args=tuple(map(_with_total_time, args)))
+            return replace(term, args=tuple(_with_total_time(arg, value) for arg in args))
         case _:
             return term
 

@@ -122,14 +122,6 @@ class Schema:
         """
         return replace(self, functional=self.functional.union(predicates))
 
-    def with_functions(self, *functions: Signature) -> Schema:
-        """The schema with these functions too.
-
-        Raises:
-            SchemaError: a name is in use, or a type is unknown.
-        """
-        return replace(self, functions={**self.functions, **{one.name: one for one in functions}})
-
     def merged(self, other: Schema) -> Schema:
         """Everything that one of the two declares.
 

@@ -54,12 +54,6 @@ class Asked:
 
 
 @dataclass(frozen=True, slots=True)
-class _Term:
-    free: frozenset[str]
-    get: Getter
-
-
-@dataclass(frozen=True, slots=True)
 class Queried:
     """A query ready to be answered, for certain variables that are bound.
 
@@ -72,17 +66,11 @@ class Queried:
     answers: Answers
 
 
-@dataclass(frozen=True, slots=True)
-class _Queries:
-    """The ways to search for an expression's variables, by those that are bound."""
-
-    free: frozenset[str]
-    by_bound: dict[frozenset[str], Queried]
-
-
-_terms: IdentityCache[Term, _Term] = IdentityCache()
+_terms: IdentityCache[Term, tuple[frozenset[str], Getter]] = IdentityCache()
+"""The free variables of a term, and its value."""
 _conditions: IdentityCache[Expression, Asked] = IdentityCache()
-_queries: IdentityCache[Expression, _Queries] = IdentityCache()
+_queries: IdentityCache[Expression, tuple[frozenset[str], dict[frozenset[str], Queried]]] = IdentityCache()
+"""The free variables of a query, and its searches by the variables that are bound."""
 
 
 def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> bool:
@@ -136,12 +124,13 @@ def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried
     queries = _queries.find(e, schema)
     if queries is None:
         check_depth(e)
-        queries = _queries.keep(e, schema, _Queries(free_variables(e), {}))
-    bound = queries.free.intersection(params)
-    found = queries.by_bound.get(bound)
+        queries = _queries.keep(e, schema, (free_variables(e), {}))
+    free, by_bound = queries
+    bound = free.intersection(params)
+    found = by_bound.get(bound)
     if found is None:
         check_answers(e, bound, schema)
-        found = queries.by_bound[bound] = Queried(e, compile_answers(e, schema, bound, asked_for(e, bound)))
+        found = by_bound[bound] = Queried(e, compile_answers(e, schema, bound, asked_for(e, bound)))
     return found
 
 
@@ -161,11 +150,12 @@ def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_B
     known = _terms.find(term, schema)
     if known is None:
         check_depth(term)
-        known = _terms.keep(term, schema, _Term(free_variables(term), compile_term(term, schema)))
-    for name in known.free:
+        known = _terms.keep(term, schema, (free_variables(term), compile_term(term, schema)))
+    free, get = known
+    for name in free:
         if type(bindings.get(name)) not in VALUE_TYPES:
             check_bound(term, bindings)
-    return known.get(world, bindings)
+    return get(world, bindings)
 
 
 def evaluate_argument(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Value:
