@@ -1,4 +1,4 @@
-"""Chance without a shared random stream: every draw is a function of the seed and an action's id (S0.15).
+"""Chance without a shared random stream: every draw is a function of the seed and an action's id.
 
 A resumed or replayed run asks with the same action ids and therefore meets the same world, no matter how
 many draws were made before.

@@ -1,4 +1,4 @@
-"""The simulated world of clean-up-table, with one verb for each of the robot's skills (S0.15).
+"""The simulated world of clean-up-table, with one verb for each of the robot's skills.
 
 Every verb takes the id of the action it executes. A repeated id returns its first result and changes nothing, so that a
 run can be resumed after a crash. A physically impossible call returns `not_possible` or `gone`. No verb raises an

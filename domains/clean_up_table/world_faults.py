@@ -1,4 +1,4 @@
-"""Faults of the clean-up-table world: seeded, bounded, recorded (S0.15).
+"""Faults of the clean-up-table world: seeded, bounded, recorded.
 
 Seed and action id decide whether a fault happens in a call; the possible faults of the call also decide which one. A
 transient fault hits the same subject at most `IN_A_ROW` times in a row, so that one more failure proves a permanent

@@ -1,1 +1,1 @@
-"""Kept runs: one transaction a macrostep in the file of the knowledge, with everything that a restart needs (S0.15)."""
+"""Kept runs: one transaction a macrostep in the file of the knowledge, with everything that a restart needs."""

@@ -1,4 +1,4 @@
-"""A run in the file of its knowledge: one transaction a macrostep, with everything that a restart needs (S0.15).
+"""A run in the file of its knowledge: one transaction a macrostep, with everything that a restart needs.
 
 `RunWriter` has the transactions, with a fence against a second writer, and listeners at their boundaries.
 """

@@ -1,4 +1,4 @@
-"""Faults of components, planners, sequencers and networks, and the order of simultaneous messages (S0.15).
+"""Faults of components, planners, sequencers and networks, and the order of simultaneous messages.
 
 Each is a function of the seed and of its subject; no draw depends on the number of earlier draws. A resumed run, whose
 actions keep their ids, therefore meets the same faults again. A seed suffices to reproduce a failure.
