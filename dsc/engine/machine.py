@@ -89,13 +89,6 @@ def step(chart: Chart, state: MachineState, event: Event | None, situation: Situ
     return Macrostep(chart, situation, state).react(event)
 
 
-def leave(chart: Chart, state: MachineState, situation: Situation) -> Step:
-    """Exit all active states before the end of the plot; their exit actions stop the skills (S0.15)."""
-    if state.root is None:
-        return Step(state, None, handled=False)
-    return Macrostep(chart, situation, state).leave()
-
-
 @dataclass(slots=True)
 class Machine:
     """Holds the state of one running chart; `step` does the rest.
@@ -121,7 +114,9 @@ class Machine:
         return done
 
     def leave(self, situation: Situation) -> Step:
-        """See `leave`."""
-        done = leave(self.chart, self.state, situation)
+        """Exit all active states before the end of the plot; their exit actions stop the skills (S0.15)."""
+        if self.state.root is None:
+            return Step(self.state, None, handled=False)
+        done = Macrostep(self.chart, situation, self.state).leave()
         self.state = done.state
         return done

@@ -7,10 +7,10 @@ reactions is bounded. A dropped reaction is computed again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -161,9 +161,6 @@ class _MachineForm(_Form):
     finished: bool
 
 
-_F = TypeVar("_F", bound=_Form)
-
-
 class FrameState(NamedTuple):
     """One running plot. Steps make many of them: a frozen dataclass takes four times as long as a named tuple.
 
@@ -213,27 +210,6 @@ class FrameState(NamedTuple):
         """Return the waiting events as plain data."""
         return [[name, {**event._asdict(), "attributes": dict(event.attributes)}] for name, event in self.kept]
 
-    @staticmethod
-    def from_json(data: Mapping[str, Any], chart: Chart) -> FrameState:
-        """Return the frame of such data, the inverse of `to_json`; errors as for `MachineState.from_json`."""
-        return _frame_of(_read(_FrameForm, data), chart)
-
-
-class _Index:
-    """Maps a name to its node; regions have no name and are stored by their place."""
-
-    def __init__(self, compiled: CompiledPlot) -> None:
-        self._plot = compiled.plot.name
-        self._index = {node.name: node.index for node in compiled.nodes[1:]}
-
-    def __call__(self, name: str) -> int:
-        found = self._index.get(name)
-        if found is None:
-            raise UnknownNameError(
-                f"plot '{self._plot}' no longer has the state '{name}'", found=name, valid=self._index
-            )
-        return found
-
 
 class MachineState(NamedTuple):
     """The complete state of a machine between two events.
@@ -262,7 +238,12 @@ class MachineState(NamedTuple):
             InputError: the data of a bound plot are not a plot.
             UnknownNameError: the chart lacks one of the plots, or a plot one of the states.
         """
-        form = _read(_MachineForm, data)
+        try:
+            form = _MachineForm.model_validate(data)
+        except ValidationError as error:
+            first = error.errors(include_url=False, include_input=False)[0]
+            path = ".".join(map(str, first["loc"])) or "the whole"
+            raise ParseError(f"this is not a state of a machine: {path}: {first['msg']}") from None
         return MachineState(None if form.root is None else _frame_of(form.root, chart), form.serials, form.finished)
 
     def configuration(self) -> tuple[str, ...]:
@@ -307,24 +288,19 @@ def _paths(frame: FrameState, prefix: str) -> Iterator[str]:
             yield from _paths(frame.children[name], f"{prefix}{name}/")
 
 
-def _read(form: type[_F], data: object) -> _F:
-    try:
-        return form.model_validate(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        path = ".".join(map(str, first["loc"])) or "the whole"
-        raise ParseError(f"this is not a state of a machine: {path}: {first['msg']}") from None
-
-
 def _frame_of(form: _FrameForm, chart: Chart) -> FrameState:
     compiled = chart.compiled(form.plot) if form.form is None else chart.bind(form.form)
-    index = _Index(compiled)
-    configuration = configuration_of(
-        compiled,
-        tuple(map(index, form.active)),
-        frozenset(map(index, form.waiting)),
-        tuple([(index(at), tuple(map(index, kept))) for at, kept in form.history.items()]),
-    )
+    index = {node.name: node.index for node in compiled.nodes[1:]}  # regions are stored by their place
+
+    def placed(names: Iterable[str]) -> tuple[int, ...]:
+        unknown = next((name for name in names if name not in index), None)
+        if unknown is not None:
+            message = f"plot '{compiled.plot.name}' no longer has the state '{unknown}'"
+            raise UnknownNameError(message, found=unknown, valid=index)
+        return tuple([index[name] for name in names])
+
+    histories = zip(placed(form.history), map(placed, form.history.values()), strict=True)
+    configuration = configuration_of(compiled, placed(form.active), frozenset(placed(form.waiting)), tuple(histories))
     children = {name: _frame_of(child, chart) for name, child in form.children.items()}
     kept = tuple([(name, Event(**dict(event))) for name, event in form.kept])
     return FrameState(form.serial, compiled, configuration, form.variables, form.activations, children, kept)

@@ -7,25 +7,10 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from dsc.engine import steps
 from dsc.engine.frames import Frame
 from dsc.engine.machine_state import NOTHING
 from dsc.engine.situation import Situation
-from dsc.engine.steps import (
-    NO_CHANGE,
-    DecisionMade,
-    Microstep,
-    Note,
-    Output,
-    PlotBound,
-    Revoke,
-    SendLater,
-    SendMessage,
-    SetParameter,
-    Start,
-    StartTimer,
-    SwitchMode,
-    Taken,
-)
 from dsc.engine.tables import StateNode
 from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, Event
 from dsc.model.actions import (
@@ -74,20 +59,20 @@ class Performer:
         self.event: Event | None = None
         self.serials = serials
         self.internal: deque[Event] = deque()
-        self.microsteps: list[Microstep] = []
-        self.decisions: list[DecisionMade] = []
-        self.output: list[Output] = []
+        self.microsteps: list[steps.Microstep] = []
+        self.decisions: list[steps.DecisionMade] = []
+        self.output: list[steps.Output] = []
         self.emitted: list[Event] = []
         self.errors: list[str] = []
-        self.knowledge = NO_CHANGE
+        self.knowledge = steps.NO_CHANGE
         self.exited: list[str] = []
         self.entered: list[str] = []
-        self.bound: list[PlotBound] = []
+        self.bound: list[steps.PlotBound] = []
 
-    def end_microstep(self, event: Event | None, taken: tuple[Taken, ...]) -> None:
+    def end_microstep(self, event: Event | None, taken: tuple[steps.Taken, ...]) -> None:
         """Close a microstep: the exits, entries and bindings since the last one."""
         bound = tuple(self.bound)
-        self.microsteps.append(Microstep(event, taken, tuple(self.exited), tuple(self.entered), bound))
+        self.microsteps.append(steps.Microstep(event, taken, tuple(self.exited), tuple(self.entered), bound))
         self.exited, self.entered, self.bound = [], [], []
 
     def fail(self, frame: Frame, reason: str) -> None:
@@ -158,24 +143,24 @@ class Performer:
         except InputError as error:
             self.fail(frame, f"{frame.prefix}{node.name}: {error}")
         else:
-            self.output.append(StartTimer(activation, index, delay, event))
+            self.output.append(steps.StartTimer(activation, index, delay, event))
 
-    def _output_of(self, frame: Frame, action: ExternalAction, activation: int, number: int) -> Output:
+    def _output_of(self, frame: Frame, action: ExternalAction, activation: int, number: int) -> steps.Output:
         """Return an external action with the values of its arguments."""
         match action:
             case Trigger():
                 component, skill = action.trigger.split(".")
                 arguments = self.values(frame, action.arguments)
                 action_id = f"a{activation}.{number}"
-                return Start(action_id, activation, component, skill, arguments, action.names, action.within)
+                return steps.Start(action_id, activation, component, skill, arguments, action.names, action.within)
             case Configure():
                 component, parameter = action.set.split(".")
-                return SetParameter(component, parameter, self.value(frame, action.to))
+                return steps.SetParameter(component, parameter, self.value(frame, action.to))
             case Send():
                 component, port = action.send.split(".")
-                return SendMessage(component, port, self.values(frame, action.arguments))
+                return steps.SendMessage(component, port, self.values(frame, action.arguments))
             case _:
-                return SwitchMode(action.switch, action.to)
+                return steps.SwitchMode(action.switch, action.to)
 
     def _perform(self, frame: Frame, state: str, action: Internal) -> None:
         match action:
@@ -191,10 +176,10 @@ class Performer:
                 else:
                     self._emit_later(frame, action, action.delay, attributes)
             case Withdraw(withdraw=term):
-                self.output.append(Revoke(frame.serial, str(self.value(frame, term))))
+                self.output.append(steps.Revoke(frame.serial, str(self.value(frame, term))))
             case Log(log=parts, label=label):
                 text = "".join(_shown(self.value(frame, part)) for part in parts)
-                self.output.append(Note(label, text))
+                self.output.append(steps.Note(label, text))
             case Choose():
                 for inner in action.then if self._chooses(frame, state, action) else action.otherwise:
                     self._perform(frame, state, inner)
@@ -215,7 +200,7 @@ class Performer:
             name = f"{action.emit}.{self.serials}"
             frame.variables = {**frame.variables, action.into: name}
         event = Event(action.emit, attributes, frame=frame.serial)
-        self.output.append(SendLater(event, _delay_of(self.value(frame, delay)), name))
+        self.output.append(steps.SendLater(event, _delay_of(self.value(frame, delay)), name))
 
     def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any]) -> None:
         if name not in frame.compiled.plot.emits:

@@ -10,7 +10,7 @@ from dsc.engine.machine_state import MOST_TRIGGERS, Configuration, FrameState
 from dsc.engine.reaction import CompiledReaction, reaction_of
 from dsc.engine.situation import FALSE, settle
 from dsc.engine.tables import TransitionEdge
-from dsc.engine.transition_selection import Enabled, Trigger, edges_of, select
+from dsc.engine.transition_selection import Trigger, edges_of, select
 from knowledge_base.language.syntax.expression import TRUE, Expression
 
 MOST_QUESTIONS = 1024
@@ -55,14 +55,9 @@ def choice_of(plot: Frame | FrameState, trigger: Trigger) -> Choice | None:
     if found is _UNKNOWN:
         if len(configuration.choices) >= MOST_TRIGGERS:
             configuration.forget()
-        found = configuration.choices[trigger] = _first_choice(configuration, trigger)
+        listens = any(edges_of(configuration.compiled, index, trigger) for index in configuration.active)
+        found = configuration.choices[trigger] = _work_out(configuration, trigger, {}) if listens else None
     return found  # type: ignore[no-any-return]
-
-
-def _first_choice(configuration: Configuration, trigger: Trigger) -> Choice | None:
-    if not any(edges_of(configuration.compiled, index, trigger) for index in configuration.active):
-        return None
-    return _work_out(configuration, trigger, {})
 
 
 def settled(guard: Expression, configuration: Configuration) -> Expression:
@@ -71,10 +66,9 @@ def settled(guard: Expression, configuration: Configuration) -> Expression:
 
 
 class _Open(Exception):  # noqa: N818  # control flow: the search stops at a question
-    def __init__(self, edge: TransitionEdge, condition: Expression) -> None:
+    def __init__(self, question: Question) -> None:
         super().__init__()
-        self.edge = edge
-        self.condition = condition
+        self.question = question
 
 
 def _work_out(configuration: Configuration, trigger: Trigger, answers: Mapping[TransitionEdge, bool]) -> Choice:
@@ -85,25 +79,15 @@ def _work_out(configuration: Configuration, trigger: Trigger, answers: Mapping[T
         if condition in (TRUE, FALSE):
             return condition == TRUE
         if edge not in answers:
-            raise _Open(edge, condition)
+            raise _Open(Question(configuration, trigger, edge, condition, answers))
         return answers[edge]
 
     try:
         taken, late = select(Frame(FrameState(0, configuration.compiled, configuration)), trigger, guard)
-    except _Open as question:
-        return _ask(configuration, trigger, question, answers)
-    return reaction_of(configuration, tuple([one.edge for one in taken]), _keepers(late))
-
-
-def _ask(
-    configuration: Configuration, trigger: Trigger, open_: _Open, answers: Mapping[TransitionEdge, bool]
-) -> Question:
-    configuration.questions += 1
-    if configuration.questions > MOST_QUESTIONS:
-        configuration.forget()
-    return Question(configuration, trigger, open_.edge, open_.condition, answers)
-
-
-def _keepers(late: list[Enabled]) -> tuple[str, ...]:
-    names = [one.frame.compiled.nodes[one.edge.source].name for one in late]
-    return tuple(dict.fromkeys(names))
+    except _Open as stop:
+        configuration.questions += 1
+        if configuration.questions > MOST_QUESTIONS:
+            configuration.forget()
+        return stop.question
+    keepers = dict.fromkeys(one.frame.compiled.nodes[one.edge.source].name for one in late)
+    return reaction_of(configuration, tuple([one.edge for one in taken]), tuple(keepers))

@@ -8,20 +8,10 @@ from itertools import chain, combinations, islice
 from typing import TYPE_CHECKING, Any
 
 from dsc.events import DONE
+from dsc.model import states
 from dsc.model.actions import ExternalAction, Internal, Trigger
 from dsc.model.language import TermField
 from dsc.model.plot import ActionPlot, initial_of
-from dsc.model.states import (
-    AnyState,
-    CompositeState,
-    DynamicState,
-    FinalState,
-    HistoryState,
-    OrthogonalState,
-    Region,
-    State,
-    SubmachineState,
-)
 from dsc.model.transitions import Connector, Transition
 from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.language.syntax.expression import Expression
@@ -109,7 +99,7 @@ class StateNode:
     index: int
     name: str
     around: tuple[int, ...]
-    state: AnyState | None
+    state: states.AnyState | None
     last: int = 0
     children: list[int] = field(default_factory=list)
     initial: int = -1
@@ -136,13 +126,13 @@ class StateNode:
         # Each step reads these, so they are computed once.
         self.parent = self.around[0] if self.around else -1
         kind = type(self.state)
-        self.final = kind is FinalState
-        self.orthogonal = kind is OrthogonalState
-        self.holds_plot = kind is SubmachineState or kind is DynamicState
+        self.final = kind is states.FinalState
+        self.orthogonal = kind is states.OrthogonalState
+        self.holds_plot = kind is states.SubmachineState or kind is states.DynamicState
 
     def settle(self) -> None:
         """Derive `timed` and `addressed` from the transitions and actions."""
-        state = self.state if isinstance(self.state, State) else None
+        state = self.state if isinstance(self.state, states.State) else None
         self.timed = state is not None and (bool(state.after or state.every) or self.at_least is not None)
         actions = (*self.entry, *self.exit, *self.broken)
         starts = bool(actions) and any(isinstance(action, Trigger) for action in actions)
@@ -229,18 +219,18 @@ class _Layout:
         for node, first in self._initials:
             node.initial = self._initial(node, first)
 
-    def _add_states(self, parent: StateNode, scope: ActionPlot | CompositeState | Region) -> None:
+    def _add_states(self, parent: StateNode, scope: ActionPlot | states.CompositeState | states.Region) -> None:
         self._initials.append((parent, initial_of(scope)))
         for name, state in scope.states.items():
             node = self._append(name, parent, state)
-            if isinstance(state, CompositeState):
+            if isinstance(state, states.CompositeState):
                 self._add_states(node, state)
-            elif isinstance(state, OrthogonalState):
+            elif isinstance(state, states.OrthogonalState):
                 self._add_regions(node, state)
             node.last = len(self.nodes) - 1
         parent.last = len(self.nodes) - 1
 
-    def _add_regions(self, node: StateNode, state: OrthogonalState) -> None:
+    def _add_regions(self, node: StateNode, state: states.OrthogonalState) -> None:
         for name, region in state.regions.items():
             inner = self._append(f"#{len(self.nodes)}", node, None)
             # SCXML has no region elements: a region that is named after its only state stands for this state.
@@ -249,16 +239,16 @@ class _Layout:
         for name, history in state.connectors.items():
             self._append(name, node, history)
 
-    def _append(self, name: str, parent: StateNode, state: AnyState | None) -> StateNode:
+    def _append(self, name: str, parent: StateNode, state: states.AnyState | None) -> StateNode:
         index = len(self.nodes)
         node = StateNode(index, name, (parent.index, *parent.around), state, last=index)
-        if isinstance(state, State):
+        if isinstance(state, states.State):
             node.entry, node.exit, node.broken = state.entry, state.exit, state.on_break or state.exit
             node.at_least = state.at_least
-        elif isinstance(state, FinalState):
+        elif isinstance(state, states.FinalState):
             node.entry = state.entry
         self.nodes.append(node)
-        (parent.histories if isinstance(state, HistoryState) else parent.children).append(index)
+        (parent.histories if isinstance(state, states.HistoryState) else parent.children).append(index)
         return node
 
     def _initial(self, parent: StateNode, first: str) -> int:
@@ -271,24 +261,24 @@ class _Layout:
 
     def defaults(self) -> dict[int, Default]:
         """Return the default target and effect of each history, by node."""
-        histories = [(node, node.state) for node in self.nodes if isinstance(node.state, HistoryState)]
+        histories = [(node, node.state) for node in self.nodes if isinstance(node.state, states.HistoryState)]
         return {node.index: self._default(node, history) for node, history in histories}
 
-    def _default(self, node: StateNode, history: HistoryState) -> Default:
+    def _default(self, node: StateNode, history: states.HistoryState) -> Default:
         target = self._target(node, history.target)
-        if isinstance(self.nodes[target].state, HistoryState) or node.parent not in self.nodes[target].around:
+        if isinstance(self.nodes[target].state, states.HistoryState) or node.parent not in self.nodes[target].around:
             raise SchemaError(f"the history '{node.name}' does not lead to a state in its scope", found=node.name)
         return Default(target, history.do)
 
     def prepare(self, node: StateNode) -> None:
         """Build the edges now if they may contain errors; else build them on first use."""
-        if isinstance(node.state, State | Connector):
+        if isinstance(node.state, states.State | Connector):
             node.lay_out = self._lay_out
             if isinstance(node.state, Connector) or not self._is_plain(node.state):
                 self._lay_out(node)
         node.settle()
 
-    def _is_plain(self, state: State) -> bool:
+    def _is_plain(self, state: states.State) -> bool:
         """Return whether each transition has at most one target, and this target exists."""
         for one in chain(chain.from_iterable(state.on.values()), state.after, state.every, state.always):
             if one.also or one.clear or (one.target is not None and one.target not in self.index):
@@ -298,11 +288,11 @@ class _Layout:
     def _lay_out(self, node: StateNode) -> None:
         """Build the transitions of one state in all tables of its node."""
         state = node.state
-        if not isinstance(state, State | Connector):
+        if not isinstance(state, states.State | Connector):
             return
         # Transitions and tables have the same order. A search by place would be slow in large plots.
         edges = (self._edge(node, place, trigger, one) for place, trigger, one in state.placed_transitions())
-        if isinstance(state, State):
+        if isinstance(state, states.State):
             node.edges = {event: tuple(islice(edges, len(many))) for event, many in state.on.items()}
             node.timeouts = tuple([TimedEdge(timed.seconds, next(edges)) for timed in state.after])
             node.cycles = tuple([TimedEdge(timed.seconds, next(edges)) for timed in state.every])
@@ -318,7 +308,7 @@ class _Layout:
             raise SchemaError(f"targets of a transition of '{node.name}' exclude each other", found=node.name)
         return TransitionEdge(
             node.index, trigger, targets, transition.guard, transition.effect, transition.rule,
-            transition.internal and isinstance(node.state, CompositeState), place, transition.passed,
+            transition.internal and isinstance(node.state, states.CompositeState), place, transition.passed,
             tuple(self._cleared(node, transition)) if transition.clear else (),
         )  # fmt: skip
 

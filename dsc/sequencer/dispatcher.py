@@ -19,17 +19,7 @@ from dsc.components.component import Component
 from dsc.components.hooks import contained, give_up
 from dsc.components.life_cycle import Life
 from dsc.components.robot import Wiring, require_instances
-from dsc.engine.steps import (
-    Cancel,
-    Output,
-    Revoke,
-    SendLater,
-    SendMessage,
-    SetParameter,
-    Start,
-    StartTimer,
-    SwitchMode,
-)
+from dsc.engine import steps
 from dsc.errors import UncertainActionError
 from dsc.messages import LateMessage, SkillMessage, TimerMessage
 from dsc.sequencer.clock import LoopClock, PastClock
@@ -70,7 +60,7 @@ class Dispatcher:
         self,
         components: Iterable[Component],
         clock: LoopClock,
-        post: Callable[[SkillMessage | TimerMessage | SendLater | LateMessage], None],
+        post: Callable[[SkillMessage | TimerMessage | steps.SendLater | LateMessage], None],
         part_of: str = "",
     ) -> None:
         self._part_of = part_of
@@ -91,7 +81,7 @@ class Dispatcher:
         self.activation.deploy(component)
         self._wiring.deployed(component)
 
-    def started(self) -> tuple[Start, ...]:
+    def started(self) -> tuple[steps.Start, ...]:
         """Return the skills that run, or have an answer that was not taken yet."""
         return tuple([one.start for one in self._running.values()])
 
@@ -112,25 +102,25 @@ class Dispatcher:
         """
         return self.timers.waiting or any(math.isfinite(one.due) for one in self._running.values())
 
-    def dispatch(self, output: Output) -> None:
+    def dispatch(self, output: steps.Output) -> None:
         """Execute one output of the machine.
 
         Raises:
             UnknownNameError: no component of that name is deployed.
         """
-        if isinstance(output, Start):
+        if isinstance(output, steps.Start):
             self._start(output)
-        elif isinstance(output, Cancel):
+        elif isinstance(output, steps.Cancel):
             self._cancel(output.activation)
-        elif isinstance(output, StartTimer):
+        elif isinstance(output, steps.StartTimer):
             self.timers.schedule(TimerMessage(output), self._clock.now() + output.seconds)
-        elif isinstance(output, SendLater):
+        elif isinstance(output, steps.SendLater):
             self.timers.schedule(output, self._clock.now() + output.seconds)
-        elif isinstance(output, Revoke):
+        elif isinstance(output, steps.Revoke):
             self.timers.revoke(output)
-        elif isinstance(output, SetParameter | SwitchMode | SendMessage):
+        elif isinstance(output, steps.SetParameter | steps.SwitchMode | steps.SendMessage):
             self.outbox.send(self.component(output.component), output)
-            if isinstance(output, SwitchMode):
+            if isinstance(output, steps.SwitchMode):
                 self.activation.switched(output.component, output.mode)
         # The rest are notes for the trace.
 
@@ -162,7 +152,7 @@ class Dispatcher:
         if what not in self._faults and len(self._faults) < _MOST_FAULTS:
             self._faults.append(what)
 
-    def settle(self, start: Start) -> None:
+    def settle(self, start: steps.Start) -> None:
         """Take the final answer of a skill; until then its component counts as in use."""
         self._running.pop(start.action_id, None)
         if start.component in self.activation.concerned:
@@ -173,20 +163,20 @@ class Dispatcher:
             self._forget_tasks.add(task)
             task.add_done_callback(self._forget_tasks.discard)
 
-    def report_taken(self, start: Start) -> None:
+    def report_taken(self, start: steps.Start) -> None:
         """Take a report of a skill, so that there is room for another."""
         running = self._running.get(start.action_id)
         if running is not None and running.reports is not None:
             running.reports.taken()
 
-    def dismiss(self, start: Start) -> None:
+    def dismiss(self, start: steps.Start) -> None:
         """Stop a skill whose report was its failure; a later answer does not count."""
         running = self._running.get(start.action_id)
         if running is not None:
             running.answered = True
         self.stop(start)
 
-    def stop(self, start: Start) -> None:
+    def stop(self, start: steps.Start) -> None:
         """Cancel a skill and drop its answer."""
         if start.action_id not in self._running:
             return
@@ -196,18 +186,18 @@ class Dispatcher:
         stopped.task.cancel()
         self._cleanups.add(start.component, stopped.task, stopped.given_up)
 
-    def restore(self, component: str, effective: Sequence[SetParameter | SwitchMode]) -> None:
+    def restore(self, component: str, effective: Sequence[steps.SetParameter | steps.SwitchMode]) -> None:
         """Restore the effective settings of before a restart; raises `UnknownNameError`."""
         self.outbox.restore(self.component(component), effective)
         for one in effective:
-            if isinstance(one, SwitchMode):
+            if isinstance(one, steps.SwitchMode):
                 self.activation.switched(component, one.mode)
 
-    def resume(self, start: Start, interrupted: InterruptedSkill) -> None:
+    def resume(self, start: steps.Start, interrupted: InterruptedSkill) -> None:
         """Continue a skill that a restart interrupted; raises `UnknownNameError`."""
         self._start(start, interrupted)
 
-    async def abandon(self, start: Start) -> None:
+    async def abandon(self, start: steps.Start) -> None:
         """Let a component stop a skill that was cancelled just before a restart.
 
         If the skill had ended before, its answer is posted, as its observations are true.
@@ -248,7 +238,7 @@ class Dispatcher:
         self._wiring.close()
         return [*self.outbox.failures(), *self._faults]
 
-    def _start(self, start: Start, interrupted: InterruptedSkill | None = None) -> None:
+    def _start(self, start: steps.Start, interrupted: InterruptedSkill | None = None) -> None:
         component = self.component(start.component)
         signature = component.skills().get(start.skill, UNKNOWN_SKILL)
         within = start.within or (math.inf if signature.pattern == "event" else DEFAULT_WITHIN)

@@ -5,17 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from dsc.engine import steps
 from dsc.engine.machine_state import FrameState
-from dsc.engine.steps import (
-    Microstep,
-    Note,
-    Output,
-    SendMessage,
-    SetParameter,
-    Start,
-    Step,
-    SwitchMode,
-)
 from dsc.events import Event
 from dsc.messages import ParameterMessage
 from dsc.trace import Trace
@@ -62,17 +53,17 @@ class StepTracer:
             data["conflated"] = conflated
         return self._trace.record("event", **data)
 
-    def begun(self, start: Start) -> str:
+    def begun(self, start: steps.Start) -> str:
         """Note a skill that was started, here or before a crash; return its name with its component's."""
         skill = f"{start.component}.{start.skill}"
         self._at_work.setdefault(start.activation, {})[start.action_id] = skill
         return skill
 
-    def answered(self, start: Start) -> None:
+    def answered(self, start: steps.Start) -> None:
         """Note the end of a skill, which cannot be cancelled afterwards."""
         self._at_work.get(start.activation, {}).pop(start.action_id, None)
 
-    def step(self, step: Step) -> int | None:
+    def step(self, step: steps.Step) -> int | None:
         """Record a macrostep with microsteps: new plots before it, the rules that answered after it."""
         if not step.microsteps:
             return None
@@ -90,7 +81,7 @@ class StepTracer:
                     self._trace.record("rule", rule=taken.rule, state=taken.source)
         return seq
 
-    def decisions(self, step: Step) -> None:
+    def decisions(self, step: steps.Step) -> None:
         """Record the decisions of dynamic states in this macrostep, with their reasons."""
         for made in step.decisions if self._trace.heard else ():
             decision = made.decision
@@ -119,7 +110,7 @@ class StepTracer:
         """Record an operator's setting of a plot's parameter; return the number of the record."""
         return self._trace.record("action", action="set", port=f"{setting.owner}.{setting.name}", value=setting.value)
 
-    def started(self, start: Start) -> int:
+    def started(self, start: steps.Start) -> int:
         """Record the start of a skill; return the number of the record."""
         skill, arguments = self.begun(start), dict(start.arguments)
         return self._trace.record("action", action="start", id=start.action_id, skill=skill, arguments=arguments)
@@ -131,19 +122,19 @@ class StepTracer:
             self._trace.record("action", action="cancel", id=action_id, skill=skill)
         return skills
 
-    def told(self, output: Output) -> None:
+    def told(self, output: steps.Output) -> None:
         """Record a one-way action or a note; timers have no record."""
         match output:
-            case SetParameter(component, parameter, value):
+            case steps.SetParameter(component, parameter, value):
                 self._trace.record("action", action="set", port=f"{component}.{parameter}", value=value)
-            case SwitchMode(component, mode):
+            case steps.SwitchMode(component, mode):
                 self._trace.record("action", action="switch", component=component, mode=mode)
-            case SendMessage(component, port, arguments):
+            case steps.SendMessage(component, port, arguments):
                 self._trace.record("action", action="send", port=f"{component}.{port}", arguments=dict(arguments))
-            case Note(label, text):
+            case steps.Note(label, text):
                 self._trace.record("log", label=label, text=text)
 
-    def _changed_variables(self, step: Step) -> dict[str, Any]:
+    def _changed_variables(self, step: steps.Step) -> dict[str, Any]:
         """Return new and changed values of parameters and variables, by the path of the plot's host state."""
         before, self._frames = self._frames, _frames(step.state.root)
         said = {}
@@ -153,7 +144,7 @@ class StepTracer:
                 said[path] = news
         return said
 
-    def _plots(self, step: Step) -> None:
+    def _plots(self, step: steps.Step) -> None:
         for micro in step.microsteps:
             for bound in micro.bound:
                 digest = bound.plot.digest
@@ -162,7 +153,7 @@ class StepTracer:
                     self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form())
 
 
-def _micro(micro: Microstep) -> dict[str, Any]:
+def _micro(micro: steps.Microstep) -> dict[str, Any]:
     event, taken, exited, entered, bound = micro
     said: dict[str, Any] = {
         "event": None if event is None else event.name,

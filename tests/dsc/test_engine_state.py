@@ -11,7 +11,7 @@ from dsc_charts import FakeSituation, Run, plot
 
 from dsc.dynamic.library import Library
 from dsc.engine.machine import step
-from dsc.engine.machine_state import FrameState, MachineState
+from dsc.engine.machine_state import MachineState
 from dsc.engine.situation import Decision
 from dsc.events import Event
 from knowledge_base.errors import InputError, UnknownNameError
@@ -157,10 +157,12 @@ def test_what_is_active_inside_a_state_is_its_own_activation_and_those_of_its_co
 def test_a_frame_goes_to_json_and_back():
     run = rich()
     run.start()
-    frame = run.machine.state.root
-    assert FrameState.from_json(json.loads(json.dumps(frame.to_json())), run.library) == frame
+    state = run.machine.state
+    form = state.to_json()
+    assert form["root"] == state.root.to_json()
+    assert MachineState.from_json(json.loads(json.dumps(form)), run.library).root == state.root
     with pytest.raises(InputError):
-        FrameState.from_json({"plot": "p"}, run.library)
+        MachineState.from_json({**form, "root": {"plot": "p"}}, run.library)
 
 
 def test_a_plot_that_moves_on_has_not_ended_also_with_variables():
