@@ -53,8 +53,7 @@ class AxiomText:
 class DomainText:
     """All of a domain file, in the order of the file; names are in lower case.
 
-    `notes` says with its place what deserves a look in the file though it changes nothing; `source` is what the
-    file is called in messages.
+    `notes` are remarks that change nothing, each with its place; `source` is the file's name for messages.
     """
 
     name: str

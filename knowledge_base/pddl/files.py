@@ -119,7 +119,7 @@ def _not_utf8(error: UnicodeDecodeError, path: Path, line: int = 1) -> ParseErro
 
 
 def text_and_source(text_or_path: str | Path, source: str | None) -> tuple[str, str | None]:
-    """The text meant by a reader's argument, and the name to call it by in messages.
+    """The text of a reader's argument, and its name for messages.
 
     A `Path` is a file. A string is PDDL text if it begins with `(` or `;` or has several lines, else a file's name.
     Bytes of a file that are not UTF-8 become half characters, which are refused outside of comments: old files have
@@ -140,7 +140,7 @@ def files_beside(path: Path) -> list[str]:
 
 
 def _piece(handle: int, path: Path, size: int, *, begun: bool) -> bytes:
-    """At most `size` bytes of what comes next; nothing at the end.
+    """The next bytes, at most `size`; none at the end.
 
     A pipe without a writer looks like one at its end, until it has begun.
     """

@@ -227,7 +227,7 @@ class _Init:
                 raise ParseError("':init' has facts and (= (FUNCTION ...) NUMBER)", place=e.place)
 
     def confirm(self, type_name: str, thing: Value, place: Place | None) -> None:
-        """`(truck t1)` says nothing new where t1 is one, and cannot make it one."""
+        """`(truck t1)` repeats the type of t1, and cannot change it."""
         if not self.schema.is_a(self.objects.get(str(thing), ""), type_name):
             raise SchemaError(f"'{type_name}' is a type; say it in :objects", place=place)
 

@@ -1,4 +1,4 @@
-"""Conditions and effects against a schema: names, numbers of arguments and types, before anything runs."""
+"""Checks of conditions and effects against a schema before a run: names, numbers of arguments and types."""
 
 from __future__ import annotations
 
@@ -284,7 +284,7 @@ class _Checker:
             return ("boolean",)
         if not isinstance(value, str):
             return ("number",)
-        # Whether there are any objects is not asked: a world would have to count them.
+        # No test for an empty mapping: a world would have to count its objects.
         known = self.schema.constants.get(value) or (None if self.objects is None else self.objects.get(value))
         if known is not None:
             return (known, "text") if quoted else (known,)

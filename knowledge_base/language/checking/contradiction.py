@@ -51,7 +51,7 @@ def implied(condition: Expression, by: Expression) -> bool:
 
 
 def complete(conditions: Iterable[Expression]) -> bool:
-    """Whether certainly always one of the conditions holds."""
+    """Whether one of the conditions certainly holds in every world."""
     return contradictory(*map(Not, conditions))
 
 

@@ -23,13 +23,13 @@ def shown(value: object) -> str:
 
 
 def require(value: object, kinds: type | tuple[type, ...], wanted: str) -> None:
-    """Raise `InputError` unless it is of one of the kinds; `wanted` says what is, as in `a schema is a Schema`."""
+    """Raise `InputError` unless `value` has one of the kinds; `wanted` is the message, as `a schema is a Schema`."""
     if not isinstance(value, kinds):
         raise InputError(f"{wanted}, not {shown(value)[:60]}")
 
 
 def require_several(value: object, what: str) -> None:
-    """Raise `InputError` unless it can be gone through; `what` are the things in it."""
+    """Raise `InputError` unless `value` is iterable and not text; `what` names its items."""
     if isinstance(value, str) or not isinstance(value, Iterable):
         raise InputError(f"{what} are given as a list, not as {shown(value)[:60]}")
 
@@ -43,7 +43,7 @@ def require_condition(text: object) -> None:
 
 
 def require_params(params: object) -> None:
-    """Raise an error unless the parameters are a mapping to values that facts can be about.
+    """Raise an error unless the parameters are a mapping to values that facts can have as arguments.
 
     Raises:
         InputError: it is not a mapping, a name is not text, or a value has another type.
@@ -62,7 +62,7 @@ def require_params(params: object) -> None:
 
 
 def fitted_names(e: Expression, params: Iterable[str]) -> tuple[str, ...]:
-    """The parameters' names as `e` spells them: in texts variables are in lower case, however they are written.
+    """The parameters' names as `e` spells them; variables of a text are in lower case.
 
     Raises:
         UnknownNameError: `e` has no such variable that could be given a value.
@@ -105,7 +105,7 @@ def require_time(time: object) -> None:
 
 
 def require_delta(delta: object) -> None:
-    """Raise `InputError` unless it is a `Delta` whose parts are what they are declared to be."""
+    """Raise `InputError` unless it is a `Delta` whose parts have their declared types."""
     if not isinstance(delta, Delta):
         raise InputError(f"a change is a Delta, not {shown(delta)}")
     if delta == _NO_CHANGE:  # the usual case; an empty part of another type differs

@@ -241,7 +241,7 @@ def _decided(tests: list[Test], world: World, bindings: Bindings, *, by: bool, o
 
 
 def _found(conditions: Iterable[Conjunct], schema: Vocabulary, bound: frozenset[str]) -> Test:
-    """Whether a search finds anything; it takes fewer frames than the search, which nested quantifiers pay for."""
+    """Whether a search finds anything, with fewer frames than the search, which matters for nested quantifiers."""
     plan = SearchPlan(conditions, schema, bound)
     first_test = plan.first.test
 
@@ -409,7 +409,7 @@ class SearchPlan:
     def _stage(self, left: tuple[int, ...], bound: frozenset[str]) -> Stage:
         steps = {i: self.steps[i] for i in left}
         open_steps = {i: s for i, s in steps.items() if not s.free <= bound}
-        # By `map` and not in comprehensions, whose frames deep nesting would have to pay for.
+        # `map` instead of comprehensions, whose frames add up under deep nesting.
         tests = list(map(self._test, (s.conjunct for i, s in steps.items() if i not in open_steps)))
         chosen = candidates(open_steps, bound)
         lookups = map(partial(_lookup, schema=self._schema, bound=bound), (step for _, step in chosen))

@@ -39,7 +39,7 @@ NO_BINDINGS: Bindings = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """A condition ready to be asked."""
+    """A compiled condition."""
 
     e: Expression
     free: frozenset[str]
@@ -55,7 +55,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Queried:
-    """A query ready to be answered, for certain variables that are bound.
+    """A compiled query, for certain variables that are bound.
 
     Attributes:
         e: the query; it is kept alive with what was made from it.
@@ -85,7 +85,7 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
 
 
 def asked(e: Expression, schema: Vocabulary) -> Asked:
-    """The condition ready to be asked of worlds with this schema; errors of the text as for `holds`."""
+    """The condition compiled for worlds with this schema; errors of the text as for `holds`."""
     found = _conditions.find(e, schema)
     if found is None:
         check_depth(e)
@@ -120,7 +120,7 @@ def rows(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDING
 
 
 def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried:
-    """The query ready to be answered when `params` are bound; errors of the text as for `query`."""
+    """The query compiled for bound `params`; errors of the text as for `query`."""
     queries = _queries.find(e, schema)
     if queries is None:
         check_depth(e)

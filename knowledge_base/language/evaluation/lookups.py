@@ -36,7 +36,7 @@ from knowledge_base.language.syntax.expression import (
 
 @dataclass(frozen=True, slots=True)
 class TypeRange:
-    """The condition that a variable is a thing of one of its types."""
+    """The condition that a variable ranges over the things of its types."""
 
     variable: TypedVariable
 
@@ -112,7 +112,7 @@ def opposite(e: Expression) -> Expression:
 
 
 def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabulary) -> list[JoinStep]:
-    """The look-ups in a good order when the variables `bound` have values and no numbers of facts are known.
+    """The look-ups in a good order for bound variables `bound`, without numbers of facts.
 
     Raises:
         InputError: a variable is only tested and nothing finds values for it.
@@ -231,7 +231,7 @@ class Lookup:
         return answers
 
     def size(self, world: World, bindings: Bindings) -> int:
-        """At most how many facts match; 0 if the world cannot say so cheaply."""
+        """An upper bound of the matching facts; 0 if the world has no cheap one."""
         estimate = getattr(world, "estimate", None)
         return estimate(self._predicate, self._pattern(world, bindings)) if estimate else 0
 

@@ -70,7 +70,7 @@ def compile_arguments(terms: tuple[Term, ...], schema: Vocabulary) -> Callable[[
 
 
 def compile_argument(term: Term, schema: Vocabulary) -> Argument:
-    """As `compile_term`, for what facts are about.
+    """As `compile_term`, for arguments of facts.
 
     Raises:
         SchemaError: it would be a geometry.

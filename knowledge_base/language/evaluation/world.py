@@ -77,7 +77,7 @@ class _Given(Exception):  # noqa: N818  no error of the question: the evaluator 
 
 
 class Meter:
-    """Counts the work of one question, and ends it where its bounds are.
+    """Counts the work of one question, and ends the question at its bounds.
 
     Args:
         bounds: those of the question.
@@ -130,7 +130,7 @@ class Meter:
 
 
 class BoundedWorld:
-    """A `World` that is another one, whose answers are counted."""
+    """A `World` that counts the answers of another one."""
 
     def __init__(self, world: World, meter: Meter) -> None:
         self._world, self._meter = world, meter

@@ -25,7 +25,7 @@ class Located:
 
 @dataclass(frozen=True, slots=True)
 class TypedVariable(Located):
-    """A parameter or quantified variable; no types or `object` means anything, several mean `either`."""
+    """A parameter or quantified variable; no types or `object` means any type, several mean `either`."""
 
     name: str
     types: tuple[str, ...] = ()
@@ -153,7 +153,7 @@ KEYWORDS = ("and", "or", "not", "imply", "exists", "forall", *COMPARISONS)
 
 
 def variables_in_order(e: Expression | Term) -> Iterator[str]:
-    """Names of the free variables as they are met reading from left to right; repeated ones again."""
+    """Names of the free variables from left to right, with repetitions."""
     match e:
         case Variable(name):
             yield name

@@ -52,7 +52,7 @@ class Group:
     place: Place
 
     def head(self) -> str | None:
-        """The first word in lower case, which says what kind of group it is; `None` if there is none."""
+        """The first word in lower case, the kind of the group; `None` if there is none."""
         first = self.items[0] if self.items else None
         return first.folded() if isinstance(first, Word) and not first.quoted else None
 

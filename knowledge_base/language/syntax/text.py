@@ -52,7 +52,7 @@ from knowledge_base.spelling import TRUTH_VALUES, is_number, value_text
 __all__ = ["parse_condition", "parse_effect", "parse_term", "parse_typed_list", "parse_variables"]
 
 LONGEST_NUMBER = 40
-"""Characters of a number; longer ones are more likely a mistake, and slow to read."""
+"""Characters of a number; longer numbers are probably mistakes, and slow to read."""
 
 
 def parse_condition(text: str | Node, source: str | None = None) -> Expression:
