@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Awaitable, Callable, Collection, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator, Sequence
 from functools import partial
 
 from dsc.components.component import Component
@@ -66,7 +66,11 @@ class Outbox:
         self._under_way |= numbers
         self._last = max(numbers)
 
-        async def taking() -> None:
+        before = self.untaken.get(component.name)
+
+        async def in_order() -> None:
+            if before is not None:
+                await asyncio.wait([before])
             try:
                 with contained():
                     await take()
@@ -76,8 +80,11 @@ class Outbox:
             finally:
                 for number in numbers:
                     del self._under_way[number]
+            why = None if before is None else failure(before)
+            if why is not None:  # the next skill fails with it
+                raise why
 
-        self._in_turn(component.name, taking)
+        self.untaken[component.name] = asyncio.get_running_loop().create_task(in_order())
 
     async def taken(self, component: Component) -> None:
         """Wait until the component has taken its `untaken` outputs; raises its error, one time."""
@@ -98,22 +105,13 @@ class Outbox:
         """Return the deliveries to wait for at the end."""
         return self.untaken.values()
 
-    def failures(self) -> list[str]:
-        """Return the reasons of failed deliveries that failed no skill."""
-        return [_untaken(name, task) for name, task in self.untaken.items() if not _succeeded(task)]
-
-    def _in_turn(self, name: str, take: Callable[[], Awaitable[None]]) -> None:
-        before = self.untaken.get(name)
-
-        async def in_order() -> None:
-            if before is not None:
-                await asyncio.wait([before])
-            await take()
-            why = None if before is None else failure(before)
-            if why is not None:  # the next skill fails with it
-                raise why
-
-        self.untaken[name] = asyncio.get_running_loop().create_task(in_order())
+    def failures(self) -> Iterator[str]:
+        """Yield the reasons of failed deliveries that failed no skill."""
+        for name, task in self.untaken.items():
+            why = failure(task) if task.done() else None
+            if why is not None or task.cancelled() or not task.done():
+                reason = described(why) if why is not None else f"no answer within {CLOSING:g} s"
+                yield f"component '{name}' did not take its last output: {reason}"
 
 
 async def _take(component: Component, told: Told) -> None:
@@ -134,13 +132,3 @@ async def _restore_mode(component: Component, mode: str) -> None:
 def failure(task: asyncio.Task[None]) -> BaseException | None:
     """Return the error of a task that is done, or `None`."""
     return None if task.cancelled() else task.exception()
-
-
-def _succeeded(task: asyncio.Task[None]) -> bool:
-    return task.done() and not task.cancelled() and task.exception() is None
-
-
-def _untaken(component: str, task: asyncio.Task[None]) -> str:
-    why = failure(task) if task.done() else None
-    reason = described(why) if why is not None else f"no answer within {CLOSING:g} s"
-    return f"component '{component}' did not take its last output: {reason}"
