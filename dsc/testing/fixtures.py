@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -101,25 +101,39 @@ def _output(output: PlotVariable) -> dict[str, Any]:
     return {"type": output.type, "initial": nothing if output.initial is None else output.initial}
 
 
-def _required(original: ActionPlot, outcome: str) -> list[str]:
-    if outcome == DONE:
-        return [name for name, output in original.outputs.items() if output.initial is None]
-    return list(original.emits[outcome] or ())
-
-
 def _check(original: ActionPlot, outcome: str, given: Mapping[str, Any]) -> None:
-    if outcome != DONE and outcome not in original.emits:
-        valid = (DONE, *original.emits)
+    if outcome == DONE:
+        required = [name for name, output in original.outputs.items() if output.initial is None]
+        require_attributes(original.name, outcome, original.outputs, given, required)
+    elif outcome in original.emits:
+        require_attributes(original.name, outcome, original.emits[outcome] or {}, given)
+    else:
         raise UnknownNameError(
             f"plot '{original.name}' does not end with '{outcome}'", place=original.place(("emits",)),
-            found=outcome, valid=valid,
+            found=outcome, valid=(DONE, *original.emits),
         )  # fmt: skip
-    declared = original.outputs if outcome == DONE else original.emits[outcome] or {}
+
+
+def require_attributes(
+    owner: str, outcome: str, declared: Collection[str], given: Collection[str], required: Iterable[str] | None = None
+) -> None:
+    """Require that an outcome of a plot or skill carries its attributes.
+
+    Args:
+        owner: the plot or skill.
+        outcome: its event.
+        declared: names of all attributes.
+        given: names of the attributes to validate.
+        required: names of the necessary ones, by default all.
+
+    Raises:
+        UnknownNameError: an attribute is not declared.
+        InputError: an attribute is missing.
+    """
     for name in given:
         if name not in declared:
-            raise UnknownNameError(
-                f"the outcome '{outcome}' of '{original.name}' has no attribute '{name}'", found=name, valid=declared
-            )
-    missing = [name for name in _required(original, outcome) if name not in given]
-    if missing:
-        raise InputError(f"the outcome '{outcome}' of '{original.name}' needs its attribute '{missing[0]}'")
+            message = f"the outcome '{outcome}' of '{owner}' has no attribute '{name}'"
+            raise UnknownNameError(message, found=name, valid=declared)
+    for name in declared if required is None else required:
+        if name not in given:
+            raise InputError(f"the outcome '{outcome}' of '{owner}' needs its attribute '{name}'")

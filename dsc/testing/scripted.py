@@ -9,7 +9,7 @@ from typing import Any
 from dsc.calls import Outcome, SkillCall
 from dsc.components.component import Component
 from dsc.skills import SkillSignature, check_arguments
-from dsc.testing.fixtures import change_of
+from dsc.testing.fixtures import change_of, require_attributes
 from knowledge_base.errors import InputError, ParseError, UnknownNameError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
@@ -230,11 +230,4 @@ def check_outcome(skill: str, signature: SkillSignature, answer: Answer) -> None
         raise UnknownNameError(
             f"skill '{skill}' has no outcome '{answer.event}'", found=answer.event, valid=signature.outcomes
         )
-    declared = signature.outcomes[answer.event]
-    for name in answer.attributes:
-        if name not in declared:
-            unknown = f"the outcome '{answer.event}' of '{skill}' has no attribute '{name}'"
-            raise UnknownNameError(unknown, found=name, valid=declared)
-    missing = [name for name in declared if name not in answer.attributes]
-    if missing:
-        raise InputError(f"the outcome '{answer.event}' of '{skill}' needs its attribute '{missing[0]}'")
+    require_attributes(skill, answer.event, signature.outcomes[answer.event], answer.attributes)
