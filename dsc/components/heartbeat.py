@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Awaitable, Callable, Collection
 from contextlib import suppress
 from typing import Any
@@ -36,15 +35,10 @@ class Heartbeat:
         self._needs = needs
         self._changed = changed
         self._root = root
-        self._heard_at: dict[str, float] = {}
-        self._activators: set[str] = set()
+        self._activators: dict[str, float] = {}  # with the second of the last heartbeat
         self._stirred = asyncio.Event()
         self.active = False
         endpoint.hear("heartbeat", self._heard)
-
-    def alive(self, name: str) -> bool:
-        """Whether a component is active and has sent a heartbeat lately."""
-        return _now() - self._heard_at.get(name, -math.inf) < SILENCE
 
     @property
     def activators(self) -> frozenset[str]:
@@ -68,8 +62,8 @@ class Heartbeat:
             await self._become(active=False)
 
     async def _beat(self) -> None:
-        self._heard_at = {name: at for name, at in self._heard_at.items() if _now() - at < SILENCE}
-        self._activators = {name for name in self._activators if self.alive(name)}
+        now = asyncio.get_running_loop().time()
+        self._activators = {name: at for name, at in self._activators.items() if now - at < SILENCE}
         await self._become(active=self._root or bool(self._activators))
         if self.active:
             self._endpoint.broadcast("heartbeat", {"needs": sorted(self._needs())})
@@ -88,11 +82,8 @@ class Heartbeat:
 
     def _heard(self, sender: str, said: Any) -> None:
         needed = self._endpoint.address in said["needs"]
-        self._heard_at[sender] = _now()
-        if needed != (sender in self._activators):
-            (self._activators.add if needed else self._activators.discard)(sender)
+        before = self._activators.pop(sender, None)
+        if needed:
+            self._activators[sender] = asyncio.get_running_loop().time()
+        if needed != (before is not None):
             self.stir()
-
-
-def _now() -> float:
-    return asyncio.get_running_loop().time()

@@ -524,9 +524,9 @@ class TransportSuite:
             await until(lambda: told == [True])
             transport.detach("arm")
             dying.broadcast = lambda *_: None  # type: ignore[method-assign]
-            assert motor.alive("arm")
+            assert motor.activators == {"arm"}
             await until(lambda: told == [True, False])
-            assert not motor.alive("arm")
+            assert not motor.activators
             task.cancel()
 
 
