@@ -30,7 +30,7 @@ from websockets.sync.client import ClientConnection, connect
 from domains.clean_up_table.deployment import deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.trace import Listener, header
-from dsc.viewer.address import PageAddress
+from dsc.viewer.access import PageAddress
 from dsc.viewer.live import LivePage
 from planning import Planner
 from planning.engines.planner import PlannerProcess

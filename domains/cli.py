@@ -175,7 +175,7 @@ def _viewed(
     from dsc.trace import header
 
     viewer_installed()
-    from dsc.viewer.address import PageAddress
+    from dsc.viewer.access import PageAddress
     from dsc.viewer.live import LivePage
 
     live = LivePage(header(**deployed.header()), PageAddress.on(port), control=control)

@@ -107,7 +107,7 @@ def view_command(
 ) -> None:
     """Look at a recorded run, or at a store as others change it, in the browser; Ctrl-C ends it."""
     viewer_installed()
-    from dsc.viewer.address import PageAddress
+    from dsc.viewer.access import PageAddress
     from dsc.viewer.record_sources import records_of
     from dsc.viewer.server import Viewer
 

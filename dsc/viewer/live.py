@@ -19,7 +19,7 @@ from knowledge_base.errors import InputError, described
 
 if TYPE_CHECKING:
     from dsc.trace import Record
-    from dsc.viewer.address import PageAddress
+    from dsc.viewer.access import PageAddress
 
 COMMAND = (sys.executable, "-P", "-m", "dsc.viewer.page_process")
 TELL_EVERY_S = 1 / 30

@@ -20,7 +20,7 @@ from itertools import count
 from socket import socket
 from typing import IO, Any
 
-from dsc.viewer.address import PageAddress
+from dsc.viewer.access import PageAddress
 from dsc.viewer.records import RecordLog
 from dsc.viewer.server import Viewer
 from knowledge_base.errors import InputError

@@ -1,4 +1,7 @@
-"""Queries of the page: the knowledge at a record, replayed from records with checkpoints, within bounds."""
+"""Requests of the page: JSON of bounded size and depth, and queries of the knowledge at a record, within bounds.
+
+The knowledge is replayed from records, with checkpoints.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from threading import Lock
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
+
+from pydantic_core import from_json
 
 from dsc.viewer.records import RecordLog
 from knowledge_base.errors import InputError, OutOfBoundsError, UnknownNameError
@@ -208,3 +214,65 @@ def require_short(text: str, name: str) -> None:
     """Raise `InputError` for a text from a browser that is longer than `MOST_TEXT`."""
     if len(text) > MOST_TEXT:
         raise InputError(f"'{name}' has {len(text)} characters; a browser may send {MOST_TEXT}")
+
+
+MOST_BYTES = 1 << 20
+"""Upper bound of a request's body."""
+Fields = Mapping[str, tuple[Callable[[Any], bool], str]]
+"""Optional fields of a request: the test of a value, and the words for its type."""
+
+
+def asked(body: bytes | str, form: Fields = MappingProxyType({})) -> dict[str, Any]:
+    """Return the request in a text.
+
+    Raises:
+        InputError: it is not a JSON object, is nested too deeply, or a field has a value of another type.
+    """
+    try:
+        request = from_json(body, allow_inf_nan=False)
+    except ValueError as error:
+        raise InputError(f"a request is one JSON object: {error}") from None
+    if not isinstance(request, dict):
+        raise InputError("a request is one JSON object")
+    for name, (fits, words) in form.items():
+        if request.get(name) is not None and not fits(request[name]):
+            raise InputError(f"'{name}' is {words}")
+    return request
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _scalar(value: Any) -> bool:
+    return isinstance(value, str | int | float | bool)
+
+
+def _scalars(value: Any) -> bool:
+    return isinstance(value, dict) and all(map(_scalar, value.values()))
+
+
+def _texts(value: Any) -> bool:
+    return isinstance(value, list) and all(map(_is_text, value))
+
+
+def _one_text(value: Any) -> bool:
+    return isinstance(value, dict) and len(value) == 1 and all(map(_is_text, value.values()))
+
+
+SEQ = (_number, "the number of a record")
+QUERY: Fields = {"seq": SEQ, "expression": (_is_text, "a text"), "params": (_scalars, "names with their values")}
+FACTS: Fields = {"seq": SEQ, "about": (_is_text, "a text")}
+CONTROL: Fields = {
+    "do": (_is_text, "a text"),
+    "name": (_is_text, "a text"),
+    "attributes": (lambda value: isinstance(value, dict), "names with their values"),
+    "statements": (_texts, "a list of texts such as (on cup1 table)"),
+    "owner": (_is_text, "a text"),
+    "on": (_one_text, "one of state, event, condition, plan_step, with a text"),
+    "number": (_number, "the number of a breakpoint"),
+}

@@ -23,13 +23,11 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from dsc.viewer.access import COOKIE, Access, Keys
-from dsc.viewer.address import PageAddress
+from dsc.viewer.access import COOKIE, Access, Keys, PageAddress
 from dsc.viewer.broadcast import Broadcast, BrowserStream
 from dsc.viewer.control import Hands
-from dsc.viewer.queries import Left, PageQueries
+from dsc.viewer.queries import CONTROL, FACTS, MOST_BYTES, QUERY, Fields, Left, PageQueries, asked
 from dsc.viewer.records import RecordLog
-from dsc.viewer.requests import CONTROL, FACTS, MOST_BYTES, QUERY, Form, asked
 from knowledge_base.errors import InputError
 
 if TYPE_CHECKING:
@@ -141,7 +139,7 @@ class Viewer:
         except InputError as error:
             return _wrong(error)
 
-    def _asked(self, answer: Callable[[Mapping[str, Any], Left], Any], form: Form) -> Callable[[Request], Any]:
+    def _asked(self, answer: Callable[[Mapping[str, Any], Left], Any], form: Fields) -> Callable[[Request], Any]:
         async def answering(request: Request) -> Response:
             try:
                 said = asked(await _body(request), form)

@@ -41,7 +41,7 @@ from dsc.text.text_diagrams import to_mermaid, to_plantuml
 from dsc.text.yaml import read_file
 from dsc.trace import Trace, header
 from dsc.validation import review_plot, validate_plot
-from dsc.viewer.address import PageAddress
+from dsc.viewer.access import PageAddress
 from dsc.viewer.control import Control
 from dsc.viewer.queries import PageQueries
 from dsc.viewer.record_sources import records_of

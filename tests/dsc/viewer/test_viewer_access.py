@@ -16,8 +16,13 @@ httpx = pytest.importorskip("httpx", reason="the extra `viewer` is not installed
 
 from dsc.cli.runs import page  # noqa: E402
 from dsc.trace import header  # noqa: E402
-from dsc.viewer.access import CODE_LIFE_S, MOST_WRONG_CODES, Access, Keys  # noqa: E402
-from dsc.viewer.address import PageAddress  # noqa: E402
+from dsc.viewer.access import (  # noqa: E402
+    CODE_LIFE_S,
+    MOST_WRONG_CODES,
+    Access,
+    Keys,
+    PageAddress,
+)
 from dsc.viewer.live import LivePage  # noqa: E402
 from dsc.viewer.records import RecordLog  # noqa: E402
 from dsc.viewer.server import Viewer  # noqa: E402

@@ -15,7 +15,7 @@ pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 
 from dsc.trace import Record, header
 from dsc.viewer import queries
-from dsc.viewer.address import PageAddress
+from dsc.viewer.access import PageAddress
 from dsc.viewer.control import MOST_BREAKS, MOST_STATEMENTS, MOST_WORK, Control
 from dsc.viewer.queries import PageQueries
 from dsc.viewer.records import RecordLog, read_trace

@@ -19,7 +19,7 @@ from hypothesis import strategies as st  # noqa: E402
 
 from dsc.events import Event  # noqa: E402
 from dsc.trace import header  # noqa: E402
-from dsc.viewer.address import PageAddress  # noqa: E402
+from dsc.viewer.access import PageAddress  # noqa: E402
 from dsc.viewer.records import RecordLog  # noqa: E402
 from dsc.viewer.server import Viewer  # noqa: E402
 from knowledge_base import InputError  # noqa: E402

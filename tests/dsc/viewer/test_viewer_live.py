@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed  # noqa: E402
 from domains.clean_up_table.deployment import deploy  # noqa: E402
 from domains.clean_up_table.scenario import Scenario  # noqa: E402
 from dsc.trace import Record, header  # noqa: E402
-from dsc.viewer.address import PageAddress  # noqa: E402
+from dsc.viewer.access import PageAddress  # noqa: E402
 from dsc.viewer.live import LivePage  # noqa: E402
 
 MUCH = 2000

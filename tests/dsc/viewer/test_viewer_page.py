@@ -14,7 +14,7 @@ pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 httpx = pytest.importorskip("httpx", reason="the extra `viewer` is not installed")
 
-from dsc.viewer.address import PageAddress  # noqa: E402
+from dsc.viewer.access import PageAddress  # noqa: E402
 from dsc.viewer.records import RecordLog  # noqa: E402
 from dsc.viewer.server import STATIC, Viewer  # noqa: E402
 

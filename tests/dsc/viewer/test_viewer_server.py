@@ -15,7 +15,7 @@ websockets = pytest.importorskip("websockets.sync.client", reason="the extra `vi
 from domains.clean_up_table.deployment import deploy  # noqa: E402
 from domains.clean_up_table.scenario import Scenario  # noqa: E402
 from dsc.trace import header  # noqa: E402
-from dsc.viewer.address import PageAddress  # noqa: E402
+from dsc.viewer.access import PageAddress  # noqa: E402
 from dsc.viewer.records import RecordLog, read_trace  # noqa: E402
 from dsc.viewer.server import Viewer  # noqa: E402
 from knowledge_base import InputError  # noqa: E402
