@@ -350,8 +350,8 @@ most of them short-lived.
 """
 
 _lock = threading.Lock()
-_running = 0
-_before = gc.get_threshold()
+_thresholds: list[tuple[int, int, int]] = []
+"""The collector's thresholds before each run in progress."""
 
 
 @contextmanager
@@ -360,19 +360,16 @@ def settled() -> Iterator[None]:
 
     A collection of all objects takes a tenth of a second. New objects are collected less often too.
     """
-    global _running, _before  # noqa: PLW0603  there is one collector in a process
     with _lock:
         gc.freeze()
-        if not _running:
-            _before = gc.get_threshold()
-            if _before[0]:  # else it is switched off
-                gc.set_threshold(max(_before[0], _YOUNG), *_before[1:])
-        _running += 1
+        before = gc.get_threshold()
+        _thresholds.append(before)
+        if before[0]:  # else it is switched off
+            gc.set_threshold(max(before[0], _YOUNG), *before[1:])
     try:
         yield
     finally:
         with _lock:
-            _running -= 1
-            if not _running:
-                gc.set_threshold(*_before)
+            gc.set_threshold(*_thresholds.pop())
+            if not _thresholds:
                 gc.unfreeze()
