@@ -12,37 +12,45 @@ from knowledge_base.errors import InputError, UnknownNameError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-SURFACES = ("table", "shelf", "floor")
-DESTINATIONS = ("sink", "bin")
 OPERATOR = "operator"
-PLACES = (*SURFACES, *DESTINATIONS, OPERATOR)
 
-TYPES = {
-    **dict.fromkeys(SURFACES, "surface"),
-    **dict.fromkeys(DESTINATIONS, "destination"),
-    OPERATOR: "place",
-}
-"""A place's type in the planning domain."""
 
-POSITIONS = {
-    "table": (0.0, 0.0),
-    "shelf": (-3.0, 0.0),
-    "floor": (0.0, -2.0),
-    "sink": (3.0, 1.0),
-    "bin": (3.0, -2.0),
-    OPERATOR: (-3.0, -3.0),
-}
-"""A place's centre, seen from above: x to the right, y away from the viewer, in metres."""
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A place seen from above, in metres: x to the right, y away from the viewer.
 
-EXTENTS = {
-    "table": (2.0, 1.0),
-    "shelf": (2.0, 0.6),
-    "floor": (2.0, 1.0),
-    "sink": (0.8, 0.6),
-    "bin": (0.6, 0.6),
-    OPERATOR: (0.6, 0.6),
+    Attributes:
+        type: the place's type in the planning domain.
+        x, y: its centre.
+        width, depth: its extent.
+    """
+
+    type: str
+    x: float
+    y: float
+    width: float
+    depth: float
+
+
+SPOTS = {
+    "table": Spot("surface", 0.0, 0.0, 2.0, 1.0),
+    "shelf": Spot("surface", -3.0, 0.0, 2.0, 0.6),
+    "floor": Spot("surface", 0.0, -2.0, 2.0, 1.0),
+    "sink": Spot("destination", 3.0, 1.0, 0.8, 0.6),
+    "bin": Spot("destination", 3.0, -2.0, 0.6, 0.6),
+    OPERATOR: Spot("place", -3.0, -3.0, 0.6, 0.6),
 }
-"""A place's width and depth in metres."""
+PLACES = tuple(SPOTS)
+SURFACES, DESTINATIONS = (
+    tuple(name for name, spot in SPOTS.items() if spot.type == wanted) for wanted in ("surface", "destination")
+)
+
+
+def distance(start: str, end: str) -> float:
+    """Return the distance between two places in metres, in a straight line."""
+    here, there = SPOTS[start], SPOTS[end]
+    return math.dist((here.x, here.y), (there.x, there.y))
+
 
 CUP, CAN, CRISP_CAN = "cup", "can", "crisp-can"
 KINDS = (CUP, CAN, CRISP_CAN)
@@ -58,11 +66,6 @@ ROOMS = ("none", "one", "two")
 HAND = "hand"
 RESERVED = frozenset({*PLACES, *ROOMS, HAND})
 _NAME = re.compile(r"[a-z][a-z0-9_-]{0,59}")
-
-
-def distance(start: str, end: str) -> float:
-    """Return the distance between two places in metres, in a straight line."""
-    return math.dist(POSITIONS[start], POSITIONS[end])
 
 
 def check_name(name: str) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from pydantic import TypeAdapter
 
-from domains.clean_up_table.items import DESTINATION_OF, PLACES, ROOMS, SURFACES, TYPES
+from domains.clean_up_table.items import DESTINATION_OF, PLACES, ROOMS, SPOTS, SURFACES
 from knowledge_base.facts import Delta, Fact, fact
 
 Attribute = str | int | tuple[str, ...]
@@ -108,7 +108,7 @@ class _Notes:
 def initial_knowledge(robot_at: str) -> Delta:
     """Return the robot's knowledge before its first look: places, its own place, and the order of rooms."""
     notes = _Notes()
-    notes.nodes.update(TYPES)
+    notes.nodes.update({name: spot.type for name, spot in SPOTS.items()})
     notes.holds("robot-at", robot_at)
     notes.holds("hand-free")
     for place in PLACES:

@@ -13,14 +13,14 @@ from pydantic import TypeAdapter
 from domains.clean_up_table.items import (
     CAN,
     CUP,
-    EXTENTS,
     HAND,
     OPERATOR,
     PLACES,
-    POSITIONS,
+    SPOTS,
     SURFACES,
     Inventory,
     Item,
+    Spot,
     new_item,
 )
 from domains.clean_up_table.observations import Result
@@ -173,9 +173,34 @@ class Room:
         """Whether every item that was ever on the table, seen or not, is in its destination."""
         return not self.left()
 
+    # Seen from above
+
     def scene(self) -> list[dict[str, Any]]:
-        """Return the world drawn from above; see `scene`."""
-        return scene(self.items, self.robot_at)
+        """Return every place, the robot and every item: `id, shape, x, y, label` in metres.
+
+        Places also have `width` and `depth`. An item inside another or in the hand has `in`, the id of its holder. An
+        item keeps its spot on a surface while others come and go.
+        """
+        places = [
+            {"id": name, "shape": name, "x": at.x, "y": at.y, "label": name, "width": at.width, "depth": at.depth}
+            for name, at in SPOTS.items()
+        ]
+        x, y = self._hand()
+        robot = {"id": "robot", "shape": "robot", "x": x, "y": y, "label": "robot"}
+        slots = {item.name: slot for slot, item in enumerate(self.items)}
+        return [*places, robot, *(self._drawn(item, slots) for item in self.items)]
+
+    def _hand(self) -> tuple[float, float]:
+        at = SPOTS[self.robot_at]
+        return at.x, at.y - _LOWER_EDGE
+
+    def _drawn(self, item: Item, slots: Mapping[str, int]) -> dict[str, Any]:
+        top = self.items.outermost(item)
+        x, y = self._hand() if top.where == HAND else _position(SPOTS[top.where], slots[top.name], len(slots))
+        drawn = {"id": item.name, "shape": item.kind, "x": x, "y": y, "label": item.name}
+        if item.where not in PLACES:
+            drawn["in"] = "robot" if item.where == HAND else item.where
+        return drawn
 
     # As data
 
@@ -220,41 +245,9 @@ class Room:
             raise InputError(f"this is not the state of a clean-up-table world: {wrong!r}") from wrong
 
 
-def scene(items: Inventory, robot_at: str) -> list[dict[str, Any]]:
-    """Return every place, the robot and every item: `id, shape, x, y, label` in metres.
-
-    Places also have `width` and `depth`. An item inside another or in the hand has `in`, the id of its holder. An item
-    keeps its spot on a surface while others come and go.
-    """
-    places = [_place(name) for name in PLACES]
-    x, y = POSITIONS[robot_at]
-    robot = {"id": "robot", "shape": "robot", "x": x, "y": y - _LOWER_EDGE, "label": "robot"}
-    return [*places, robot, *(_item(item, slot, items, robot_at) for slot, item in enumerate(items))]
-
-
-def _place(name: str) -> dict[str, Any]:
-    (x, y), (width, depth) = POSITIONS[name], EXTENTS[name]
-    return {"id": name, "shape": name, "x": x, "y": y, "label": name, "width": width, "depth": depth}
-
-
-def _item(item: Item, slot: int, items: Inventory, robot_at: str) -> dict[str, Any]:
-    top = items.outermost(item)
-    top_slot = slot if top is item else list(items).index(top)
-    x, y = _spot(top.where, top_slot, len(items), robot_at)
-    drawn = {"id": item.name, "shape": item.kind, "x": x, "y": y, "label": item.name}
-    if item.where not in PLACES:
-        drawn["in"] = "robot" if item.where == HAND else item.where
-    return drawn
-
-
-def _spot(where: str, slot: int, count: int, robot_at: str) -> tuple[float, float]:
-    """Return the position of the item with that number, on a grid for all items."""
-    if where == HAND:
-        x, y = POSITIONS[robot_at]
-        return x, y - _LOWER_EDGE
-    (x, y), (width, depth) = POSITIONS[where], EXTENTS[where]
+def _position(at: Spot, slot: int, count: int) -> tuple[float, float]:
+    """Return the position of the item with that number in a place, on a grid for all items."""
+    row, column = divmod(slot, _COLUMNS)
     rows = -(-count // _COLUMNS)
-    column, row = slot % _COLUMNS, slot // _COLUMNS
-    across = (column + 0.5) / _COLUMNS - 0.5
-    along = (row + 0.5) / rows - 0.5
-    return round(x + across * width, 3), round(y + along * depth, 3)
+    across, along = (column + 0.5) / _COLUMNS - 0.5, (row + 0.5) / rows - 0.5
+    return round(at.x + across * at.width, 3), round(at.y + along * at.depth, 3)
