@@ -184,7 +184,7 @@ def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, plan
 
 
 def test_a_store_brings_its_own_knowledge(planner, tmp_path):
-    with pytest.raises(InputError, match="the knowledge is the store's"):
+    with pytest.raises(InputError, match="a store provides the knowledge"):
         Executive(DOMAIN, [], [], KnowledgeBase(DOMAIN.schema), planner, store=tmp_path / "run.kb")
 
 
