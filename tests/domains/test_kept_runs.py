@@ -197,7 +197,7 @@ def test_the_command_keeps_a_run_resumes_it_and_tells_what_happened(whole, tmp_p
             ["run", "--resume", "x.kb", "--seed", "1"],
             "--resume continues a run as it began, without --seed",
         ),
-        (["run", "--resume", "x.kb", "--real-time"], "does not go with --real-time"),
+        (["run", "--resume", "x.kb", "--real-time"], "as it began, without --real-time"),
         (["run", "--resume", "x.kb"], "there is no store 'x.kb'"),
         (["runs", "list", "x.kb"], "there is no store 'x.kb'"),
         (["runs", "replay", __file__], "cannot read the store: file is not a database"),
