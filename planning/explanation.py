@@ -91,10 +91,10 @@ class _Reach:
     @staticmethod
     def of(task: Task, world: World) -> _Reach:
         reach, numbering = reachable(task), task.numbering
-        named = [one for one in reach.facts.keys() - numbering.fluents if isinstance(numbering.named(one), Fact)]
+        literals = reach.facts.keys() - numbering.fluents - numbering.bounds.keys()
         taken = itertools.compress(task.ways.all, reach.taken)
         changes = dict.fromkeys(change for way in taken for change in way.assignments)
-        return _Reach(frozenset(map(numbering.fact, named)), tuple(changes), world)
+        return _Reach(frozenset([numbering.facts[one] for one in literals]), tuple(changes), world)
 
     def allows(self, condition: Residual) -> bool:
         """Return whether each leaf of the condition holds or may hold alone."""
@@ -189,7 +189,7 @@ class _Causes:
             found = [
                 self.lacking(rule, full)
                 for kept in itertools.combinations(rule.atoms, len(rule.atoms) - given_up)
-                for bindings in itertools.islice(rule.join(self.index, kept, start), 1)
+                for bindings in itertools.islice(rule.join(self.index, kept, start, self.grounder.patience), 1)
                 if (full := self.completed(rule, bindings)) is not None
             ]
             if found:

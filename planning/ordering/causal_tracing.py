@@ -27,7 +27,7 @@ from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.evaluator import apply_effect, holds
 from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, effect_parts, substitute_effect
-from knowledge_base.language.syntax.expression import And, Atom, Constant, Expression, Not, Variable
+from knowledge_base.language.syntax.expression import Atom, Constant, Expression, Not, Variable
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
@@ -37,24 +37,14 @@ from planning.ordering.step_dependencies import Changes, Ground, Support, change
 from planning.plan import Plan, PlanStep
 from planning.problem.conditions import Literal
 from planning.problem.derived import derivation
-
-
-def causal_links(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> tuple[CausalLink, ...]:
-    """Return the causal links of a plan from `world` to the goal, by user.
-
-    The plan leads to the goal as long as all of them hold.
-
-    Raises:
-        InputError: the plan does not lead to the goal.
-    """
-    return deordered(plan, domain, world, goal).links
+from planning.problem.expressions import conjuncts_of
 
 
 def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> PartialOrder:
-    """Return the plan without ordered pairs that have no reason.
+    """Return the plan without ordered pairs that have no reason, with its causal links by user.
 
-    Every linearization leads from `world` to the goal. The result is not always the least such order, which is NP-hard
-    to find.
+    Every linearization leads from `world` to the goal, as long as all links hold. The result is not always the least
+    such order, which is NP-hard to find.
 
     Raises:
         InputError: the plan does not lead to the goal; `planning.validation.validate` returns the step and the reason.
@@ -64,9 +54,8 @@ def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression
     for number, step in enumerate(plan.steps, start=1):
         tracing.take(number, step, derived.domain)
     tracing.reach(len(plan.steps) + 1, derived.expand(goal))
-    links = tuple(dict.fromkeys(CausalLink(*link) for link in tracing.links))
     steps = {number: bits for number, bits in tracing.earlier.items() if number <= len(plan.steps)}
-    return PartialOrder(plan.steps, links, reduction(steps))
+    return PartialOrder(plan.steps, tuple(tracing.links), reduction(steps))
 
 
 class CausalTrace:
@@ -76,17 +65,17 @@ class CausalTrace:
         world: the present, with derived facts.
 
     Attributes:
-        links: provider, condition and user of each causal link, in the order of the users.
+        links: the causal links, in the order of the users.
         earlier: for each step, the steps that must end before it, as bits.
     """
 
     def __init__(self, world: World) -> None:
-        self.links: list[tuple[int, Expression, int]] = []
+        self.links: list[CausalLink] = []
         self.earlier: dict[int, int] = defaultdict(int)
-        self._base = world
+        self._base, self._schema = world, world.schema
         self._ahead = Overlay(world)
         self._pending: dict[Fact, bool] = {}
-        self._facts: dict[Fact, _Record] = {}
+        self._facts = _Records(world)
         self._numbers: dict[Fact, _Number] = defaultdict(_Number)
 
     def take(self, number: int, step: PlanStep, domain: PlanningDomain) -> None:
@@ -97,17 +86,25 @@ class CausalTrace:
         """
         action, ground = domain.action(step), domain.ground(step)
         self._check_types(action, step)
-        known = _Known.of(ground, action, self._base.schema)
+        known, before = _Known.of(ground, step, action, self._schema), len(self.links)
         for condition, literal in known.needs:
             if literal is not None:
                 self._need(number, condition, literal, step)
             else:
                 self._need_all(number, condition, step)
-        if known.makes is not None:
+        if known.makes is None:
+            self._take_in_world(number, step, action, domain, ground.effect)
+        else:
             self._make(number, known.makes)
             self._pending.update(known.changes)
-            return
-        doing = _doing(action, step, ground.effect, domain, self._world)
+        if not known.plain:
+            self._unite_links(before)
+
+    def _take_in_world(
+        self, number: int, step: PlanStep, action: PlanningAction, domain: PlanningDomain, effect: Effect
+    ) -> None:
+        """Add the changes of a step that depend on the world."""
+        doing = _doing(action, step, effect, domain, self._world)
         for condition in dict.fromkeys(doing.conditions):
             if holds(condition, self._world, {}):  # otherwise the step's own start makes it true
                 self._need_support(number, condition, step)
@@ -117,14 +114,14 @@ class CausalTrace:
         self._set(number, doing)
         plain = action.timed is None and not doing.numbers
         world = self._world
-        made = doing.delta() if plain else apply_effect(ground.effect, world)
+        made = doing.delta() if plain else apply_effect(effect, world)
         for fluent, now in made.values.items():
             before = world.value(fluent.predicate, fluent.args)
             if isinstance(now, int | float) and isinstance(before, int | float):
                 self._numbers[fluent].moves[number] = now - before
         world.apply(made)
         for literal in doing.makes:  # the end may delete a fact that the start adds
-            self._record(literal.fact).holds = world.holds(literal.fact.predicate, literal.fact.args)
+            self._facts[literal.fact].holds = world.holds(literal.fact.predicate, literal.fact.args)
 
     def reach(self, user: int, goal: Expression) -> None:
         """Add the goal as the last user.
@@ -132,7 +129,13 @@ class CausalTrace:
         Raises:
             InputError: the goal does not hold.
         """
+        before = len(self.links)
         self._need_all(user, goal, None)
+        self._unite_links(before)
+
+    def _unite_links(self, since: int) -> None:
+        """Remove equal links among the last ones: one condition may occur several times in a step or goal."""
+        self.links[since:] = dict.fromkeys(self.links[since:])
 
     @property
     def _world(self) -> Overlay:
@@ -145,24 +148,18 @@ class CausalTrace:
         return self._ahead
 
     def _check_types(self, action: PlanningAction, step: PlanStep) -> None:
-        fitting, type_of = self._base.schema.fitting, self._base.type_of
+        fitting, type_of = self._schema.fitting, self._base.type_of
         for parameter, arg in zip(action.parameters, step.args, strict=True):
             if type_of(arg) not in fitting(parameter.types):
                 raise InputError(f"{step} is not possible: '{arg}' is no {' or '.join(parameter.types) or 'object'}")
 
-    def _record(self, fact: Fact) -> _Record:
-        found = self._facts.get(fact)
-        if found is None:
-            found = self._facts[fact] = _Record(self._base.holds(fact.predicate, fact.args))
-        return found
-
     def _need(self, user: int, condition: Expression, literal: Literal, whose: PlanStep | None) -> None:
         """Record that a step, or the goal, needs a literal."""
-        wanted, record = literal.positive, self._record(literal.fact)
+        wanted, record = literal.positive, self._facts[literal.fact]
         if record.holds is not wanted:
             raise _missing(condition, whose)
         provider = record.since[wanted]
-        self.links.append((provider, condition, user))
+        self.links.append(CausalLink(provider, condition, user))
         record.users[wanted] |= 1 << user
         if provider:
             self.earlier[user] |= 1 << provider
@@ -170,7 +167,7 @@ class CausalTrace:
     def _need_all(self, user: int, condition: Expression, whose: PlanStep | None) -> None:
         """Record that a step, or the goal, needs all parts of a ground condition now."""
         for part in conjuncts(condition, self._base):  # reads only objects, which no step changes
-            literal = _literal(part, self._base.schema)
+            literal = _literal(part, self._schema)
             if literal is None:
                 self._need_support(user, part, whose)
             else:
@@ -184,7 +181,7 @@ class CausalTrace:
         if not found:  # no step can change it
             return
         providers = {one for ground in found for one in self._providers(ground) if self._helps(one, ground, condition)}
-        self.links += [(one, condition, user) for one in sorted(providers - {PRESENT} or {PRESENT})]
+        self.links += [CausalLink(one, condition, user) for one in sorted(providers - {PRESENT} or {PRESENT})]
         for ground in found:
             self._rely(user, ground)
 
@@ -193,13 +190,13 @@ class CausalTrace:
             if provider:
                 self.earlier[user] |= 1 << provider
         if isinstance(ground, Literal):
-            self._record(ground.fact).users[ground.positive] |= 1 << user
+            self._facts[ground.fact].users[ground.positive] |= 1 << user
         else:
             self._numbers[ground].users |= 1 << user
 
     def _make(self, number: int, makes: Iterable[Literal]) -> None:
         """Order the step after users and makers of the opposite; a fact both deleted and added is true at the end."""
-        records = [(self._record(literal.fact), literal.positive) for literal in makes]
+        records = [(self._facts[literal.fact], literal.positive) for literal in makes]
         own = 1 << number
         for record, positive in records:
             self.earlier[number] |= record.users[not positive] | record.makers[not positive]
@@ -224,7 +221,7 @@ class CausalTrace:
 
     def _providers(self, ground: Ground) -> tuple[int, ...]:
         if isinstance(ground, Literal):
-            return (self._record(ground.fact).since[ground.positive],)
+            return (self._facts[ground.fact].since[ground.positive],)
         known = self._numbers[ground]
         return tuple(_numbers(known.adders | known.assigners)) or (PRESENT,)
 
@@ -239,7 +236,6 @@ class CausalTrace:
         return max((provider for ground in found for provider in self._providers(ground)), default=PRESENT)
 
 
-@dataclass(slots=True)
 class _Record:
     """The history of a fact; index 0 of each list is about its falsehood, index 1 about its truth.
 
@@ -250,10 +246,25 @@ class _Record:
         users: the steps that rely on it, as bits.
     """
 
-    holds: bool
-    since: list[int] = field(default_factory=lambda: [PRESENT, PRESENT])
-    makers: list[int] = field(default_factory=lambda: [0, 0])
-    users: list[int] = field(default_factory=lambda: [0, 0])
+    __slots__ = ("holds", "makers", "since", "users")
+
+    def __init__(self, *, holds: bool) -> None:
+        self.holds = holds
+        self.since = [PRESENT, PRESENT]
+        self.makers = [0, 0]
+        self.users = [0, 0]
+
+
+class _Records(dict[Fact, _Record]):
+    """The record of each fact, made on first access."""
+
+    def __init__(self, world: World) -> None:
+        super().__init__()
+        self._world = world
+
+    def __missing__(self, fact: Fact) -> _Record:
+        made = self[fact] = _Record(holds=self._world.holds(fact.predicate, fact.args))
+        return made
 
 
 @dataclass(slots=True)
@@ -279,30 +290,57 @@ class _Known:
         needs: its conditions; with the literal if the condition is one.
         makes: the literals that it makes true; `None` if they depend on the world.
         changes: the truth values of their facts afterwards.
+        plain: whether all needs are literals, and no change depends on the world.
     """
 
     needs: tuple[tuple[Expression, Literal | None], ...]
     makes: tuple[Literal, ...] | None
     changes: dict[Fact, bool]
+    plain: bool
 
     @staticmethod
-    def of(step: GroundStep, action: PlanningAction, schema: Vocabulary) -> _Known:
+    def of(ground: GroundStep, step: PlanStep, action: PlanningAction, schema: Vocabulary) -> _Known:
         """Return the cached needs and changes: a new plan shares most steps with the last."""
-        return _known.find(step, schema) or _known.keep(step, schema, _Known._of(step, action, schema))
+        return _known.find(ground, schema) or _known.keep(ground, schema, _Known._of(ground, step, action, schema))
 
     @staticmethod
-    def _of(step: GroundStep, action: PlanningAction, schema: Vocabulary) -> _Known:
-        parts = dict.fromkeys(_flat(step.condition))
-        needs = tuple([(part, _literal(part, schema)) for part in parts])
-        if not _always_the_same(action, schema):
-            return _Known(needs, None, {})
-        leaves = [leaf for leaf in effect_parts(step.effect) if isinstance(leaf, Add | Delete)]
-        makes = dict.fromkeys([Literal(_fact(leaf.atom), isinstance(leaf, Add)) for leaf in leaves])
-        deleted = {one.fact: False for one in makes if not one.positive}
-        return _Known(needs, tuple(makes), {**deleted, **{one.fact: True for one in makes if one.positive}})
+    def _of(ground: GroundStep, step: PlanStep, action: PlanningAction, schema: Vocabulary) -> _Known:
+        needs = tuple([(part, _literal(part, schema)) for part in dict.fromkeys(conjuncts_of(ground.condition))])
+        pattern = _patterns.find(action, schema) or _patterns.keep(action, schema, _Pattern.of(action, schema))
+        if pattern.changes is None:
+            return _Known(needs, None, {}, plain=False)
+        args = dict(zip([p.name for p in action.parameters], step.args, strict=True))
+        made = {False: dict[Fact, bool](), True: dict[Fact, bool]()}
+        for predicate, names, adds in pattern.changes:
+            made[adds][Fact(predicate, tuple([args[name] for name in names]))] = adds
+        makes = tuple([Literal(fact, positive) for positive, facts in made.items() for fact in facts])
+        plain = None not in [literal for _, literal in needs]
+        return _Known(needs, makes, {**made[False], **made[True]}, plain)
+
+
+@dataclass(frozen=True, slots=True)
+class _Pattern:
+    """The predicates, parameters and truth values that an action changes; `None` if they depend on the world."""
+
+    changes: tuple[tuple[str, tuple[str, ...], bool], ...] | None
+
+    @staticmethod
+    def of(action: PlanningAction, schema: Vocabulary) -> _Pattern:
+        """Return the changes of an action that only adds and deletes facts, unconditionally, with valid types."""
+        types = {parameter.name: parameter.types for parameter in action.parameters}
+        changes = []
+        for part in effect_parts(action.effect) if action.timed is None else ():
+            if isinstance(part, AllOf):
+                continue
+            if not isinstance(part, Add | Delete) or not _may_be_told(part.atom, types, schema):
+                return _Pattern(None)
+            names = tuple([term.name for term in part.atom.args if isinstance(term, Variable)])
+            changes.append((part.atom.predicate, names, isinstance(part, Add)))
+        return _Pattern(tuple(changes) if action.timed is None else None)
 
 
 _known: IdentityCache[GroundStep, _Known] = IdentityCache(size=1024)
+_patterns: IdentityCache[PlanningAction, _Pattern] = IdentityCache(size=256)
 
 
 def _doing(action: PlanningAction, step: PlanStep, effect: Effect, domain: PlanningDomain, world: World) -> Changes:
@@ -313,36 +351,13 @@ def _doing(action: PlanningAction, step: PlanStep, effect: Effect, domain: Plann
     return changes(end, world, after=start)
 
 
-def _flat(e: Expression) -> Iterator[Expression]:
-    if isinstance(e, And):
-        for part in e.parts:
-            yield from _flat(part)
-    else:
-        yield e
-
-
 def _literal(e: Expression, schema: Vocabulary) -> Literal | None:
+    """Return the condition as a literal, or `None` if it is none."""
     atom = e.body if isinstance(e, Not) else e
-    if isinstance(atom, Atom) and atom.predicate in schema.predicates and _is_ground(atom):
-        return Literal(_fact(atom), atom is e)
-    return None
-
-
-def _is_ground(atom: Atom) -> bool:
-    return all(isinstance(term, Constant) for term in atom.args)
-
-
-def _fact(atom: Atom) -> Fact:
-    return Fact(atom.predicate, tuple([term.value for term in atom.args if isinstance(term, Constant)]))
-
-
-def _always_the_same(action: PlanningAction, schema: Vocabulary) -> bool:
-    """Return whether the action only adds and deletes facts, unconditionally, with valid types for all arguments."""
-    types = {parameter.name: parameter.types for parameter in action.parameters}
-    return action.timed is None and all(
-        isinstance(part, AllOf) or (isinstance(part, Add | Delete) and _may_be_told(part.atom, types, schema))
-        for part in effect_parts(action.effect)
-    )
+    if not isinstance(atom, Atom) or atom.predicate not in schema.predicates:
+        return None
+    values = tuple([term.value for term in atom.args if isinstance(term, Constant)])
+    return Literal(Fact(atom.predicate, values), atom is e) if len(values) == len(atom.args) else None
 
 
 def _may_be_told(atom: Atom, types: dict[str, tuple[str, ...]], schema: Vocabulary) -> bool:

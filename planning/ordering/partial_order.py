@@ -68,7 +68,7 @@ class PartialOrder:
         """Step -> all steps that end before it begins, in order (the transitive closure)."""
         found: dict[int, frozenset[int]] = {}
         for number, direct in self.waits_for.items():
-            found[number] = frozenset(direct).union(*(found[one] for one in direct))
+            found[number] = frozenset(direct).union(*[found[one] for one in direct])
         return found
 
     def restricted(self, pairs: Iterable[tuple[int, int]]) -> PartialOrder:

@@ -13,7 +13,7 @@ The steps, in order:
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from knowledge_base.facts import Fact
@@ -33,7 +33,7 @@ from planning.problem.grounding import Variant
 from planning.problem.operators import OperatorCache, ignored, metric_of, numbered, things_of
 from planning.problem.reduction import pruned, spared
 from planning.problem.relaxed_reachability import reachable
-from planning.problem.relevance import Relevant, refuse_unforeseeable, relevant
+from planning.problem.relevance import Relevant, refuse_unsupported, relevant
 from planning.problem.task import Assembly, Numbering, OperatorIndex, Task
 from planning.problem.temporal import build_temporal_problem, durative
 from planning.quantities import NumericBound
@@ -88,12 +88,14 @@ class GroundedProblem:
 
     Attributes:
         relevant: the relevant actions, predicates and functions.
+        things: all objects with their types.
         wanted: the residual of the goal; `False` if it can never hold.
         task: the ground problem; `None` if the goal can never hold.
         assembly: makes a `Problem` from the task.
     """
 
     relevant: Relevant
+    things: Mapping[str, str]
     wanted: Residual
     task: Task | None = None
     assembly: Assembly | None = None
@@ -149,7 +151,7 @@ class ProblemBuilder:
             if missing:
                 return self._nothing(*dict.fromkeys(missing))
             task, notes = _priced(pruned(grounded.task, reach.taken), amount)
-            return self._sliced(task, grounded.assembly, world, notes)
+            return self._sliced(task, grounded.assembly, world, grounded.things, notes)
 
     def grounded(
         self, world: World, goal: Expression, metric: Term | None = None, patience: WorkLimit | None = None
@@ -167,9 +169,8 @@ class ProblemBuilder:
         """
         goal = self._derivation.expand(goal)
         matters = self._relevant(goal, metric)
-        self._derivation.require_supported(goal, matters.actions)
-        refuse_unforeseeable(goal, matters.actions, self._domain)
-        patience = patience or WorkLimit()
+        refuse_unsupported(goal, matters.actions, self._derivation)
+        patience, things = patience or WorkLimit(), things_of(world)
         patience.doing = "grounding the goal"
         grounder = Grounder(world, matters.changing, keep_false=True, patience=patience)
         try:
@@ -177,13 +178,13 @@ class ProblemBuilder:
         except UnsupportedActionError as error:
             raise UnsupportedGoalError(error.message, place=error.place) from None
         if wanted is False:
-            return GroundedProblem(matters, wanted)
-        groundwork, assembly = self._prepared(matters, metric, world, patience)
+            return GroundedProblem(matters, things, wanted)
+        groundwork, assembly = self._prepared(matters, metric, world, things, patience)
         numbering = groundwork.numbering
         ways, goal_numbers = _with_conjunctive_goal(groundwork.ways, wanted, numbering)
-        init = (numbering.present(world) - {numbering.of(_ACTING.negated)}) | {numbering.of(_ACTING)}
-        task = Task(numbering, init, goal_numbers, ways)
-        return GroundedProblem(matters, wanted, task, assembly)
+        acting = numbering.of(_ACTING)
+        init = (numbering.present(world) - {acting ^ 1}) | {acting}
+        return GroundedProblem(matters, things, wanted, Task(numbering, init, goal_numbers, ways), assembly)
 
     def _relevant(self, goal: Expression, metric: Term | None) -> Relevant:
         """Return the relevant part of the domain, cached by the predicates and functions of the goal."""
@@ -195,23 +196,25 @@ class ProblemBuilder:
         return self._matters[key]
 
     def _prepared(
-        self, matters: Relevant, metric: Term | None, world: World, patience: WorkLimit
+        self, matters: Relevant, metric: Term | None, world: World, things: Mapping[str, str], patience: WorkLimit
     ) -> tuple[OperatorCache, Assembly]:
         """Return the cached ground actions if they are valid for this world, else new ones."""
         key = (tuple(action.name for action in matters.actions), matters.changing, metric)
         known = self._kept.pop(key, None)  # removed while in use, so that an error leaves no partial entry
-        if known is None or not known[0].serves(world):
-            groundwork = OperatorCache(matters, metric, world)
+        if known is None or not known[0].serves(world, things):
+            groundwork = OperatorCache(matters, metric, world, things)
             known = groundwork, Assembly(groundwork.numbering)
-        known[0].extend(world, patience)
+        known[0].extend(world, things, patience)
         while len(self._kept) >= _MOST_KEPT:
             del self._kept[next(iter(self._kept))]
         self._kept[key] = known
         return known
 
-    def _sliced(self, task: Task, assembly: Assembly, world: World, notes: tuple[str, ...]) -> Problem:
+    def _sliced(
+        self, task: Task, assembly: Assembly, world: World, things: Mapping[str, str], notes: tuple[str, ...]
+    ) -> Problem:
         """Return the problem without objects that others can replace; their actions return with `unsliced`."""
-        left, gone, things = task.left or {}, spared(task), things_of(world)
+        left, gone = task.left or {}, spared(task)
 
         def problem(task: Task, world: World | None) -> Problem:
             return assembly.problem(self._domain.name, task, things, world, notes)

@@ -16,27 +16,21 @@ from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, Fact, Value
 from knowledge_base.language.evaluation.evaluator import query
 from knowledge_base.language.evaluation.world import World
-from knowledge_base.language.syntax.effect import effect_conditions
 from knowledge_base.language.syntax.expression import (
     And,
     Atom,
     Comparison,
     Constant,
-    Exists,
     Expression,
-    Forall,
-    Imply,
-    Not,
     Or,
     Term,
     Variable,
-    parts_of,
+    substitute,
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.world.overlay import Overlay
-from planning.domain import Axiom, PlanningAction, PlanningDomain
-from planning.problem.expressions import changed, denied, instantiated, names_of, rewritten, type_test
-from planning.strips import UnsupportedActionError, UnsupportedGoalError
+from planning.domain import Axiom, PlanningDomain
+from planning.problem.expressions import changed, denied, names_of, rewritten, type_test, with_atoms
 
 _AXIOMS = "planners with axioms of their own, such as Fast Downward run by itself"
 
@@ -56,6 +50,7 @@ class Derivation:
     Attributes:
         original: the domain as its author wrote it.
         domain: the domain with derived predicates replaced by their conditions where possible.
+        changing: the predicates and functions that actions change.
         unsupported: the recursive predicates that actions affect, each with the inputs that actions change.
     """
 
@@ -69,9 +64,9 @@ class Derivation:
         self._circles = [circle for circle in _strata(graph) if _is_circle(circle, graph)]
         self._recursive = frozenset().union(*self._circles)
         self._schema = domain.schema
-        self._changing = frozenset[str]().union(*(changed(action.effect) for action in domain.actions.values()))
+        self.changing = frozenset[str]().union(*(changed(action.effect) for action in domain.actions.values()))
         reached = {name: {name, *nx.descendants(graph, name)} for name in self._recursive}
-        affected = {name: self._changing & follows for name, follows in reached.items()}
+        affected = {name: self.changing & follows for name, follows in reached.items()}
         self.unsupported = {name: causes for name, causes in affected.items() if causes}
         if domain.axioms:
             actions = {name: rewritten(action, self.expand) for name, action in domain.actions.items()}
@@ -86,18 +81,13 @@ class Derivation:
         return self._expanded.find(e, None) or self._expanded.keep(e, None, self._expand(e))
 
     def _expand(self, e: Expression) -> Expression:
-        match e:
-            case Atom(name) if name in self._axioms and name not in self._recursive:
-                cases = tuple(self._expand(self._instance(axiom, e)) for axiom in self._axioms[name])
-                return cases[0] if len(cases) == 1 else Or(cases)
-            case Not(body) | Exists(_, body) | Forall(_, body):
-                return replace(e, body=self._expand(body))
-            case And(parts) | Or(parts):
-                return replace(e, parts=tuple(map(self._expand, parts)))
-            case Imply(premise, conclusion):
-                return Imply(self._expand(premise), self._expand(conclusion), place=e.place)
-            case _:
-                return e
+        return with_atoms(e, self._cases)
+
+    def _cases(self, atom: Atom) -> Expression:
+        if atom.predicate not in self._axioms or atom.predicate in self._recursive:
+            return atom
+        cases = tuple(self._expand(self._instance(axiom, atom)) for axiom in self._axioms[atom.predicate])
+        return cases[0] if len(cases) == 1 else Or(cases)
 
     def world(self, world: World) -> World:
         """Return the world with the facts of those recursive predicates that no action affects."""
@@ -129,7 +119,7 @@ class Derivation:
 
     def may_change(self, e: Expression) -> bool:
         """Return whether some action may make the expanded condition true or false; `False` is certain."""
-        changing = self._changing.union(self._schema.computed, self.unsupported)
+        changing = self.changing.union(self._schema.computed, self.unsupported)
         fixed = self._schema.predicates.keys() - changing
         return not all(name in fixed or self._schema.is_type(name, 1) for name in names_of(e))
 
@@ -138,21 +128,6 @@ class Derivation:
         """Whether a derived predicate is recursive, so that its replacement depends on the world."""
         return bool(self._recursive)
 
-    def require_supported(self, goal: Expression, actions: Iterable[PlanningAction]) -> None:
-        """Raise an error if the expanded goal or actions contain a predicate without support.
-
-        Raises:
-            UnsupportedGoalError, UnsupportedActionError: with the predicate, the reason and the place.
-        """
-        for atom in self._unsupported_in(goal):
-            raise UnsupportedGoalError(f"the goal asks for {self.why(atom.predicate)}", place=atom.place)
-        for action in actions:
-            for condition in (action.precondition, *effect_conditions(action.effect)):
-                for atom in self._unsupported_in(condition):
-                    raise UnsupportedActionError(
-                        f"the planning action '{action.name}' asks for {self.why(atom.predicate)}", place=atom.place
-                    )
-
     def why(self, name: str) -> str:
         """Return why a predicate has no support, and the planners that have it."""
         changing = ", ".join(f"'{one}'" for one in sorted(self.unsupported[name]))
@@ -160,12 +135,6 @@ class Derivation:
             f"'{name}', a derived predicate that follows from itself (at {self._axioms[name][0].place}) and from what"
             f" planning actions change ({changing}); what can do it: {_AXIOMS}"
         )
-
-    def _unsupported_in(self, e: Expression | Term) -> Iterator[Atom]:
-        if isinstance(e, Atom) and e.predicate in self.unsupported:
-            yield e
-        for part in parts_of(e):
-            yield from self._unsupported_in(part)
 
     def _dependencies(self, axioms: Iterable[Axiom]) -> nx.DiGraph[str]:
         """Return the graph from each predicate to its inputs, derived or not."""
@@ -192,7 +161,7 @@ class Derivation:
             if own.types != wide.types
         )
         terms = dict(zip((p.name for p in axiom.parameters), atom.args, strict=True))
-        condition = instantiated(axiom.condition, terms)
+        condition = substitute(axiom.condition, terms)
         return And((*tests, condition)) if tests else condition
 
     def _consequences(self, circle: Iterable[str], world: World) -> Iterator[Fact]:
@@ -233,18 +202,13 @@ class Settled:
         return self._replaced(expanded) if self.predicates else expanded
 
     def _replaced(self, e: Expression) -> Expression:
-        match e:
-            case Atom(name, args) if name in self.predicates:
-                known = sorted((one.args for one in self.facts if one.predicate == name), key=str)
-                return Or(tuple(And(tuple(map(_equal, args, values))) for values in known), place=e.place)
-            case Not(body) | Exists(_, body) | Forall(_, body):
-                return replace(e, body=self._replaced(body))
-            case And(parts) | Or(parts):
-                return replace(e, parts=tuple(map(self._replaced, parts)))
-            case Imply(premise, conclusion):
-                return Imply(self._replaced(premise), self._replaced(conclusion), place=e.place)
-            case _:
-                return e
+        return with_atoms(e, self._listed)
+
+    def _listed(self, atom: Atom) -> Expression:
+        if atom.predicate not in self.predicates:
+            return atom
+        known = sorted((one.args for one in self.facts if one.predicate == atom.predicate), key=str)
+        return Or(tuple(And(tuple(map(_equal, atom.args, values))) for values in known), place=atom.place)
 
 
 def _equal(term: Term, value: Value) -> Expression:

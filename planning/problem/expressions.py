@@ -1,65 +1,65 @@
-"""Expressions of a domain: the names they read and change, and substitution in them."""
+"""Expressions of a domain: the names they read and change, and replacement of conditions in them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES
-from knowledge_base.language.syntax.effect import (
-    Add,
-    AllOf,
-    Delete,
-    Effect,
-    ForEach,
-    NumericEffect,
-    When,
-    effect_leaves,
-)
-from knowledge_base.language.syntax.expression import (
-    And,
-    Arithmetic,
-    Atom,
-    Call,
-    Comparison,
-    Constant,
-    Exists,
-    Expression,
-    Forall,
-    Imply,
-    Not,
-    Or,
-    Term,
-    TypedVariable,
-    Variable,
-    free_variables,
-    parts_of,
-)
+from knowledge_base.language.syntax import effect as eff
+from knowledge_base.language.syntax import expression as ex
+from knowledge_base.language.syntax.expression import Atom, Expression, Term
 from planning.domain import PlanningAction
 
 
-def names_of(e: Expression | Term) -> Iterator[str]:
-    """Yield the predicates, types and functions in an expression."""
+def inside(e: Expression | Term) -> list[Expression | Term]:
+    """Return the expression with all expressions and terms in it, in the order of the text."""
+    found: list[Expression | Term] = []
     agenda = [e]
     while agenda:
         one = agenda.pop()
-        if isinstance(one, Constant | Variable):
-            continue
-        if isinstance(one, Atom):
-            yield one.predicate
-        elif isinstance(one, Call):
-            yield one.function
-        agenda.extend(reversed(parts_of(one)))
+        found.append(one)
+        if not isinstance(one, ex.Constant | ex.Variable):
+            agenda.extend(reversed(ex.parts_of(one)))
+    return found
 
 
-def name_of(leaf: Add | Delete | NumericEffect) -> str:
+def names_of(e: Expression | Term) -> list[str]:
+    """Return the predicates, types and functions in an expression; repeated ones again."""
+    return [name for one in inside(e) if (name := name_in(one)) is not None]
+
+
+def name_in(e: Expression | Term) -> str | None:
+    """Return the expression's own predicate or function, or `None`."""
+    return e.function if isinstance(e, ex.Call) else e.predicate if isinstance(e, Atom) else None
+
+
+def conjuncts_of(e: Expression) -> list[Expression]:
+    """Return the parts of a conjunction, nested ones included; a condition of another form is its own only part."""
+    found: list[Expression] = []
+    agenda = [e]
+    while agenda:
+        one = agenda.pop()
+        if isinstance(one, ex.And):
+            agenda.extend(reversed(one.parts))
+        else:
+            found.append(one)
+    return found
+
+
+def conditions_of(action: PlanningAction) -> tuple[Expression, ...]:
+    """Return the precondition and the conditions of conditional effects."""
+    return (action.precondition, *eff.effect_conditions(action.effect))
+
+
+def name_of(leaf: eff.Add | eff.Delete | eff.NumericEffect) -> str:
     """Return the predicate or function of a change."""
-    return leaf.call.function if isinstance(leaf, NumericEffect) else leaf.atom.predicate
+    return leaf.call.function if isinstance(leaf, eff.NumericEffect) else leaf.atom.predicate
 
 
-def changed(effect: Effect) -> frozenset[str]:
+def changed(effect: eff.Effect) -> frozenset[str]:
     """Return the predicates and functions that an effect changes."""
-    return frozenset(map(name_of, effect_leaves(effect)))
+    return frozenset(map(name_of, eff.effect_leaves(effect)))
 
 
 def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
@@ -67,14 +67,29 @@ def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
     match e:
         case Atom():
             yield from () if wanted else (e,)
-        case Not(body):
+        case ex.Not(body):
             yield from denied(body, wanted=not wanted)
-        case Imply(premise, conclusion):
+        case ex.Imply(premise, conclusion):
             yield from denied(premise, wanted=not wanted)
             yield from denied(conclusion, wanted=wanted)
         case _:
-            for part in parts_of(e):
+            for part in ex.parts_of(e):
                 yield from denied(part, wanted=wanted)
+
+
+def with_atoms(e: Expression, instead: Callable[[Atom], Expression]) -> Expression:
+    """Return the condition with each of its atoms replaced."""
+    match e:
+        case Atom():
+            return instead(e)
+        case ex.Not(body) | ex.Exists(_, body) | ex.Forall(_, body):
+            return replace(e, body=with_atoms(body, instead))
+        case ex.And(parts) | ex.Or(parts):
+            return replace(e, parts=tuple(with_atoms(part, instead) for part in parts))
+        case ex.Imply(premise, conclusion):
+            return replace(e, premise=with_atoms(premise, instead), conclusion=with_atoms(conclusion, instead))
+        case ex.Comparison():
+            return e
 
 
 def rewritten(action: PlanningAction, rewrite: Callable[[Expression], Expression]) -> PlanningAction:
@@ -91,63 +106,19 @@ def rewritten(action: PlanningAction, rewrite: Callable[[Expression], Expression
     return replace(action, precondition=rewrite(action.precondition), effect=effect, timed=timed)
 
 
-def _rewritten(effect: Effect, rewrite: Callable[[Expression], Expression]) -> Effect:
+def _rewritten(effect: eff.Effect, rewrite: Callable[[Expression], Expression]) -> eff.Effect:
     match effect:
-        case AllOf(parts):
+        case eff.AllOf(parts):
             return replace(effect, parts=tuple(_rewritten(part, rewrite) for part in parts))
-        case ForEach(_, body):
+        case eff.ForEach(_, body):
             return replace(effect, effect=_rewritten(body, rewrite))
-        case When(condition, body):
+        case eff.When(condition, body):
             return replace(effect, condition=rewrite(condition), effect=_rewritten(body, rewrite))
         case _:
             return effect
 
 
-def type_test(parameter: TypedVariable, term: Term) -> Expression:
+def type_test(parameter: ex.TypedVariable, term: Term) -> Expression:
     """Return the test that a term is of the parameter's type; values are checked where they are written."""
     types = [one for one in parameter.types or (ROOT_TYPE,) if one not in VALUE_TYPES]
-    return Or(tuple(Atom(one, (term,)) for one in types)) if types else And(())
-
-
-def instantiated(e: Expression, terms: Mapping[str, Term]) -> Expression:
-    """Return the condition with terms for its free variables; bound variables are renamed where they would clash."""
-    match e:
-        case Atom(_, args):
-            return replace(e, args=_all(args, terms))
-        case Not(body):
-            return replace(e, body=instantiated(body, terms))
-        case And(parts) | Or(parts):
-            return replace(e, parts=tuple(instantiated(part, terms) for part in parts))
-        case Imply(premise, conclusion):
-            return Imply(instantiated(premise, terms), instantiated(conclusion, terms), place=e.place)
-        case Comparison(operator, left, right):
-            return Comparison(operator, _term(left, terms), _term(right, terms), place=e.place)
-        case Exists(variables, body) | Forall(variables, body):
-            renamed = _renamed(variables, terms)
-            inner = {**terms, **{old.name: Variable(new.name) for old, new in zip(variables, renamed, strict=True)}}
-            return replace(e, variables=renamed, body=instantiated(body, inner))
-
-
-def _renamed(variables: tuple[TypedVariable, ...], terms: Mapping[str, Term]) -> tuple[TypedVariable, ...]:
-    taken = frozenset().union(*map(free_variables, terms.values()))
-
-    def fresh(name: str) -> str:
-        while name in taken:
-            name += "'"
-        return name
-
-    return tuple(replace(variable, name=fresh(variable.name)) for variable in variables)
-
-
-def _all(args: tuple[Term, ...], terms: Mapping[str, Term]) -> tuple[Term, ...]:
-    return tuple(_term(arg, terms) for arg in args)
-
-
-def _term(term: Term, terms: Mapping[str, Term]) -> Term:
-    match term:
-        case Variable(name):
-            return terms.get(name, term)
-        case Call(_, args) | Arithmetic(_, args):
-            return replace(term, args=_all(args, terms))
-        case _:
-            return term
+    return ex.Or(tuple(Atom(one, (term,)) for one in types)) if types else ex.TRUE

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.checking.vocabulary import Vocabulary
-from knowledge_base.language.syntax.expression import And, Atom, Constant, Expression, Variable
+from knowledge_base.language.syntax.expression import Atom, Constant, Variable
 from planning.cancellable_work import WorkLimit
 from planning.domain import PlanningAction
 from planning.plan import PlanStep
@@ -23,6 +23,7 @@ from planning.problem.conditions import (
     every,
     negation,
 )
+from planning.problem.expressions import conjuncts_of
 from planning.quantities import Assignment, combined, fluents
 from planning.strips import UnsupportedActionError
 
@@ -171,19 +172,17 @@ class JoinRule:
         action: the planning action.
         atoms: the positive conjuncts of its precondition.
         allowed: the objects that each parameter may take.
-        patience: the limit of the work; each fact tried counts.
     """
 
     action: PlanningAction
     atoms: tuple[Atom, ...]
     allowed: Mapping[str, Mapping[str, None]]
-    patience: WorkLimit
 
     @staticmethod
     def of(action: PlanningAction, grounder: Grounder) -> JoinRule:
         """Return the rule for an action."""
         atoms = joined_atoms(action, grounder.world.schema)
-        return JoinRule(action, atoms, {p.name: grounder.objects(p) for p in action.parameters}, grounder.patience)
+        return JoinRule(action, atoms, {p.name: grounder.objects(p) for p in action.parameters})
 
     def unify(self, atom: Atom, fact: Fact, bindings: Mapping[str, Value]) -> dict[str, Value] | None:
         """Return the bindings extended so that the atom is the fact, or `None`."""
@@ -199,33 +198,31 @@ class JoinRule:
         return extended
 
     def join(
-        self, reached: ReachedFacts, atoms: tuple[Atom, ...], bindings: dict[str, Value]
+        self, reached: ReachedFacts, atoms: tuple[Atom, ...], bindings: dict[str, Value], patience: WorkLimit
     ) -> Iterator[dict[str, Value]]:
-        """Yield all bindings under which the atoms are reached; the join starts with the most selective atom."""
+        """Yield all bindings under which the atoms are reached; the join starts with the most selective atom.
+
+        Raises:
+            WorkLimitError: the limit is reached; each fact tried counts.
+        """
         if not atoms:
             yield bindings
             return
         found = [reached.candidates(atom, bindings) for atom in atoms]
         best = min(range(len(atoms)), key=lambda i: len(found[i]))
         for fact in found[best]:
-            self.patience.spend()
+            patience.spend()
             extended = self.unify(atoms[best], fact, bindings)
             if extended is not None:
-                yield from self.join(reached, atoms[:best] + atoms[best + 1 :], extended)
+                yield from self.join(reached, atoms[:best] + atoms[best + 1 :], extended, patience)
 
 
 def joined_atoms(action: PlanningAction, schema: Vocabulary) -> tuple[Atom, ...]:
     """Return the positive conjuncts of an action's precondition that a join can bind."""
     return tuple(
         atom
-        for atom in _conjuncts(action.precondition)
-        if atom.predicate in schema.predicates and all(isinstance(t, Variable | Constant) for t in atom.args)
+        for atom in conjuncts_of(action.precondition)
+        if isinstance(atom, Atom)
+        and atom.predicate in schema.predicates
+        and all(isinstance(t, Variable | Constant) for t in atom.args)
     )
-
-
-def _conjuncts(e: Expression) -> Iterator[Atom]:
-    if isinstance(e, And):
-        for part in e.parts:
-            yield from _conjuncts(part)
-    elif isinstance(e, Atom):
-        yield e

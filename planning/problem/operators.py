@@ -39,24 +39,24 @@ class Consulted:
     It has the objects of all worlds so far.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, things: Mapping[str, str]) -> None:
         self._world = world
         self._truths: dict[Fact, bool] = {}
         self._contents: dict[Fact, Content] = {}
-        self.things = things_of(world)
+        self.things = dict(things)
 
-    def agrees(self, world: World) -> bool:
-        """Return whether `world` gives all recorded answers."""
+    def agrees(self, world: World, things: Mapping[str, str]) -> bool:
+        """Return whether `world`, with these objects and their types, gives all recorded answers."""
         return (
-            all(self.things.get(name, own) == own for name, own in things_of(world).items())
+            {**things, **self.things} == {**self.things, **things}  # no object has another type
             and all(world.holds(f.predicate, f.args) is truth for f, truth in self._truths.items())
             and all(world.value(f.predicate, f.args) == number for f, number in self._contents.items())
         )
 
-    def follow(self, world: World) -> bool:
+    def follow(self, world: World, things: Mapping[str, str]) -> bool:
         """Read from `world` from now on; return whether it has new objects."""
         before, self._world = len(self.things), world
-        self.things.update(things_of(world))
+        self.things.update(things)
         return len(self.things) > before
 
     @property
@@ -98,11 +98,12 @@ class OperatorCache:
         relevant: the relevant part of the domain.
         metric: the term to minimize.
         world: the first world it is valid for.
+        things: the objects of this world with their types.
     """
 
-    def __init__(self, relevant: Relevant, metric: Term | None, world: World) -> None:
+    def __init__(self, relevant: Relevant, metric: Term | None, world: World, things: Mapping[str, str]) -> None:
         self.numbering = Numbering()
-        self._world = Consulted(world)
+        self._world = Consulted(world, things)
         self._grounder = Grounder(self._world, relevant.changing)
         self._actions = relevant.actions
         self._over_all = any(_ranges_over_all(action, world.schema) for action in relevant.actions)
@@ -110,32 +111,31 @@ class OperatorCache:
         self._costs = Costs.of(metric, self._grounder)
         self._rules: list[JoinRule] = []
         self._reached = ReachedFacts()
-        self._met: set[Fact] = set()
+        self._met: dict[str, set[tuple[Value, ...]]] = {}  # by predicate
         self._queue: deque[Fact] = deque()
         self._done: set[PlanStep] = set()
         self.ways = OperatorIndex([])
         self._found_so_far = 0
 
-    def serves(self, world: World) -> bool:
+    def serves(self, world: World, things: Mapping[str, str]) -> bool:
         """Return whether the cached operators are also valid for this world."""
-        same = not self._over_all or list(things_of(world)) == list(self._world.things)
-        return same and self._world.agrees(world)
+        same = not self._over_all or list(things) == list(self._world.things)
+        return same and self._world.agrees(world, things)
 
-    def extend(self, world: World, patience: WorkLimit | None = None) -> None:
+    def extend(self, world: World, things: Mapping[str, str], patience: WorkLimit) -> None:
         """Add the operators that only this world makes possible.
 
         Args:
             world: the next world it is valid for.
+            things: the objects of this world with their types.
             patience: the limit of the work; discard the cache after an error.
 
         Raises:
             UnsupportedActionError: see `planning.problem.grounding.variants`.
             WorkLimitError: the limit is reached.
         """
-        patience = patience or WorkLimit()
         self._grounder = replace(self._grounder, patience=patience)
-        self._rules = [replace(rule, patience=patience) for rule in self._rules]
-        found = list(self._found(world, more=self._world.follow(world)))
+        found = list(self._found(world, more=self._world.follow(world, things)))
         if found:
             self.ways = OperatorIndex(sorted([*self.ways.all, *found], key=self._key))
 
@@ -152,22 +152,26 @@ class OperatorCache:
                 triggers.setdefault(atom.predicate, []).append((rule, position))
         for predicate in triggers:
             arity = len(world.schema.predicates[predicate].parameters)
-            for args in world.match(predicate, (None,) * arity):
-                self._meet(Fact(predicate, args))
+            self._meet(predicate, world.match(predicate, (None,) * arity))
         while self._queue:
             fact = self._queue.popleft()
             self._reached.add(fact)
             for rule, position in triggers.get(fact.predicate, ()):
                 self._grounder.patience.doing = f"grounding action '{rule.action.name}'"
                 start = rule.unify(rule.atoms[position], fact, {})
+                if start is None:
+                    continue
                 rest = rule.atoms[:position] + rule.atoms[position + 1 :]
-                for bindings in rule.join(self._reached, rest, start) if start is not None else ():
+                for bindings in rule.join(self._reached, rest, start, self._grounder.patience):
                     yield from self._take(rule, bindings)
 
-    def _meet(self, fact: Fact) -> None:
-        if fact not in self._met:
-            self._met.add(fact)
-            self._queue.append(fact)
+    def _meet(self, predicate: str, facts: Iterable[tuple[Value, ...]]) -> None:
+        """Queue the facts of a predicate that are new."""
+        met = self._met.setdefault(predicate, set())
+        for args in facts:
+            if args not in met:
+                met.add(args)
+                self._queue.append(Fact(predicate, args))
 
     def _take(self, rule: JoinRule, bindings: dict[str, Value]) -> Iterator[GroundOperator]:
         self._grounder.patience.doing = f"grounding action '{rule.action.name}'"
@@ -179,7 +183,7 @@ class OperatorCache:
                 for variant in variants(rule.action, full, self._grounder):
                     for effect in variant.effects:
                         if effect.positive:
-                            self._meet(effect.fact)
+                            self._meet(effect.fact.predicate, [effect.fact.args])
                     yield self._way(variant)
 
     def _way(self, variant: Variant) -> GroundOperator:

@@ -13,13 +13,12 @@ plan therefore proves nothing, and the engine solves the whole problem.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, filterfalse
 
-from knowledge_base.facts import Fact, Value
-from planning.problem.task import GroundOperator, Numbering, OperatorIndex, Task
-from planning.quantities import NumericBound, fluents
+from planning.problem.task import GroundOperator, LazyTable, Numbering, OperatorIndex, Task
+from planning.quantities import fluents
 
 
 def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:
@@ -34,42 +33,33 @@ def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:
     """
     # The next problem differs mostly in its facts; possible operators and deletable facts, the key, stay the same.
     key = (bytes(possible), task.goal, task.settled)
-    kept = task.ways.known("slice" if task.left else "whole", lambda: Restriction(task.ways, task.numbering))
-    contribution = task.ways.known(key, lambda: kept.contribution(task, bytes(possible)))
+    kept = task.ways.known("slice" if task.left else "whole", lambda: _RelevantParts(task.ways, task.numbering))
+    contribution = task.ways.known(key, lambda: _contributing(task, bytearray(possible)))
     settled = task.settled | contribution.lasting.intersection(task.init)
-    asked = frozenset(contribution.wanted) - settled
-    left = kept.of(contribution.positions, asked, settled)
+    left = kept.of(contribution.positions, contribution.wanted - settled, settled)
     goal = tuple([one for one in task.goal if one not in settled])
     present = set(task.init)
-    needed = dict.fromkeys(chain.from_iterable([way.needs for way in left.values()]))
-    init = tuple([one for one in (*needed, *(one for one in goal if one not in needed)) if one in present])
-    return replace(task, init=init, goal=goal, left=left, settled=settled)
+    needed = dict.fromkeys([*chain.from_iterable([way.needs for way in left.values()]), *goal])
+    return replace(task, init=tuple([one for one in needed if one in present]), goal=goal, left=left, settled=settled)
 
 
-class Restriction:
-    """A cache of contributing operators and their relevant parts; the next problem mostly reuses it."""
+class _RelevantParts:
+    """A cache of the relevant parts of operators; the next problem mostly reuses it."""
 
     def __init__(self, ways: OperatorIndex, numbering: Numbering) -> None:
         self._ways, self._numbering = ways, numbering
         self._asked: frozenset[int] = frozenset()
         self._settled: frozenset[int] = frozenset()
         self._left: dict[int, GroundOperator] = {}
-        self._last: _Contribution | None = None
-
-    def contribution(self, task: Task, possible: bytes) -> _Contribution:
-        """Return the contribution to the task's goal by these possible operators."""
-        found = None if self._last is None else _still_contributing(self._last, task, possible)
-        self._last = found or _contributing(task, possible)
-        return self._last
 
     def of(self, positions: Iterable[int], asked: frozenset[int], settled: frozenset[int]) -> dict[int, GroundOperator]:
         """Return by position the relevant parts of the operators that add a literal in `asked`."""
-        if self._left:
+        left = self._left
+        if left:
             for one in (asked ^ self._asked) | (settled ^ self._settled):
                 for i in self._ways.touching.get(one, ()):
-                    self._left.pop(i, None)
+                    left.pop(i, None)
         self._asked, self._settled = asked, settled
-        left = self._left
         for i in positions:
             if i not in left:
                 left[i] = _clean(self._ways.all[i], asked, settled, self._numbering)
@@ -81,30 +71,27 @@ class _Contribution:
     """The literals and operators that contribute to a goal.
 
     Attributes:
-        task, possible: the arguments it was computed for.
-        wanted: the literals and bounds of the goal and of operators' needs. Each has the position of the operator that
-            needs it (-1: the goal); that operator adds an earlier entry.
+        wanted: the literals and bounds of the goal and of contributing operators' needs.
         positions: the operators that add a wanted literal, or change a number of a wanted bound.
         lasting: the wanted literals that stay true once they hold: no operator deletes them or changes their numbers.
     """
 
-    task: Task
-    possible: bytes
-    wanted: Mapping[int, int]
+    wanted: frozenset[int]
     positions: Sequence[int]
     lasting: frozenset[int]
 
 
-def _contributing(task: Task, possible: bytes) -> _Contribution:
+def _contributing(task: Task, open_: bytearray) -> _Contribution:
+    """Return the contribution to the task's goal by the operators that are `open_`, by position."""
     ways, adders, wants, settled = task.ways.all, task.ways.adders, task.numbering.wants, task.settled
-    inputs, open_ = _inputs(ways, task.numbering), bytearray(possible)
-    wanted, agenda = dict.fromkeys(task.goal, -1), list(task.goal)
+    inputs = _inputs(ways, task.numbering)
+    wanted, agenda = set(task.goal), list(task.goal)
     found: list[int] = []
     while agenda:
         here = agenda.pop()
         if wants or inputs:
             fresh = [one for one in (*wants.get(here, ()), *inputs.get(here, ())) if one not in wanted]
-            wanted.update(dict.fromkeys(fresh, -1))
+            wanted.update(fresh)
             agenda += fresh
         for i in adders.get(here, ()):
             if open_[i]:
@@ -112,110 +99,15 @@ def _contributing(task: Task, possible: bytes) -> _Contribution:
                 found.append(i)
                 for need in ways[i].needs:
                     if need not in wanted and need not in settled:
-                        wanted[need] = i
+                        wanted.add(need)
                         agenda.append(need)
-    return _contribution(task, possible, wanted, sorted(found))
-
-
-def _contribution(task: Task, possible: bytes, wanted: Mapping[int, int], found: Sequence[int]) -> _Contribution:
-    ways, wants = task.ways.all, task.numbering.wants
     made = set[int]().union(*[ways[i].deletes for i in found])
     if task.numbering.fluents:
         made.update(one for i in found for one in ways[i].adds if one in task.numbering.fluents)
-    lasting = frozenset(wanted.keys() - made)
+    lasting = frozenset(wanted - made)
     if wants:
         lasting = frozenset([one for one in lasting if made.isdisjoint(wants.get(one, ()))])
-    return _Contribution(task, possible, wanted, found, lasting)
-
-
-def _still_contributing(before: _Contribution, task: Task, possible: bytes) -> _Contribution | None:
-    """Return the contribution after some operators became impossible; `None` if a quick test cannot decide.
-
-    Each literal wanted by an impossible operator needs another operator that wants it.
-    """
-    if task.numbering.fluents or task.goal != before.task.goal or task.ways is not before.task.ways:
-        return None
-    if int.from_bytes(possible) & ~int.from_bytes(before.possible):
-        return None
-    if not _settled_alike(before.task.settled, task, before.wanted, possible):
-        return None
-    left = _Left(before, task, possible)
-    wanted = left.wanted()
-    return None if wanted is None else _contribution(task, possible, wanted, left.positions)
-
-
-def _settled_alike(before: frozenset[int], task: Task, wanted: Container[int], possible: bytes) -> bool:
-    """Return whether newly settled literals were not wanted, and no possible operator needs a no longer settled one."""
-    if any(one in wanted for one in task.settled - before):
-        return False
-    return not any(possible[i] for one in before - task.settled for i in task.ways.users.get(one, ()))
-
-
-class _Left:
-    """The rest of a contribution after some of its operators became impossible."""
-
-    def __init__(self, before: _Contribution, task: Task, possible: bytes) -> None:
-        self._before, self._task = before, task
-        self._useful = bytearray(len(possible))
-        lost = []
-        for i in before.positions:
-            if possible[i]:
-                self._useful[i] = 1
-            else:
-                lost.append(i)
-        self._unwanted = self._dropped(lost)
-
-    @property
-    def positions(self) -> list[int]:
-        """The operators that still contribute."""
-        return [i for i in self._before.positions if self._useful[i]]
-
-    def _dropped(self, lost: list[int]) -> set[int]:
-        """Return the literals no longer wanted: their operators are lost, or add nothing wanted."""
-        ways, goal, dropped, agenda = self._task.ways, set(self._task.goal), set[int](), list(lost)
-        while agenda:
-            for need in ways.all[agenda.pop()].needs:
-                if need in goal or need in dropped or need not in self._before.wanted or self._is_needed(need):
-                    continue
-                dropped.add(need)
-                for i in ways.adders.get(need, ()):
-                    if self._useful[i] and not any(self._is_wanted(one, dropped) for one in self._brought(i)):
-                        self._useful[i] = 0
-                        agenda.append(i)
-        return dropped
-
-    def wanted(self) -> dict[int, int] | None:
-        """Return each wanted literal with a remaining operator; `None` if a quick test finds none for one."""
-        before, useful, unwanted = self._before.wanted, self._useful, self._unwanted
-        orphans = [one for one, i in before.items() if i >= 0 and not useful[i] and one not in unwanted]
-        place = {one: n for n, one in enumerate(before)} if orphans else {}
-        others: dict[int, int] = {}
-        for one in orphans:
-            parent = self._parent(one, place)
-            if parent is None:
-                return None
-            others[one] = parent
-        return {one: others.get(one, i) for one, i in before.items() if one not in unwanted}
-
-    def _parent(self, one: int, place: Mapping[int, int]) -> int | None:
-        """Return an operator that needs the literal and adds one that was wanted before it."""
-        here = place[one]
-        for i in self._task.ways.users.get(one, ()):
-            if self._useful[i]:
-                brought = (add for add in self._brought(i) if add not in self._unwanted)
-                if any(place.get(add, here) < here for add in brought):
-                    return i
-        return None
-
-    def _is_needed(self, one: int) -> bool:
-        return any(self._useful[i] for i in self._task.ways.users.get(one, ()))
-
-    def _is_wanted(self, one: int, dropped: Container[int]) -> bool:
-        return one in self._before.wanted and one not in dropped
-
-    def _brought(self, i: int) -> Iterator[int]:
-        way = self._task.ways.all[i]
-        return (one for one in way.adds if one not in way.needs)
+    return _Contribution(frozenset(wanted), sorted(found), lasting)
 
 
 def _inputs(ways: Iterable[GroundOperator], numbering: Numbering) -> Mapping[int, Iterable[int]]:
@@ -228,12 +120,12 @@ def _inputs(ways: Iterable[GroundOperator], numbering: Numbering) -> Mapping[int
 
 
 def _clean(way: GroundOperator, asked: frozenset[int], settled: frozenset[int], numbering: Numbering) -> GroundOperator:
-    needs = tuple([one for one in way.needs if one not in settled])
+    needs = tuple(filterfalse(settled.__contains__, way.needs))
     return GroundOperator(
         way.step,
         needs,
-        tuple([one for one in way.adds if one in asked and one not in needs]),
-        tuple([one for one in way.deletes if one in asked]),
+        tuple(filterfalse(needs.__contains__, filter(asked.__contains__, way.adds))),
+        tuple(filter(asked.__contains__, way.deletes)),
         tuple([a for a in way.assignments if numbering.fluent(a.fluent) in asked]) if way.assignments else (),
         way.cost,
         way.number,
@@ -242,27 +134,39 @@ def _clean(way: GroundOperator, asked: frozenset[int], settled: frozenset[int], 
 
 def spared(task: Task) -> list[int]:
     """Return the positions of the operators that are redundant, since each mentions a replaceable object."""
-    left = task.left or {}
-    settled = frozenset(map(str, _settled(task, left)))
-    mentions = _mentions(task, left, settled)
+    left, naming = task.left or {}, task.ways.naming
+    mentions = _mentions(task, left, _settled(task, left))
     if not mentions:
         return []
-    naming = task.ways.naming
-    stand_ins = [name for name in naming if name not in mentions and any(i in left for i in naming[name])]
-    before: dict[str, _Exchange] = task.ways.known("exchanges", dict)
+    stand_ins = [name for name in naming if name not in mentions and not left.keys().isdisjoint(naming[name])]
+    exchanges: dict[tuple[str, str], _Exchange] = task.ways.known("exchanges", dict)
+    last: dict[str, str] = task.ways.known("replaced", dict)
     gone: set[int] = set()
     for name, listed in mentions.items():
         # The same object mostly replaces it again.
-        known = [before[name]] if name in before and before[name].other in stand_ins else []
-        exchanges = chain(known, (_Exchange(name, other, task) for other in stand_ins))
-        exchange = next((one for one in exchanges if one.covers(listed, left)), None)
-        if exchange is not None:
-            before[name] = exchange
-            gone.update(listed)
+        for other in [last[name], *stand_ins] if last.get(name) in stand_ins else stand_ins:
+            exchange = exchanges.get((name, other))
+            if exchange is None:
+                exchange = exchanges[name, other] = _Exchange(name, other, task)
+            if exchange.covers(listed, left):
+                last[name] = other
+                gone.update(listed)
+                break
     return sorted(gone)
 
 
-def _mentions(task: Task, left: Mapping[int, GroundOperator], settled: frozenset[str]) -> Mapping[str, Sequence[int]]:
+def _settled(task: Task, left: Mapping[int, GroundOperator]) -> set[str]:
+    """Return the objects that must stay."""
+    objects, bounds = task.numbering.objects, task.numbering.bounds
+    settled = set[str]().union(*map(objects.__getitem__, (*task.init, *task.goal)))
+    for way in left.values() if task.numbering.fluents else ():
+        for one in way.assignments:
+            settled.update(str(arg) for fluent in (one.fluent, *fluents(one.amount)) for arg in fluent.args)
+        settled.update(*[objects[need] for need in way.needs if need in bounds])
+    return settled
+
+
+def _mentions(task: Task, left: Mapping[int, GroundOperator], settled: set[str]) -> Mapping[str, Sequence[int]]:
     """Return a mapping from each removable object to the operators with it in their step or literals."""
     found: dict[str, dict[int, None]] = {}
     for name, positions in task.ways.naming.items():
@@ -273,52 +177,30 @@ def _mentions(task: Task, left: Mapping[int, GroundOperator], settled: frozenset
         mine = found.get(name, {})
         for one in about[name]:
             for i in task.ways.touching.get(one, ()):
-                if i not in mine and i in left and _touches(left[i], one):
+                way = left.get(i)
+                if i not in mine and way and (one in way.needs or one in way.adds or one in way.deletes):
                     mine[i] = None
         if mine:
             found[name] = mine
     return {name: sorted(positions) for name, positions in sorted(found.items())}
 
 
-def _touches(way: GroundOperator, one: int) -> bool:
-    return one in way.needs or one in way.adds or one in way.deletes
-
-
 def _about(task: Task) -> Mapping[str, Sequence[int]]:
     """Return a mapping from each object to the literals and bounds about it."""
     about: dict[str, list[int]] = {}
     for one in task.ways.touching:
-        for thing in {str(thing) for thing in _things(task.numbering.named(one))}:
+        for thing in task.numbering.objects[one]:
             about.setdefault(thing, []).append(one)
     return about
-
-
-def _settled(task: Task, left: Mapping[int, GroundOperator]) -> Iterator[Value]:
-    """Yield the objects that must stay."""
-    for number in (*task.init, *task.goal):
-        yield from _things(task.numbering.named(number))
-    for way in left.values() if task.numbering.fluents else ():
-        for one in way.assignments:
-            for fluent in (one.fluent, *fluents(one.amount)):
-                yield from fluent.args
-        for need in way.needs:
-            if isinstance(bound := task.numbering.named(need), NumericBound):
-                yield from _things(bound)
-
-
-def _things(one: Fact | NumericBound) -> Iterator[Value]:
-    for fact in (one,) if isinstance(one, Fact) else one.fluents():
-        yield from fact.args
 
 
 class _Exchange:
     """The replacement of `name` by `other`, with the operator that covered each one, for the next problem."""
 
     def __init__(self, name: str, other: str, task: Task) -> None:
-        self.other = other
-        self._name = name
+        self._name, self._other, self._ways = name, other, task.ways
         self._images = task.numbering.images(name, other)
-        self._of_step = task.ways.of_step
+        self._twins: LazyTable[Sequence[int]] = LazyTable(self._of_same_step)
         self._proofs: dict[int, tuple[GroundOperator, int, GroundOperator]] = {}
 
     def covers(self, positions: Iterable[int], left: Mapping[int, GroundOperator]) -> bool:
@@ -332,28 +214,29 @@ class _Exchange:
         return True
 
     def _covers(self, i: int, left: Mapping[int, GroundOperator]) -> bool:
-        way, images = left[i], self._images
-        needs = tuple([images[one] for one in way.needs])
-        adds = tuple([images[one] for one in way.adds])
-        deletes = tuple([images[one] for one in way.deletes])
-        for j, real in self._reals(way, left):
+        way, image = left[i], self._images.__getitem__
+        needs, adds, deletes = set(map(image, way.needs)), set(map(image, way.adds)), set(map(image, way.deletes))
+        for j in self._twins[i]:
+            twin = left.get(j)
             if (
-                (needs == real.needs or set(needs).issuperset(real.needs))
-                and (adds == real.adds or set(adds) <= {*real.adds, *real.needs})
-                and (deletes == real.deletes or set(deletes).issuperset(real.deletes))
-                and set(real.assignments) == set(way.assignments)
-                and (real.cost or 0) <= (way.cost or 0)
+                twin is not None
+                and needs.issuperset(twin.needs)
+                and adds.issubset((*twin.adds, *twin.needs))
+                and deletes.issuperset(twin.deletes)
+                and (twin.assignments == way.assignments or set(twin.assignments) == set(way.assignments))
+                and (twin.cost or 0) <= (way.cost or 0)
             ):
-                self._proofs[i] = (way, j, real)
+                self._proofs[i] = (way, j, twin)
                 return True
-        if set(adds) <= set(needs):  # the operator adds nothing
+        if adds <= needs:  # the operator adds nothing
             self._proofs[i] = (way, i, way)
             return True
         return False
 
-    def _reals(self, way: GroundOperator, left: Mapping[int, GroundOperator]) -> Iterator[tuple[int, GroundOperator]]:
-        there = None
-        if way.step is not None:
-            args = tuple([self.other if arg == self._name else arg for arg in way.step.args])
-            there = way.step.action, args
-        return ((j, left[j]) for j in self._of_step.get(there, ()) if j in left)
+    def _of_same_step(self, i: int) -> Sequence[int]:
+        """Return the operators of the step with `other` instead of `name`."""
+        step = self._ways.all[i].step
+        if step is None:
+            return self._ways.of_step.get(None, ())
+        args = tuple([self._other if arg == self._name else arg for arg in step.args])
+        return self._ways.of_step.get((step.action, args), ())

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from planning.problem.task import GroundOperator, Numbering, Task
-from planning.quantities import NumericBound, helps
+from planning.quantities import helps
 
 _GIVEN = -1  # instead of an operator: the fact holds initially
 _DEEPEST = 50
@@ -70,12 +70,9 @@ def _worked_out(task: Task) -> Reach:
 
 def _helped(bounds: Iterable[int], way: GroundOperator, numbering: Numbering) -> list[int]:
     """Return the bounds that the operator may make true."""
-    named = [(number, numbering.named(number)) for number in bounds]
     return [
-        number
-        for number, bound in named
-        if isinstance(bound, NumericBound) and any(helps(change, bound) for change in way.assignments)
-    ]
+        number for number in bounds if any(helps(change, numbering.bounds[number]) for change in way.assignments)
+    ]  # fmt: skip
 
 
 @dataclass(slots=True)

@@ -6,14 +6,13 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 from knowledge_base.errors import Place
-from knowledge_base.language.syntax.effect import Add, Delete, NumericEffect, effect_conditions, effect_leaves
-from knowledge_base.language.syntax.expression import Atom, Call, Comparison, Expression, Term, parts_of
+from knowledge_base.language.syntax.effect import Add, Delete, NumericEffect, effect_leaves
+from knowledge_base.language.syntax.expression import Atom, Comparison, Expression, Term
 from knowledge_base.language.syntax.text import to_text
-from knowledge_base.world.schema import Schema
 from planning.domain import PlanningAction, PlanningDomain
 from planning.plan import NobodyCan
-from planning.problem.derived import derivation
-from planning.problem.expressions import changed, name_of, names_of
+from planning.problem.derived import Derivation, derivation
+from planning.problem.expressions import changed, conditions_of, inside, name_in, name_of, names_of
 from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 
@@ -35,90 +34,68 @@ def relevant(goal: Expression, metric: Term | None, actions: Iterable[PlanningAc
     actions, needed = tuple(actions), frozenset(names_of(goal))
     while True:
         found = tuple(action for action in actions if needed & changed(action.effect))
-        more = needed.union(*(_asked(action, needed) for action in found))
+        leaves = [leaf for action in found for leaf in effect_leaves(action.effect)]
+        read = [names_of(condition) for action in found for condition in conditions_of(action)]
+        more = needed.union(*read, *_amounts(leaves, needed))
         if more == needed:
             break
         needed = more
-    leaves = [leaf for action in found for leaf in effect_leaves(action.effect)]
-    counted = needed | _counted(metric, leaves)
-    return Relevant(
-        found,
-        frozenset(name_of(one) for one in leaves if not isinstance(one, NumericEffect) or name_of(one) in counted),
-    )
+    priced = () if metric is None else names_of(metric)
+    counted = needed.union(priced, *_amounts(leaves, priced))
+    changing = [name_of(one) for one in leaves if not isinstance(one, NumericEffect) or name_of(one) in counted]
+    return Relevant(found, frozenset(changing))
 
 
-def _asked(action: PlanningAction, needed: Collection[str]) -> Iterator[str]:
-    """Yield the names that the action reads, without amounts of functions that are not needed."""
-    yield from names_of(action.precondition)
-    for condition in effect_conditions(action.effect):
-        yield from names_of(condition)
-    yield from _amounts(effect_leaves(action.effect), needed)
+def _amounts(leaves: Iterable[Add | Delete | NumericEffect], of: Collection[str]) -> list[list[str]]:
+    """Return the names in each amount assigned to these functions."""
+    return [names_of(one.value) for one in leaves if isinstance(one, NumericEffect) and name_of(one) in of]
 
 
-def _amounts(leaves: Iterable[Add | Delete | NumericEffect], of: Collection[str]) -> Iterator[str]:
-    """Yield the names in amounts assigned to these functions."""
-    for leaf in leaves:
-        if isinstance(leaf, NumericEffect) and name_of(leaf) in of:
-            yield from names_of(leaf.value)
-
-
-def _counted(metric: Term | None, leaves: Collection[Add | Delete | NumericEffect]) -> frozenset[str]:
-    """Return the functions in the metric, and those in the amounts by which these change."""
-    own = frozenset() if metric is None else frozenset(names_of(metric))
-    return own.union(_amounts(leaves, own))
-
-
-def refuse_unforeseeable(goal: Expression, actions: Iterable[PlanningAction], domain: PlanningDomain) -> None:
+def refuse_unsupported(goal: Expression, actions: Iterable[PlanningAction], derived: Derivation) -> None:
     """Raise an error if the goal or a relevant action has a condition that no engine can foresee.
 
+    Args:
+        goal: the expanded goal.
+        actions: the relevant actions of the derivation's domain.
+        derived: the derivation of the domain.
+
     Raises:
-        UnsupportedGoalError, UnsupportedActionError: with the place and the condition.
+        UnsupportedGoalError, UnsupportedActionError: with the condition, the reason and the place.
     """
-    schema = domain.schema
-    changing = frozenset[str]().union(*(changed(action.effect) for action in domain.actions.values()))
-    content = {name for name in changing & schema.functions.keys() if schema.result(name) != "number"}
-    if not content and not schema.computed:
+    schema = derived.domain.schema
+    content = {name for name in derived.changing & schema.functions.keys() if schema.result(name) != "number"}
+    if not content and not schema.computed and not derived.unsupported:
         return
-    for asked, why in _unforeseeable(goal, schema, changing, content):
+    for asked, why in _unforeseeable(goal, derived, content):
         raise UnsupportedGoalError(f"the goal asks for {why}", place=asked.place)
     for action in actions:
-        for condition in (action.precondition, *effect_conditions(action.effect)):
-            for asked, why in _unforeseeable(condition, schema, changing, content):
+        for condition in conditions_of(action):
+            for asked, why in _unforeseeable(condition, derived, content):
                 raise UnsupportedActionError(f"planning action '{action.name}' asks for {why}", place=asked.place)
 
 
-def _unforeseeable(
-    e: Expression, schema: Schema, changing: Collection[str], content: Collection[str]
-) -> Iterator[tuple[Expression, str]]:
-    for atom, read in _computed_from(e, schema, changing):
-        told = f"{to_text(atom)} reads {to_text(read)}"
-        yield atom, f"what is computed from something that planning actions change: {told}"
-    for part in _parts(e):
-        if isinstance(part, Comparison | Atom) and any(_name(inner) in content for inner in _parts(part)):
+def _unforeseeable(e: Expression, derived: Derivation, content: set[str]) -> Iterator[tuple[Expression, str]]:
+    """Yield the conditions in `e` that no engine can foresee, each with the reason."""
+    for part in inside(e):
+        if isinstance(part, Atom):
+            if part.predicate in derived.unsupported:
+                yield part, derived.why(part.predicate)
+            for read in _read_by(part, derived):
+                told = f"{to_text(part)} reads {to_text(read)}"
+                yield part, f"what is computed from something that planning actions change: {told}"
+        if isinstance(part, Comparison | Atom) and not content.isdisjoint(names_of(part)):
             yield part, f"a value that planning actions change, and which is no number: {to_text(part)}"
 
 
-def _computed_from(
-    e: Expression | Term, schema: Schema, changing: Collection[str]
-) -> Iterator[tuple[Atom, Expression | Term]]:
-    """Yield the computed atoms in `e`, each with the expressions it reads from `changing`."""
-    if isinstance(e, Atom) and e.predicate in schema.computed:
-        for read in schema.computed[e.predicate].inputs(e.args):
-            yield from ((e, part) for part in _parts(read) if _name(part) in changing)
-            yield from ((e, inner) for _, inner in _computed_from(read, schema, changing))
-    for part in parts_of(e):
-        yield from _computed_from(part, schema, changing)
-
-
-def _parts(e: Expression | Term) -> Iterator[Expression | Term]:
-    yield e
-    for part in parts_of(e):
-        yield from _parts(part)
-
-
-def _name(e: Expression | Term) -> str | None:
-    """Return the function or predicate of the expression."""
-    return e.function if isinstance(e, Call) else e.predicate if isinstance(e, Atom) else None
+def _read_by(atom: Atom, derived: Derivation) -> Iterator[Expression | Term]:
+    """Yield the expressions that actions change and that a computed atom reads, directly or through others."""
+    computed = derived.domain.schema.computed
+    for read in computed[atom.predicate].inputs(atom.args) if atom.predicate in computed else ():
+        for part in inside(read):
+            if name_in(part) in derived.changing:
+                yield part
+            if isinstance(part, Atom):
+                yield from _read_by(part, derived)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,12 +125,11 @@ def numeric_constructs(domain: PlanningDomain, goal: Expression) -> Iterator[Con
     matters = relevant(goal, None, derived.domain.actions.values())
     conditions = [("the goal", goal)]
     for action in matters.actions:
-        owned = (action.precondition, *effect_conditions(action.effect))
-        conditions += [(f"planning action '{action.name}'", one) for one in owned]
+        conditions += [(f"planning action '{action.name}'", one) for one in conditions_of(action)]
     for owner, condition in conditions:
-        for comparison in _comparisons(condition):
-            if not matters.changing.isdisjoint(names_of(comparison)):
-                yield Construct(owner, to_text(comparison), comparison.place)
+        for one in inside(condition):
+            if isinstance(one, Comparison) and not matters.changing.isdisjoint(names_of(one)):
+                yield Construct(owner, to_text(one), one.place)
 
 
 def why_no_engine(domain: PlanningDomain, goal: Expression, nobody: NobodyCan) -> str:
@@ -166,10 +142,3 @@ def why_no_engine(domain: PlanningDomain, goal: Expression, nobody: NobodyCan) -
     """
     construct = next(numeric_constructs(domain, goal), None)
     return nobody.message if construct is None else f"{construct}; {nobody.who}"
-
-
-def _comparisons(e: Expression | Term) -> Iterator[Comparison]:
-    if isinstance(e, Comparison):
-        yield e
-    for part in parts_of(e):
-        yield from _comparisons(part)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import filterfalse
 from typing import Any, NamedTuple, TypeVar
 
 from knowledge_base.facts import Fact, Value
@@ -18,45 +19,45 @@ NOT = "not "
 """The prefix of a predicate for a negative literal (positive normal form). No declared name has a blank."""
 
 
-class _Images(dict[int, int]):
+_T = TypeVar("_T")
+_V = TypeVar("_V")
+
+
+class LazyTable(dict[int, _V]):
     """A mapping that computes each entry on first access."""
 
-    def __init__(self, rename: Callable[[int], int]) -> None:
+    def __init__(self, work_out: Callable[[int], _V]) -> None:
         super().__init__()
-        self._rename = rename
+        self._work_out = work_out
 
-    def __missing__(self, number: int) -> int:
-        image = self[number] = self._rename(number)
-        return image
+    def __missing__(self, number: int) -> _V:
+        made = self[number] = self._work_out(number)
+        return made
 
 
 class Numbering:
     """A growing table of numbers for literals, bounds and fluents; a number never changes its meaning.
 
     Attributes:
+        facts: number -> the literal in positive normal form.
+        bounds: number -> the bound.
         fluents: the numbers of numeric fluents.
+        objects: number -> the objects that the literal, bound or fluent is about.
+        wants: bound -> the fluents in it.
+        supports: fluent -> the bounds with it.
     """
 
     def __init__(self) -> None:
+        self.facts: LazyTable[Fact] = LazyTable(self._fact)
+        self.bounds: dict[int, NumericBound] = {}
+        self.fluents: set[int] = set()
+        self.objects: LazyTable[frozenset[str]] = LazyTable(self._objects)
+        self.wants: dict[int, dict[int, None]] = {}
+        self.supports: dict[int, dict[int, None]] = {}
         self._numbers: dict[Fact | NumericBound, int] = {}
         self._named: list[Fact | NumericBound] = []
         self._by_predicate: dict[str, list[tuple[int, tuple[Value, ...]]]] = {}
-        self._bounds: dict[int, NumericBound] = {}
-        self._facts: dict[int, Fact] = {}
-        self._images: dict[tuple[str, str], _Images] = {}
-        self._wants: dict[int, dict[int, None]] = {}
-        self._supports: dict[int, dict[int, None]] = {}
-        self.fluents: set[int] = set()
-
-    @property
-    def wants(self) -> Mapping[int, Mapping[int, None]]:
-        """Bound -> the fluents in it."""
-        return self._wants
-
-    @property
-    def supports(self) -> Mapping[int, Mapping[int, None]]:
-        """Fluent -> the bounds with it."""
-        return self._supports
+        self._images: dict[tuple[str, str], LazyTable[int]] = {}
 
     def of(self, leaf: Leaf) -> int:
         """Return the number of a literal or bound."""
@@ -75,32 +76,35 @@ class Numbering:
         """Return the fact or bound of the number; a negative literal has the fact that it denies."""
         return self._named[number >> 1]
 
-    def fact(self, number: int) -> Fact:
-        """Return the literal in positive normal form."""
-        known = self._facts.get(number)
-        if known is None:
-            fact = self._named[number >> 1]
-            if not isinstance(fact, Fact):
-                raise TypeError(f"{fact} is not a fact")
-            known = self._facts[number] = as_fact(Literal(fact, not number & 1))
-        return known
+    def _fact(self, number: int) -> Fact:
+        fact = self._named[number >> 1]
+        if not isinstance(fact, Fact):
+            raise TypeError(f"{fact} is not a fact")
+        return as_fact(Literal(fact, not number & 1))
+
+    def _objects(self, number: int) -> frozenset[str]:
+        one = self._named[number >> 1]
+        facts = (one,) if isinstance(one, Fact) else one.fluents()
+        return frozenset([str(value) for fact in facts for value in fact.args])
 
     def present(self, world: World) -> set[int]:
         """Return the numbers of all literals and bounds that hold in `world`; fluents have no truth value."""
-        values = {one: worth(world, one) for one in map(self.fact, sorted(self.fluents))}
-        held = {number for number, bound in self._bounds.items() if bound.holds(values)}
+        values = {fluent: worth(world, fluent) for fluent in map(self.facts.__getitem__, sorted(self.fluents))}
+        held = {number for number, bound in self.bounds.items() if bound.holds(values)}
+        computed = world.schema.computed
         for predicate, listed in self._by_predicate.items():
-            if predicate in world.schema.computed:
+            if predicate in computed:
                 held.update([number + (not is_so(Fact(predicate, args), world)) for number, args in listed])
             else:  # one query for all: most facts of the predicate have a number
                 known = set(world.match(predicate, (None,) * len(listed[0][1])))
-                held.update([number + (args not in known) for number, args in listed])
+                for number, args in listed:
+                    held.add(number + (args not in known))
         return held
 
     def images(self, name: str, other: str) -> Mapping[int, int]:
         """Return a mapping from each literal to the same literal about `other` instead of `name`."""
         if (name, other) not in self._images:
-            self._images[name, other] = _Images(lambda number: self._renamed(number, name, other))
+            self._images[name, other] = LazyTable(lambda number: self._renamed(number, name, other))
         return self._images[name, other]
 
     def _renamed(self, number: int, name: str, other: str) -> int:
@@ -116,7 +120,7 @@ class Numbering:
             number = self._numbers[one] = 2 * len(self._named)
             self._named.append(one)
             if isinstance(one, NumericBound):
-                self._bounds[number] = one
+                self.bounds[number] = one
             else:
                 self._by_predicate.setdefault(one.predicate, []).append((number, one.args))
         return number
@@ -125,8 +129,8 @@ class Numbering:
         number = self._number(bound)
         for one in bound.fluents():
             fluent = self.fluent(one)
-            self._wants.setdefault(number, {})[fluent] = None
-            self._supports.setdefault(fluent, {})[number] = None
+            self.wants.setdefault(number, {})[fluent] = None
+            self.supports.setdefault(fluent, {})[number] = None
         return number
 
 
@@ -134,8 +138,6 @@ def as_fact(literal: Literal) -> Fact:
     """Return the literal in positive normal form."""
     return literal.fact if literal.positive else Fact(NOT + literal.fact.predicate, literal.fact.args)
 
-
-_T = TypeVar("_T")
 
 _MOST_KNOWN = 16
 
@@ -193,47 +195,36 @@ class OperatorIndex:
     @cached_property
     def users(self) -> Mapping[int, Sequence[int]]:
         """Literal or bound -> the operators that need it."""
-        users: dict[int, list[int]] = {}
-        for i, way in enumerate(self.all):
-            for one in way.needs:
-                users.setdefault(one, []).append(i)
-        return users
+        return _positions([way.needs for way in self.all])
 
     @cached_property
     def adders(self) -> Mapping[int, Sequence[int]]:
         """Literal or fluent -> the operators that add or change it without needing it."""
-        adders: dict[int, list[int]] = {}
-        for i, way in enumerate(self.all):
-            for one in way.adds:
-                if one not in way.needs:
-                    adders.setdefault(one, []).append(i)
-        return adders
+        return _positions([[one for one in way.adds if one not in way.needs] for way in self.all])
 
     @cached_property
     def touching(self) -> Mapping[int, Sequence[int]]:
         """Literal, bound or fluent -> the operators that need, add, change or delete it."""
-        touching: dict[int, list[int]] = {}
-        for i, way in enumerate(self.all):
-            for one in {*way.needs, *way.adds, *way.deletes}:
-                touching.setdefault(one, []).append(i)
-        return touching
+        return _positions([{*way.needs, *way.adds, *way.deletes} for way in self.all])
 
     @cached_property
     def naming(self) -> Mapping[str, Sequence[int]]:
         """Object -> the operators whose steps name it."""
-        naming: dict[str, list[int]] = {}
-        for i, way in enumerate(self.all):
-            for name in set(way.step.args) if way.step else ():
-                naming.setdefault(name, []).append(i)
-        return naming
+        return _positions([set(way.step.args) if way.step else set() for way in self.all])
 
     @cached_property
     def of_step(self) -> Mapping[Key, Sequence[int]]:
         """Step, see `key` -> its operators."""
-        of_step: dict[Key, list[int]] = {}
-        for i, way in enumerate(self.all):
-            of_step.setdefault(key(way.step), []).append(i)
-        return of_step
+        return _positions([(key(way.step),) for way in self.all])
+
+
+def _positions(those: Iterable[Iterable[_T]]) -> dict[_T, list[int]]:
+    """Return for each value the positions of the collections with it."""
+    found: dict[_T, list[int]] = {}
+    for i, values in enumerate(those):
+        for value in values:
+            found.setdefault(value, []).append(i)
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,7 +276,7 @@ class Assembly:
         known = self._made.get
         actions = tuple([found[1] if (found := known(id(way))) else self._action(way) for way in ways])
         mentioned = dict.fromkeys([arg for action in actions if action.step for arg in action.step.args])
-        mentioned.update(dict.fromkeys(str(value) for fact in (*init, *goal) for value in fact.args))
+        mentioned.update(dict.fromkeys([str(value) for fact in (*init, *goal) for value in fact.args]))
         objects = {one: things[one] for one in mentioned if one in things}
         asked = _fluents(actions, bounds) if self._numbering.fluents else ()
         numbers = {} if world is None else {one: worth(world, one) for one in asked}
@@ -294,29 +285,21 @@ class Assembly:
     def _action(self, way: GroundOperator) -> GroundAction:
         if len(self._made) >= _MOST_KEPT:
             self._made.clear()
-        action = self._make(way)
+        fact = self._numbering.facts.__getitem__
+        needs, bounds = self._split(way.needs)
+        adds = tuple(map(fact, filterfalse(self._numbering.fluents.__contains__, way.adds)))
+        cost = 0.0 if way.cost is None else way.cost
+        action = GroundAction(way.step, needs, adds, tuple(map(fact, way.deletes)), cost, bounds, way.assignments)
         self._made[id(way)] = way, action
         return action
 
-    def _make(self, way: GroundOperator) -> GroundAction:
-        numbering = self._numbering
-        needs, bounds = self._split(way.needs)
-        adds = tuple([numbering.fact(one) for one in way.adds if one not in numbering.fluents])
-        deletes = tuple(map(numbering.fact, way.deletes))
-        cost = 0.0 if way.cost is None else way.cost
-        return GroundAction(way.step, needs, adds, deletes, cost, bounds, way.assignments)
-
-    def _split(self, numbers: Iterable[int]) -> tuple[tuple[Fact, ...], tuple[NumericBound, ...]]:
+    def _split(self, numbers: Collection[int]) -> tuple[tuple[Fact, ...], tuple[NumericBound, ...]]:
         """Return facts in positive normal form, and bounds."""
-        facts: list[Fact] = []
-        bounds: list[NumericBound] = []
-        for number in numbers:
-            one = self._numbering.named(number)
-            if isinstance(one, NumericBound):
-                bounds.append(one)
-            else:
-                facts.append(self._numbering.fact(number))
-        return tuple(facts), tuple(bounds)
+        facts, bounds = self._numbering.facts, self._numbering.bounds
+        if bounds.keys().isdisjoint(numbers):
+            return tuple(map(facts.__getitem__, numbers)), ()
+        named = tuple([facts[one] for one in numbers if one not in bounds])
+        return named, tuple([bounds[one] for one in numbers if one in bounds])
 
 
 def _fluents(actions: Iterable[GroundAction], goal: Iterable[NumericBound]) -> dict[Fact, None]:

@@ -23,7 +23,7 @@ from planning.plan import PlanStep
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, alternatives
 from planning.problem.expressions import changed
 from planning.problem.grounding import Variant, variants
-from planning.problem.operators import OperatorCache
+from planning.problem.operators import OperatorCache, things_of
 from planning.problem.relaxed_reachability import reachable
 from planning.problem.relevance import Relevant, relevant
 from planning.problem.task import NOT, GroundOperator, OperatorIndex, Task, as_fact
@@ -121,8 +121,9 @@ def _possible(
     actions = tuple(actions)
     later = [one for action in actions if action.timed for one in _end(action, action.timed.over_all, action.timed.end)]
     ends = replace(matters, actions=(*map(_start, actions), *later))
-    groundwork = OperatorCache(ends, None, world)
-    groundwork.extend(world, patience)
+    things = things_of(world)
+    groundwork = OperatorCache(ends, None, world, things)
+    groundwork.extend(world, things, patience)
     numbering = groundwork.numbering
 
     def linked(way: GroundOperator, step: PlanStep) -> GroundOperator:

@@ -17,7 +17,7 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.expression import And, Not, substitute
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
-from planning.ordering.causal_tracing import causal_links
+from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import standing
 from planning.plan import Plan, PlanStep
 
@@ -55,7 +55,7 @@ class Replay:
         if record.type == "plan.found":
             plan = Plan(tuple(map(parsed, record.data["steps"])))
             self.steps = dict(enumerate(plan.steps, start=1))
-            self.links = causal_links(plan, self.domain, self.world, parse_condition(self.goal))
+            self.links = deordered(plan, self.domain, self.world, parse_condition(self.goal)).links
         elif record.type == "knowledge":
             self._change(record)
         elif record.type == "step":
