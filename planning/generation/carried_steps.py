@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 from typing import Any
 
 from dsc.dynamic.library import Library
@@ -20,7 +19,6 @@ from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect
 from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
-    Atom,
     Comparison,
     Constant,
     Expression,
@@ -32,7 +30,7 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from planning.domain import PlanningAction, PlanningDomain
 from planning.plan import PlanStep
-from planning.problem.expressions import changed, names_of
+from planning.problem.expressions import changed, conjuncts_of, names_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,14 +230,9 @@ def implementing(step: PlanStep, library: Library) -> tuple[ActionPlot, ...]:
 
 def expectation(effect: Effect, bindings: Mapping[str, Value]) -> Expression:
     """Return the condition that holds after an effect in every world."""
-    ground = [(_ground(part.atom, bindings), isinstance(part, Add)) for part in _literals(effect)]
+    ground = [(substitute(part.atom, bindings), isinstance(part, Add)) for part in _literals(effect)]
     added = [atom for atom, adds in ground if adds]
     return And((*added, *(Not(atom) for atom, adds in ground if not adds and atom not in added)))
-
-
-def parts(e: Expression) -> tuple[Expression, ...]:
-    """Return the conjuncts of a condition."""
-    return tuple(chain.from_iterable(map(parts, e.parts))) if isinstance(e, And) else (e,)
 
 
 def _step(
@@ -252,10 +245,10 @@ def _step(
         limit = Constant(seconds)
     return CarriedStep(
         text=str(step),
-        needed=tuple(one for one in parts(ground.condition) if not _decided(one)),
+        needed=tuple([one for one in conjuncts_of(ground.condition) if not _decided(one)]),
         over_all=tuple(substitute(one, bindings) for one in _watched(action)),
         effect=ground.effect,
-        expected=() if assumed else parts(expectation(action.effect, bindings)),
+        expected=() if assumed else tuple(conjuncts_of(expectation(action.effect, bindings))),
         content=content, assumed=assumed, seconds=limit, **more,
     )  # fmt: skip
 
@@ -289,14 +282,10 @@ def _watched(action: PlanningAction) -> Iterator[Expression]:
     if action.timed is not None:
         effects = (action.timed.start_effect, action.timed.end_effect)
         own = {name for effect in effects for name in changed(effect)}
-        yield from (one for one in parts(action.timed.over_all) if not own.intersection(names_of(one)))
+        yield from (one for one in conjuncts_of(action.timed.over_all) if not own.intersection(names_of(one)))
 
 
 def _literals(effect: Effect) -> list[Add | Delete]:
     if isinstance(effect, AllOf):
         return [literal for part in effect.parts for literal in _literals(part)]
     return [effect] if isinstance(effect, Add | Delete) else []
-
-
-def _ground(atom: Atom, bindings: Mapping[str, Value]) -> Atom:
-    return Atom(atom.predicate, tuple(substitute(arg, bindings) for arg in atom.args))
