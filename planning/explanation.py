@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.evaluation.explanation import explain
+from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.effect import Add, AllOf, Effect, ForEach, When, effect_leaves
 from knowledge_base.language.syntax.expression import And, Expression, TypedVariable, substitute
@@ -206,7 +207,7 @@ class _Causes:
         parameters = self.domain.actions[rule.action.name].parameters
         step = PlanStep(rule.action.name, tuple(str(bindings[p.name]) for p in parameters))
         needed = [self.grounder.fact(atom, bindings) for atom in rule.atoms]
-        others = _parts(rule.action.precondition)
+        others = conjuncts(rule.action.precondition)
         unmet = [
             c for c in others if c not in rule.atoms and not self.reach.allows(self.grounder.residual(c, bindings))
         ]
@@ -218,7 +219,7 @@ class _Causes:
 def _cases(action: PlanningAction) -> Iterator[PlanningAction]:
     """One action for each effect, with the variables and conditions of the effect as parameters and precondition."""
     for leaf, variables, conditions in _effects(action.effect):
-        needed = (*_parts(action.precondition), *(part for one in conditions for part in _parts(one)))
+        needed = (*conjuncts(action.precondition), *(part for one in conditions for part in conjuncts(one)))
         yield replace(action, parameters=(*action.parameters, *variables), precondition=And(needed), effect=leaf)
 
 
@@ -236,10 +237,6 @@ def _effects(
             yield from _effects(body, variables, (*conditions, condition))
         case _:
             yield effect, variables, conditions
-
-
-def _parts(e: Expression) -> tuple[Expression, ...]:
-    return e.parts if isinstance(e, And) else (e,)
 
 
 def _present(rules: Iterable[JoinRule], world: World) -> Iterator[Fact]:

@@ -15,6 +15,7 @@ from dsc.model.states import DynamicState, State, SubmachineState
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Value
+from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect
 from knowledge_base.language.syntax.expression import (
     And,
@@ -30,7 +31,7 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from planning.domain import PlanningAction, PlanningDomain
 from planning.plan import PlanStep
-from planning.problem.expressions import changed, conjuncts_of, names_of
+from planning.problem.expressions import changed, names_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,10 +246,10 @@ def _step(
         limit = Constant(seconds)
     return CarriedStep(
         text=str(step),
-        needed=tuple([one for one in conjuncts_of(ground.condition) if not _decided(one)]),
+        needed=tuple([one for one in conjuncts(ground.condition) if not _decided(one)]),
         over_all=tuple(substitute(one, bindings) for one in _watched(action)),
         effect=ground.effect,
-        expected=() if assumed else tuple(conjuncts_of(expectation(action.effect, bindings))),
+        expected=() if assumed else tuple(conjuncts(expectation(action.effect, bindings))),
         content=content, assumed=assumed, seconds=limit, **more,
     )  # fmt: skip
 
@@ -282,7 +283,7 @@ def _watched(action: PlanningAction) -> Iterator[Expression]:
     if action.timed is not None:
         effects = (action.timed.start_effect, action.timed.end_effect)
         own = {name for effect in effects for name in changed(effect)}
-        yield from (one for one in conjuncts_of(action.timed.over_all) if not own.intersection(names_of(one)))
+        yield from (one for one in conjuncts(action.timed.over_all) if not own.intersection(names_of(one)))
 
 
 def _literals(effect: Effect) -> list[Add | Delete]:

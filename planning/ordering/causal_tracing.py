@@ -25,6 +25,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.evaluator import apply_effect, holds
+from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.evaluation.world import World
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, effect_parts, substitute_effect
 from knowledge_base.language.syntax.expression import Atom, Constant, Expression, Not, Variable
@@ -33,11 +34,10 @@ from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.domain import GroundStep, PlanningAction, PlanningDomain
 from planning.ordering.partial_order import PRESENT, CausalLink, PartialOrder, reduction
-from planning.ordering.step_dependencies import Changes, Ground, Support, changes, conjuncts, favours, support
+from planning.ordering.step_dependencies import Changes, Ground, Support, changes, favours, ground_conjuncts, support
 from planning.plan import Plan, PlanStep
 from planning.problem.conditions import Literal
 from planning.problem.derived import derivation
-from planning.problem.expressions import conjuncts_of
 
 
 def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> PartialOrder:
@@ -166,7 +166,7 @@ class CausalTrace:
 
     def _need_all(self, user: int, condition: Expression, whose: PlanStep | None) -> None:
         """Record that a step, or the goal, needs all parts of a ground condition now."""
-        for part in conjuncts(condition, self._base):  # reads only objects, which no step changes
+        for part in ground_conjuncts(condition, self._base):  # reads only objects, which no step changes
             literal = _literal(part, self._schema)
             if literal is None:
                 self._need_support(user, part, whose)
@@ -305,7 +305,7 @@ class _Known:
 
     @staticmethod
     def _of(ground: GroundStep, step: PlanStep, action: PlanningAction, schema: Vocabulary) -> _Known:
-        needs = tuple([(part, _literal(part, schema)) for part in dict.fromkeys(conjuncts_of(ground.condition))])
+        needs = tuple([(part, _literal(part, schema)) for part in dict.fromkeys(conjuncts(ground.condition))])
         pattern = _patterns.find(action, schema) or _patterns.keep(action, schema, _Pattern.of(action, schema))
         if pattern.changes is None:
             return _Known(needs, None, {}, plain=False)

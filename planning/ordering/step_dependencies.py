@@ -14,33 +14,10 @@ from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.language.evaluation.evaluator import apply_effect, choices, evaluate_argument, holds
 from knowledge_base.language.evaluation.world import World
-from knowledge_base.language.syntax.effect import (
-    Add,
-    AllOf,
-    Delete,
-    Effect,
-    ForEach,
-    NumericEffect,
-    When,
-    substitute_effect,
-)
-from knowledge_base.language.syntax.expression import (
-    And,
-    Arithmetic,
-    Atom,
-    Call,
-    Comparison,
-    Constant,
-    Exists,
-    Expression,
-    Forall,
-    Imply,
-    Not,
-    Or,
-    Term,
-    parts_of,
-    substitute,
-)
+from knowledge_base.language.syntax import effect as eff
+from knowledge_base.language.syntax import expression as ex
+from knowledge_base.language.syntax.effect import Effect
+from knowledge_base.language.syntax.expression import Atom, Expression, Term
 from knowledge_base.world.overlay import Overlay
 from planning.problem.conditions import Literal
 
@@ -97,35 +74,35 @@ def changes(effect: Effect, world: World, after: Effect | None = None) -> Change
 
 def _collect(effect: Effect, world: World, found: Changes) -> None:
     match effect:
-        case Add(atom) | Delete(atom):
-            found.makes[Literal(ground(atom, world), isinstance(effect, Add))] = None
-        case AllOf(parts):
+        case eff.Add(atom) | eff.Delete(atom):
+            found.makes[Literal(ground(atom, world), isinstance(effect, eff.Add))] = None
+        case eff.AllOf(parts):
             for part in parts:
                 _collect(part, world, found)
-        case ForEach():
+        case eff.ForEach():
             for chosen in choices(effect.variables, world):
-                _collect(substitute_effect(effect.effect, chosen), world, found)
-        case When(condition, inner):
+                _collect(eff.substitute_effect(effect.effect, chosen), world, found)
+        case eff.When(condition, inner):
             happens = holds(condition, world, {})
-            found.conditions += conjuncts(condition, world, wanted=happens)
+            found.conditions += ground_conjuncts(condition, world, wanted=happens)
             if happens:
                 _collect(inner, world, found)
-        case NumericEffect(operator, call, value):
+        case eff.NumericEffect(operator, call, value):
             fluent = ground(call, world)
             found.numbers[fluent] = operator in _COMMUTING and found.numbers.get(fluent, True)
             found.reads |= set(_fluents(value, world))
 
 
-def conjuncts(e: Expression, world: World, *, wanted: bool = True) -> Iterator[Expression]:
+def ground_conjuncts(e: Expression, world: World, *, wanted: bool = True) -> Iterator[Expression]:
     """Yield ground conditions whose conjunction is `e` (its negation if not `wanted`)."""
     match e:
-        case Not(body):
-            yield from conjuncts(body, world, wanted=not wanted)
-        case And() | Or() | Imply() | Forall() | Exists() if _is_conjunction(e, wanted=wanted):
+        case ex.Not(body):
+            yield from ground_conjuncts(body, world, wanted=not wanted)
+        case ex.And() | ex.Or() | ex.Imply() | ex.Forall() | ex.Exists() if _is_conjunction(e, wanted=wanted):
             for part in _parts(e, world):
-                yield from conjuncts(part, world, wanted=wanted)
+                yield from ground_conjuncts(part, world, wanted=wanted)
         case _:
-            yield e if wanted else Not(e)
+            yield e if wanted else ex.Not(e)
 
 
 def support(e: Expression, world: World, rank: Rank, *, wanted: bool = True) -> Support | None:
@@ -135,11 +112,11 @@ def support(e: Expression, world: World, rank: Rank, *, wanted: bool = True) -> 
             fact = ground(e, world)
             as_wanted = world.holds(fact.predicate, fact.args) is wanted
             return frozenset({Literal(fact, wanted)}) if as_wanted else None
-        case Not(body):
+        case ex.Not(body):
             return support(body, world, rank, wanted=not wanted)
-        case Atom() | Comparison():  # a type never changes
+        case Atom() | ex.Comparison():  # a type never changes
             as_wanted = holds(e, world, {}) is wanted
-            return frozenset(chain(*(_fluents(part, world) for part in parts_of(e)))) if as_wanted else None
+            return frozenset(chain(*(_fluents(part, world) for part in ex.parts_of(e)))) if as_wanted else None
         case _:
             found = (support(part, world, rank, wanted=wanted) for part in _parts(e, world))
             return _all(found) if _is_conjunction(e, wanted=wanted) else _best(found, rank)
@@ -151,9 +128,9 @@ def favours(e: Expression, fluent: Fact, world: World) -> float | None:
     `None` if the condition alone does not determine it.
     """
     match e:
-        case Not(Comparison(operator, left, right)) if operator in _DIRECTIONS:
+        case ex.Not(ex.Comparison(operator, left, right)) if operator in _DIRECTIONS:
             sign = -_DIRECTIONS[operator]
-        case Comparison(operator, left, right) if operator in _DIRECTIONS:
+        case ex.Comparison(operator, left, right) if operator in _DIRECTIONS:
             sign = _DIRECTIONS[operator]
         case _:
             return None
@@ -163,9 +140,9 @@ def favours(e: Expression, fluent: Fact, world: World) -> float | None:
 
 def _slope(term: Term, fluent: Fact, world: World) -> float | None:
     match term:
-        case Call():
+        case ex.Call():
             return float(ground(term, world) == fluent)
-        case Arithmetic("+" | "-" as operator, args):
+        case ex.Arithmetic("+" | "-" as operator, args):
             slopes = [_slope(arg, fluent, world) for arg in args]
             if None in slopes:
                 return None
@@ -173,31 +150,31 @@ def _slope(term: Term, fluent: Fact, world: World) -> float | None:
             if operator == "+":
                 return first + sum(rest)
             return first - sum(rest) if rest else -first
-        case Arithmetic():
+        case ex.Arithmetic():
             return None if fluent in _fluents(term, world) else 0.0
         case _:
             return 0.0
 
 
-def ground(form: Atom | Call, world: World) -> Fact:
+def ground(form: Atom | ex.Call, world: World) -> Fact:
     """Return the fact or fluent that a form without variables names."""
     name = form.predicate if isinstance(form, Atom) else form.function
-    return Fact(name, tuple(t.value if isinstance(t, Constant) else evaluate_argument(t, world) for t in form.args))
+    return Fact(name, tuple(t.value if isinstance(t, ex.Constant) else evaluate_argument(t, world) for t in form.args))
 
 
 def _is_conjunction(e: Expression, *, wanted: bool) -> bool:
     """Return whether all parts are needed; otherwise one is enough. De Morgan's laws swap them."""
-    return isinstance(e, And | Forall) is wanted
+    return isinstance(e, ex.And | ex.Forall) is wanted
 
 
 def _parts(e: Expression, world: World) -> Iterable[Expression]:
     match e:
-        case And(parts) | Or(parts):
+        case ex.And(parts) | ex.Or(parts):
             return parts
-        case Imply(premise, conclusion):
-            return Not(premise), conclusion
-        case Exists(variables, body) | Forall(variables, body):
-            return (substitute(body, chosen) for chosen in choices(variables, world))
+        case ex.Imply(premise, conclusion):
+            return ex.Not(premise), conclusion
+        case ex.Exists(variables, body) | ex.Forall(variables, body):
+            return (ex.substitute(body, chosen) for chosen in choices(variables, world))
         case _:
             raise SchemaError(f"{e} has no parts")
 
@@ -216,7 +193,7 @@ def _best(found: Iterable[Support | None], rank: Rank) -> Support | None:
 
 
 def _fluents(e: Expression | Term, world: World) -> Iterator[Fact]:
-    if isinstance(e, Call):
+    if isinstance(e, ex.Call):
         yield ground(e, world)
-    for part in parts_of(e):
+    for part in ex.parts_of(e):
         yield from _fluents(part, world)

@@ -20,7 +20,7 @@ from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.ordering.partial_order import PRESENT, CausalLink, PartialOrder, scheduled
-from planning.ordering.step_dependencies import Changes, Ground, Support, changes, conjuncts, favours, support
+from planning.ordering.step_dependencies import Changes, Ground, Support, changes, favours, ground_conjuncts, support
 from planning.plan import Plan, PlanStep, Timing
 from planning.problem.conditions import Literal
 from planning.problem.derived import derivation
@@ -110,7 +110,7 @@ class _Tracing:
 
     def need(self, user: int, condition: Expression, whose: str) -> None:
         """Record that a step, or the goal, needs a condition now; its own effects are not links."""
-        for part in dict.fromkeys(conjuncts(condition, self.world)):
+        for part in dict.fromkeys(ground_conjuncts(condition, self.world)):
             found = support(part, self.world, self._latest)
             if found is None:
                 raise InputError(f"the plan does not lead to the goal: {whose} needs {to_text(part)}")

@@ -15,25 +15,9 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.evaluation.evaluator import evaluate_argument, evaluate_term, holds
 from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.syntax import expression as ex
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
-from knowledge_base.language.syntax.expression import (
-    And,
-    Arithmetic,
-    Atom,
-    Call,
-    Comparison,
-    Constant,
-    Exists,
-    Expression,
-    Forall,
-    Imply,
-    Not,
-    Or,
-    Term,
-    TypedVariable,
-    Variable,
-    parts_of,
-)
+from knowledge_base.language.syntax.expression import Atom, Expression, Term
 from knowledge_base.language.syntax.text import to_text
 from planning.cancellable_work import WorkLimit
 from planning.quantities import OPPOSITE, Assignment, NumericBound, Quantity, combined
@@ -150,7 +134,7 @@ class GroundEffect:
 def is_so(fact: Fact, world: World) -> bool:
     """Return whether the fact holds; a world stores no facts of computed predicates."""
     if fact.predicate in world.schema.computed:
-        return holds(Atom(fact.predicate, tuple(map(Constant, fact.args))), world)
+        return holds(Atom(fact.predicate, tuple(map(ex.Constant, fact.args))), world)
     return world.holds(fact.predicate, fact.args)
 
 
@@ -176,11 +160,11 @@ class Grounder:
         The result does not depend on these facts, so that it stays valid when an external change touches them.
         """
         match e:
-            case And(parts):
+            case ex.And(parts):
                 return every(self.precondition(part, bindings) for part in parts)
             case Atom(name) if name in self.world.schema.predicates:
                 return Literal(self.fact(e, bindings))
-            case Not(Atom(name) as atom) if name in self.world.schema.predicates:
+            case ex.Not(Atom(name) as atom) if name in self.world.schema.predicates:
                 return Literal(self.fact(atom, bindings), positive=False)
             case _:
                 return self.residual(e, bindings)
@@ -194,18 +178,18 @@ class Grounder:
         match e:
             case Atom():
                 found = self._atom(e, bindings, wanted=wanted)
-            case Not(body):
+            case ex.Not(body):
                 found = self.residual(body, bindings, wanted=not wanted)
-            case And(parts) | Or(parts):
-                join = every if isinstance(e, And) is wanted else some
+            case ex.And(parts) | ex.Or(parts):
+                join = every if isinstance(e, ex.And) is wanted else some
                 found = join(self.residual(part, bindings, wanted=wanted) for part in parts)
-            case Imply(premise, conclusion):
-                found = self.residual(Or((Not(premise), conclusion)), bindings, wanted=wanted)
-            case Exists(variables, body) | Forall(variables, body):
-                join = every if isinstance(e, Forall) is wanted else some
+            case ex.Imply(premise, conclusion):
+                found = self.residual(ex.Or((ex.Not(premise), conclusion)), bindings, wanted=wanted)
+            case ex.Exists(variables, body) | ex.Forall(variables, body):
+                join = every if isinstance(e, ex.Forall) is wanted else some
                 choices = self.choices(variables, bindings)
                 found = join(self.residual(body, inner, wanted=wanted) for inner in choices)
-            case Comparison():
+            case ex.Comparison():
                 found = self._comparison(e, bindings, wanted=wanted)
         return found
 
@@ -234,7 +218,9 @@ class Grounder:
                 if effect.call.function in self.changing:
                     yield GroundEffect(condition, self._assignment(effect, bindings))
 
-    def choices(self, variables: Iterable[TypedVariable], bindings: Mapping[str, Value]) -> Iterator[dict[str, Value]]:
+    def choices(
+        self, variables: Iterable[ex.TypedVariable], bindings: Mapping[str, Value]
+    ) -> Iterator[dict[str, Value]]:
         """Yield the bindings extended by every choice of objects for `variables`.
 
         Raises:
@@ -245,12 +231,12 @@ class Grounder:
             self.patience.spend()
             yield {**bindings, **dict(zip((v.name for v in chosen), values, strict=True))}
 
-    def objects(self, variable: TypedVariable) -> dict[str, None]:
+    def objects(self, variable: ex.TypedVariable) -> dict[str, None]:
         """Return the objects of the variable's types, as a set in order."""
         types = variable.types or ("object",)
         return dict.fromkeys(name for one in types for name in self.world.objects(one))
 
-    def fact(self, atom: Atom | Call, bindings: Mapping[str, Value]) -> Fact:
+    def fact(self, atom: Atom | ex.Call, bindings: Mapping[str, Value]) -> Fact:
         """Return the atom or numeric fluent with values for its terms.
 
         Raises:
@@ -266,9 +252,9 @@ class Grounder:
             InputError: the value is not a number, or a divisor is zero.
         """
         match term:
-            case Call(function) if function in self.changing:
+            case ex.Call(function) if function in self.changing:
                 return self.fact(term, bindings)
-            case Arithmetic(operator, args) if self.changes(term):
+            case ex.Arithmetic(operator, args) if self.changes(term):
                 try:
                     return combined(operator, tuple(self.quantity(arg, bindings) for arg in args))
                 except ArithmeticError as error:
@@ -281,9 +267,9 @@ class Grounder:
 
     def changes(self, e: Expression | Term) -> bool:
         """Return whether the term or condition reads a number that actions change."""
-        return (isinstance(e, Call) and e.function in self.changing) or any(map(self.changes, parts_of(e)))
+        return (isinstance(e, ex.Call) and e.function in self.changing) or any(map(self.changes, ex.parts_of(e)))
 
-    def _comparison(self, e: Comparison, bindings: Mapping[str, Value], *, wanted: bool) -> Residual:
+    def _comparison(self, e: ex.Comparison, bindings: Mapping[str, Value], *, wanted: bool) -> Residual:
         if not self.changes(e):
             return holds(e, self.world, bindings) is wanted
         left, right = self.quantity(e.left, bindings), self.quantity(e.right, bindings)
@@ -306,9 +292,9 @@ class Grounder:
 
     def _value(self, term: Term, bindings: Mapping[str, Value]) -> Value:
         match term:
-            case Variable(name) if name in bindings:
+            case ex.Variable(name) if name in bindings:
                 return bindings[name]
-            case Constant(value):
+            case ex.Constant(value):
                 return value
             case _ if self.changes(term):
                 raise UnsupportedActionError(

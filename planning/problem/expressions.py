@@ -34,19 +34,6 @@ def name_in(e: Expression | Term) -> str | None:
     return e.function if isinstance(e, ex.Call) else e.predicate if isinstance(e, Atom) else None
 
 
-def conjuncts_of(e: Expression) -> list[Expression]:
-    """Return the parts of a conjunction, nested ones included; a condition of another form is its own only part."""
-    found: list[Expression] = []
-    agenda = [e]
-    while agenda:
-        one = agenda.pop()
-        if isinstance(one, ex.And):
-            agenda.extend(reversed(one.parts))
-        else:
-            found.append(one)
-    return found
-
-
 def conditions_of(action: PlanningAction) -> tuple[Expression, ...]:
     """Return the precondition and the conditions of conditional effects."""
     return (action.precondition, *eff.effect_conditions(action.effect))

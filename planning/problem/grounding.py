@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.checking.vocabulary import Vocabulary
+from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.expression import Atom, Constant, Variable
 from planning.cancellable_work import WorkLimit
 from planning.domain import PlanningAction
@@ -23,7 +24,6 @@ from planning.problem.conditions import (
     every,
     negation,
 )
-from planning.problem.expressions import conjuncts_of
 from planning.quantities import Assignment, combined, fluents
 from planning.strips import UnsupportedActionError
 
@@ -221,7 +221,7 @@ def joined_atoms(action: PlanningAction, schema: Vocabulary) -> tuple[Atom, ...]
     """Return the positive conjuncts of an action's precondition that a join can bind."""
     return tuple(
         atom
-        for atom in conjuncts_of(action.precondition)
+        for atom in conjuncts(action.precondition)
         if isinstance(atom, Atom)
         and atom.predicate in schema.predicates
         and all(isinstance(t, Variable | Constant) for t in atom.args)
