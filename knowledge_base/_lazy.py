@@ -14,7 +14,7 @@ def lazy_exports(package: str, init: str) -> tuple[Callable[[str], Any], Callabl
 
     Args:
         package: the package's `__name__`.
-        init: its `__file__`, beside which the stub lies.
+        init: its `__file__`; the stub is in the same folder.
     """
     stub = ast.parse(Path(init).with_suffix(".pyi").read_text("utf-8"))
     imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]

@@ -1,6 +1,6 @@
-"""Errors about what people wrote: each says where, what was found, and what was meant.
+"""Errors about input: each has the place, the word found and the nearest valid word.
 
-One family for all rooms, so that a command can turn any of them into one line and exit status 2.
+All rooms share one family, so that a command turns each of them into one line and exit status 2.
 """
 
 from __future__ import annotations
@@ -14,28 +14,28 @@ from functools import lru_cache
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where in a text something stands; lines and columns count from 1, `None` is unknown."""
+    """Place in a text; lines and columns count from 1, `None` is unknown."""
 
     source: str | None = None
     line: int | None = None
     column: int | None = None
 
     def __str__(self) -> str:
-        """`file:line:column`, as far as known (compilers' and editors' form)."""
+        """`file:line:column` without the unknown parts, as compilers and editors write it."""
         parts = [self.source or "<text>", *(str(n) for n in (self.line, self.column) if n is not None)]
         return printable(":".join(parts))
 
 
 MAX_MESSAGE = 400
-"""Characters of a message; what people wrote may be much longer, and nobody reads that in an error."""
+"""Characters of a message; quoted input may be much longer."""
 MAX_NAME = 100
-"""Characters of a name for which the nearest valid one is searched; comparing is quadratic in them."""
+"""Characters of a name for which the nearest valid one is searched; a comparison is quadratic in them."""
 MAX_COMPARED = 50
-"""Names that are compared closely with a misspelt one; of more, those that share most pairs of letters."""
+"""Names that are compared with a misspelt one; of more, those that share most pairs of letters."""
 
 
 def nearest(name: str, valid: Iterable[str]) -> str | None:
-    """The valid name that `name` was probably meant to be, or `None` when nothing is close."""
+    """Return the valid name closest to `name`, or `None` when nothing is close."""
     if len(name) > MAX_NAME:
         return None
     folded = name.casefold()
@@ -60,24 +60,24 @@ def shortened(text: str, longest: int = MAX_MESSAGE) -> str:
 
 
 MAX_MEMBERS = 3
-"""Exceptions of a group that its description has; and so many groups inside each other."""
+"""Exceptions of a group in its description; also the most groups inside each other."""
 _name_of = type.__dict__["__name__"].__get__  # a metaclass may say something else, or fail
 _members_of = BaseExceptionGroup.__dict__["exceptions"].__get__
 
 
 def type_name(value: object) -> str:
-    """The name of the value's type on one line, without asking the value or its metaclass."""
+    """Return the name of the value's type on one line, without a call of the value or its metaclass."""
     return printable(shortened(str.__str__(_name_of(type(value))), MAX_NAME))
 
 
 def described(error: BaseException, *, named: bool = True) -> str:
-    """The exception on one line of at most `MAX_MESSAGE` characters; a group with the first exceptions in it.
+    """Return the exception on one line of at most `MAX_MESSAGE` characters; a group with its first exceptions.
 
     User code defines an exception's type, metaclass and text, and any of them may fail. This function does not.
 
     Args:
         error: the exception.
-        named: whether the name of its type stands before its text.
+        named: whether the name of its type precedes its text.
     """
     try:
         return shortened(_described(error, MAX_MEMBERS, named=named))
@@ -95,7 +95,7 @@ def _described(error: BaseException, depth: int, *, named: bool) -> str:
 
 
 def text_of(value: object, write: Callable[[object], str]) -> str:
-    """What `str` or `repr` says of the value, on one line; bounded, and words instead where it fails."""
+    """Return the value by `str` or `repr` on one line, bounded; a replacement if that fails."""
     try:
         text = shortened(str.__str__(write(value)))
         return shortened(printable(" ".join(text.split()) if write is str else text))
@@ -109,13 +109,13 @@ def _pairs(name: str) -> frozenset[str]:
 
 
 class InputError(Exception):
-    """Something a person wrote cannot be used; nothing was changed.
+    """A mistake in the input; nothing was changed.
 
     Attributes:
-        message: what is wrong, one sentence without a full stop.
-        place: where it stands.
-        found: the offending word as written, if there is one.
-        valid: the names that would have been right, if there is a list of them.
+        message: the mistake, one sentence without a full stop.
+        place: its place in the text.
+        found: the wrong word as written, if there is one.
+        valid: the valid names, if there is a list of them.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class InputError(Exception):
         self.message = printable(shortened(message))
         super().__init__(self.message)
         self.place = place
-        self.found = None if found is None else str(found)  # what programs hand in may be anything
+        self.found = None if found is None else str(found)  # a program may pass any object
         self.valid = tuple(sorted(set(valid)))
 
     @property
@@ -138,7 +138,7 @@ class InputError(Exception):
         return nearest(self.found, self.valid) if self.found is not None else None
 
     def located(self, place: Place) -> InputError:
-        """The same error with `place` filled in where it had none; used by readers that know the file."""
+        """Return the same error; one without a place gets this one from a reader that knows the file."""
         if self.place is None:
             self.place = place
         return self
@@ -157,11 +157,11 @@ class InputError(Exception):
 
 
 class ParseError(InputError):
-    """The text does not have the form of the language it claims to be in."""
+    """The text violates the grammar of its language."""
 
 
 class UnsupportedConstructError(ParseError):
-    """A part of PDDL, or of a relative of it, that is known but that nothing here can plan with.
+    """A known part of PDDL, or of a relative of it, that no planner here supports.
 
     Attributes:
         construct: its keyword, e.g. `:process`.
@@ -175,7 +175,7 @@ class UnsupportedConstructError(ParseError):
 
 
 class UnknownNameError(InputError):
-    """A type, predicate, function, object, variable or plot that nobody declared."""
+    """An undeclared type, predicate, function, object, variable or plot."""
 
 
 class SchemaError(InputError):
@@ -183,23 +183,23 @@ class SchemaError(InputError):
 
 
 class ConflictError(Exception):
-    """A transaction met a world that is not the one it was written for; nothing was changed."""
+    """A transaction does not fit the present world or thread; nothing was changed."""
 
 
 class StoreError(InputError):
-    """A store's file cannot be opened, read or written; what was acknowledged before is untouched."""
+    """A store's file cannot be opened, read or written; acknowledged changes are untouched."""
 
 
 class DamagedStoreError(StoreError):
-    """A store's file has not what was written into it; the message names the table and the row."""
+    """A store's file differs from the written data; the message names the table and the row."""
 
 
 class OutOfBoundsError(InputError):
     """A question, or an effect, reached its bounds or was cancelled; nothing was changed.
 
     Attributes:
-        work: how many facts and things it looked at.
-        seconds: how long it took.
+        work: number of facts and things that it examined.
+        seconds: its duration.
     """
 
     def __init__(self, message: str, *, work: int, seconds: float) -> None:
@@ -210,13 +210,13 @@ class OutOfBoundsError(InputError):
 
 
 class SchemaMismatchError(SchemaError):
-    """What was written with one schema is read with another that is not an extension of it.
+    """A store or world is read with a schema that does not extend its own.
 
     Attributes:
-        differences: what is missing or declared otherwise, one sentence each.
+        differences: missing and different declarations, one sentence each.
 
     Args:
-        said: what they come to.
+        said: their summary.
     """
 
     def __init__(
@@ -228,8 +228,8 @@ class SchemaMismatchError(SchemaError):
 
 
 class HistoryError(InputError):
-    """A version or time that is not kept, or not there yet."""
+    """A version or time that is no longer kept, or in the future."""
 
 
 class ConditionCancelledError(Exception):
-    """Someone waits for a condition that is not installed any more and will not fire again."""
+    """A coroutine waits for a condition that is no longer installed and will not fire again."""

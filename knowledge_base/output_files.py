@@ -1,10 +1,10 @@
-"""Files that commands write: judged before a command begins, written as a whole or not at all.
+"""Files that commands write: checked before a command begins, written as a whole or not at all.
 
-An output never takes the place of a store, of a file that belongs to one, or of another file of the same command. Two
-names are one file when the operating system says so (links, `./x`, case). A regular file is replaced: the new text
-stands complete beside it before it takes the name, with the mode of the old one. The place of a symlink is that of
-its target; other hard links keep the old text. Pipes, terminals and open descriptors (`-`, `/dev/stdout`,
-`/dev/fd/3`, a FIFO) are written as they are, since a new file in their place would reach nobody.
+An output never replaces a store, a file that belongs to one, or another file of the same command. The operating system
+decides whether two names are one file (links, `./x`, case). A regular file is replaced: a temporary file in the same
+folder gets the complete text and the old mode, then the name. A symlink leads to its target; other hard links keep the
+old text. Pipes, terminals and open descriptors (`-`, `/dev/stdout`, `/dev/fd/3`, a FIFO) are written in place, since
+no reader would open a new file.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from knowledge_base.journal.sidecar_files import is_database, store_owning
 
 STANDARD_OUTPUT = Path("-")
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
-"""Errors of a medium, which no other name would mend."""
+"""Errors of a medium, which another name would not avoid."""
 PATIENCE_S = 5.0
-"""Seconds in which somebody has to begin to read a FIFO."""
+"""Seconds in which a reader has to open a FIFO."""
 
 _LOOK_AGAIN_S = 0.02
 _DESCRIPTORS = re.compile(r"/proc/(?P<process>\d+)(/task/\d+)?/fd")
 _LOGS = {"-wal": (b"\x37\x7f\x06\x82", b"\x37\x7f\x06\x83"), "-journal": (b"\xd9\xd5\x05\xf9",)}
-"""How SQLite's logs begin."""
+"""First bytes of SQLite's logs."""
 _Identity = tuple[object, ...]
 
 
@@ -41,14 +41,13 @@ class Output:
     """A file that a command writes.
 
     Args:
-        path: where it goes; `-` is standard output.
+        path: its path; `-` is standard output.
         option: the word of the command that names it, for messages.
-        others: what else the command reads or writes, as far as it is known; the output is none of these, nor of the
-            files that a store keeps beside itself.
-        over: how a file begins that a stream may empty; a file that begins otherwise stays.
+        others: the other files of the command; the output is different from these and from their sidecar files.
+        over: first characters of a file that a stream may empty; another file stays.
 
     Raises:
-        InputError: nothing can or may be written there; nothing has been changed then.
+        InputError: the file cannot or must not be written; nothing was changed.
     """
 
     def __init__(self, path: Path | str, option: str, *others: Path | None, over: str | None = None) -> None:
@@ -59,19 +58,19 @@ class Output:
         self._check()
 
     def keep(self, *others: Path) -> None:
-        """Raise `InputError` if it is one of these files, which turned out to be needed, or belongs to one."""
+        """Raise `InputError` if it is one of these files, or belongs to one; the command needs them too."""
         self._others += others
         self._check()
 
     def write(self, text: str) -> None:
-        """Replace what is there by a text; errors as for `write_all`."""
+        """Replace the content by a text; errors as for `write_all`."""
         write_all({self: text})
 
     @contextmanager
     def stream(self) -> Iterator[TextIO]:
-        """What is written in the block, line by line, where it can be read at once.
+        """Open the file for a block; each line is written immediately.
 
-        A regular file is emptied, but not replaced: who reads it already goes on with the same file.
+        A regular file is emptied, but not replaced: a present reader continues with the same file.
 
         Raises:
             InputError: as for an output, or another program streams to this file.
@@ -87,7 +86,7 @@ class Output:
             yield stream
 
     def refused(self, why: str) -> InputError:
-        """The error that says why it cannot be written."""
+        """Return the error with the reason why it cannot be written."""
         return InputError(f"{self._option}: cannot write '{self.path}': {why}")
 
     def _check(self) -> None:
@@ -112,7 +111,7 @@ class Output:
                 raise self.refused("it is open only to be read")
             return
         if self._over is not None and found is not None and found.st_size > 0 and not _begins(self.path, self._over):
-            raise self.refused("it is there already, and is no file of that kind")
+            raise self.refused("it exists already and is not a file of that kind")
         folder = _target(self.path).parent
         if not folder.is_dir():
             raise self.refused(f"there is no folder '{folder}'")
@@ -126,12 +125,12 @@ class Output:
                 raise self.refused(f"the command needs '{other}' for something else")
 
     def _is_special(self) -> bool:
-        """Whether it is written as it is: no regular file, or one that is open already."""
+        """Whether it is written in place: it is not a regular file, or it is open already."""
         found = _status(self.path)
         return _descriptor(self.path) is not None or (found is not None and not stat.S_ISREG(found.st_mode))
 
     def _special(self) -> int:
-        """A descriptor of what cannot be replaced."""
+        """Return a descriptor of a file that cannot be replaced."""
         number = _descriptor(self.path)
         if number is not None:
             for stream in (sys.stdout, sys.stderr):
@@ -150,7 +149,7 @@ class Output:
                 return opened
 
     def _emptied(self) -> int:
-        """A descriptor of the regular file, empty, which no other stream has."""
+        """Return a descriptor of the regular file, empty, which no other stream has."""
         opened = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:
             self._take(opened)
@@ -169,13 +168,13 @@ class Output:
         begin = (self._over or "").encode()
         there = os.read(opened, len(begin))
         if there and there != begin:  # it has come since the check
-            raise self.refused("it is there already, and is no file of that kind")
+            raise self.refused("it exists already and is not a file of that kind")
         os.ftruncate(opened, 0)
         os.lseek(opened, 0, os.SEEK_SET)
 
     @contextmanager
     def _reported(self) -> Iterator[None]:
-        """Turns errors about names and rights into `InputError`s; those of a medium get the name of the file."""
+        """Turn errors about names and rights into `InputError`s; those of a medium get the name of the file."""
         try:
             yield
         except (BrokenPipeError, InputError):
@@ -184,24 +183,24 @@ class Output:
             if error.errno in FULL:
                 error.filename = str(self.path)
                 raise
-            why = "nobody reads it" if error.errno == errno.ENXIO else str(error.strerror)
+            why = "it has no reader" if error.errno == errno.ENXIO else str(error.strerror)
             raise self.refused(why) from None
         except ValueError as error:  # a null character in the name
             raise self.refused(str(error)) from None
 
 
 def write_all(texts: Mapping[Output, str]) -> None:
-    """Replace what is there by the texts, all of them or, with an error before the last is complete, none.
+    """Replace the contents by the texts, all of them or, with an error before the last is complete, none.
 
     Raises:
-        InputError: a text cannot be encoded as UTF-8, or nothing can be written there.
+        InputError: a text cannot be encoded as UTF-8, or a file cannot be written.
         OSError: there is no room.
     """
     complete = {output: _encoded(output, text) for output, text in texts.items()}
     beside: dict[Output, Path] = {}
     try:
         for output, data in complete.items():
-            output._check()  # noqa: SLF001  what is there may have come since
+            output._check()  # noqa: SLF001  another program may have made it since
             if output.path != STANDARD_OUTPUT and not output._is_special():  # noqa: SLF001
                 _stage(output, data, beside)
         for output, data in complete.items():
@@ -229,7 +228,7 @@ def _encoded(output: Output, text: str) -> bytes:
 
 
 def _stage(output: Output, data: bytes, beside: dict[Output, Path]) -> None:
-    """Write a file in the same folder, under a name that nobody else has."""
+    """Write a file in the same folder, under a new name."""
     target = _target(output.path)
     file = target.with_name(f".dsc-{os.urandom(8).hex()}.tmp")
     with output._reported():  # noqa: SLF001
@@ -246,7 +245,7 @@ def _stage(output: Output, data: bytes, beside: dict[Output, Path]) -> None:
 
 
 def _status(path: Path) -> os.stat_result | None:
-    """What the operating system says of what the name leads to; `None` if there is nothing."""
+    """Return the status of the file that the name leads to; `None` if there is none."""
     try:
         return path.stat()
     except FileNotFoundError:
@@ -254,12 +253,12 @@ def _status(path: Path) -> os.stat_result | None:
 
 
 def _target(path: Path) -> Path:
-    """The file that the name leads to, through all links."""
+    """Return the file that the name leads to, through all links."""
     return Path(os.path.realpath(path))
 
 
 def _identity(path: Path) -> _Identity:
-    """Equal for two names of one file; a file that is not there is its name in its folder."""
+    """Return equal values for two names of one file; a missing file is its name in its folder."""
     try:
         found = _status(path)
         if found is not None:
@@ -272,7 +271,7 @@ def _identity(path: Path) -> _Identity:
 
 
 def _descriptor(path: Path) -> int | None:
-    """The number of the open file that the name stands for, as `/dev/stdout` does; `None` for other names."""
+    """Return the number of the open file that a name such as `/dev/stdout` denotes; `None` for other names."""
     for _ in range(8):  # links to links
         folder = _DESCRIPTORS.fullmatch(os.path.realpath(path.parent))
         if folder is not None and path.name.isdecimal():
@@ -284,7 +283,7 @@ def _descriptor(path: Path) -> int | None:
 
 
 def _lost(path: Path) -> Path | None:
-    """The store whose file is empty or gone, if that is its place or its log, which may hold all of it."""
+    """Return the store with an empty or missing file, if the path is its own or its log's, which may hold all of it."""
     for end, begins in _LOGS.items():
         log = path if path.name.endswith(end) else path.with_name(path.name + end)
         if any(_begins(log, begin) for begin in begins):
@@ -293,7 +292,7 @@ def _lost(path: Path) -> Path | None:
 
 
 def _begins(path: Path, begin: bytes | str) -> bool:
-    """Whether it is a regular file that begins so. Not for stores: to close one takes SQLite's locks on it away."""
+    """Whether it is a regular file that begins so. Not for stores: closing one removes SQLite's locks on it."""
     wanted = begin.encode() if isinstance(begin, str) else begin
     try:
         if not stat.S_ISREG(path.stat().st_mode):  # others could keep us waiting
@@ -305,4 +304,4 @@ def _begins(path: Path, begin: bytes | str) -> bool:
 
 
 _KINDS = {stat.S_IFDIR: "a folder", stat.S_IFBLK: "a disk", stat.S_IFSOCK: "a socket"}
-"""What is never written to, as messages call it."""
+"""Kinds of files that are never written, with their names in messages."""

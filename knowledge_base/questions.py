@@ -100,7 +100,7 @@ class Questions:
         """Return the condition; `params` must have all its free variables.
 
         Raises:
-            ParseError: the text is no condition.
+            ParseError: the text is not a condition.
             UnknownNameError: an undeclared predicate, function, type, variable or object.
             SchemaError: a wrong number of arguments or a type that can never fit.
         """

@@ -1,7 +1,7 @@
-"""Sensor streams and transforms by reference: they stay outside, the latest value is known (S4.9).
+"""Data sources: sensor streams and transforms by reference, of which only the latest value is known (S4.9).
 
-A fluent that is bound to a source is worth what the source was fed last. That is seen at once by whoever asks
-and by installed conditions, at the present version; no version, change or journal ever has it.
+A fluent that is bound to a source has the latest value of the source. Questions and installed conditions see it
+immediately, at the present version; versions, changes and journals do not have it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class DataSource:
 
     Attributes:
         fluent: the function with its arguments.
-        reference: where the values come from, e.g. `tf:map/cup1`.
+        reference: the origin of the values, e.g. `tf:map/cup1`.
     """
 
     def __init__(self, owner: Sources, fluent: Fact, reference: str) -> None:
@@ -38,26 +38,26 @@ class DataSource:
 
     @property
     def latest(self) -> Content | None:
-        """What it was fed last; `None` before the first time."""
+        """Its latest value; `None` before the first update."""
         return self._latest
 
     @property
     def closed(self) -> bool:
-        """Whether it feeds no longer: it was closed, its thing was removed, or the knowledge base was closed."""
+        """Whether it is closed: by itself, with its thing, or with the knowledge base."""
         return self._closed
 
     def update(self, content: Content) -> None:
-        """The fluent is worth this now. While somebody's transaction is open, this waits for its end.
+        """Set the value of the fluent, after the end of an open transaction.
 
         Raises:
-            SchemaError: it is not of the type of the function's result.
+            SchemaError: the value does not have the type of the function's result.
             InputError: a number that is not finite.
             ConflictError: the source is closed.
         """
         self._owner.feed(self, content)
 
     def close(self) -> None:
-        """Feed no longer: the fluent reads as if it had never been bound; repeating it is fine."""
+        """Stop feeding: the fluent has the value that was set; closing it again has no effect."""
         self._owner.close(self)
 
     def __repr__(self) -> str:
@@ -74,11 +74,11 @@ class DataSource:
     # --- called by its owner, under the lock
 
     def take(self, content: Content) -> None:
-        """It was fed."""
+        """Keep the latest value."""
         self._latest = content
 
     def end(self) -> None:
-        """It feeds no longer."""
+        """Mark it as closed."""
         self._closed = True
 
 
@@ -97,7 +97,7 @@ class Sources:
         self._open: dict[Fact, DataSource] = {}
 
     def bind(self, fluent: Fact, reference: str) -> DataSource:
-        """Make a source for a fluent that has none; see `KnowledgeBase.bind_source`."""
+        """Make a source for a fluent without one; see `KnowledgeBase.bind_source`."""
         if not isinstance(reference, str) or not reference:
             raise InputError(f"a source's reference is text that says where values come from, not {reference!r}")
         with self._lock:
@@ -110,12 +110,12 @@ class Sources:
         return source
 
     def listed(self) -> list[DataSource]:
-        """Those that are open."""
+        """Return the open sources."""
         with self._lock:
             return list(self._open.values())
 
     def feed(self, source: DataSource, content: Content) -> None:
-        """Take in a value; see `DataSource.update`."""
+        """Set a value; see `DataSource.update`."""
         fluent = source.fluent
         require_content(content, self._state.schema.result(fluent.predicate), fluent)
         with self._lock:
@@ -139,7 +139,7 @@ class Sources:
         self._notifier.deliver()
 
     def close_about(self, things: Iterable[str]) -> None:
-        """Things go, and with them what feeds values about them; conditions are told by whoever removes them."""
+        """Close the sources about removed things; the commit that removes them notifies the conditions."""
         gone = set(things)
         for source in [s for s in self._open.values() if not gone.isdisjoint(s.fluent.args)]:
             self._drop(source)
@@ -152,7 +152,7 @@ class Sources:
             graph.unfeed(source.fluent, self._state.values.get(source.fluent))
 
     def _show(self, fluent: Fact, reference: str, content: Content) -> None:
-        if (graph := self._graph()) is not None:  # nobody has looked at it otherwise
+        if (graph := self._graph()) is not None:  # no reader has used it before
             graph.feed(fluent, reference, content)
 
     def _tell(self, fluent: Fact, before: Content) -> None:

@@ -1,22 +1,21 @@
-"""How values are spelt in the language: which names need no quotes, and a value as text that is read back as it is."""
+"""Spelling of values in the language: names without quotes, and values as text that a reader gives back unchanged."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 
-# What can be written without quotes and is read back as the same text (names are folded to lower case); a `-` in front
-# parts a name from its type in typed lists.
+# Names without quotes, which a reader folds to lower case. A `-` in front separates a name from its type in lists.
 _PLAIN_NAME = re.compile(r"[^\s()\";?:-][^\s()\";?]*")
 _NOT_IN_NAMES = re.compile(r"[\s()\";?]+")
 LONGEST_NAME = 255
 """Characters of the name of a thing."""
 A_NAME_IS = (
     f"a name has 1 to {LONGEST_NAME} printable characters in lower case without blanks, parentheses, quotes, ';' and"
-    " '?'; it begins with neither '-' nor ':' and is no number, nor true, false or #t"
+    " '?'; it begins with neither '-' nor ':' and is not a number, true, false or #t"
 )
 _TIME_PASSED = "#t"
-"""How much time has passed, in PDDL+."""
+"""The passed time in PDDL+."""
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?")
 TRUTH_VALUES: Mapping[str, bool] = {"true": True, "false": False}
 """The two words that are read as truth values, not as names."""

@@ -1,4 +1,4 @@
-"""What people say of a world, as text: facts told, numbers set and things named, each a change (`Delta`).
+"""Statements: facts, values and things as text, each a change (`Delta`).
 
 A statement is an effect of the language (`(on cup1 table)`, `(not (on cup1 table))`, `(increase (failures cup1) 1)`),
 a number as problems write it (`(= (weight cup1) 0.2)`), or a thing with its type, told like a fact (`(cup cup1)`).
@@ -22,20 +22,20 @@ from knowledge_base.world.overlay import Overlay
 
 
 def told(statements: Iterable[str], world: World, source: str | None = None, bounds: Bounds | None = None) -> Delta:
-    """The change that makes all the statements true, one after the other; nothing is changed yet.
+    """Return the change that makes all the statements true, one after the other.
 
     Things may be used in front of the statement that names their type.
 
     Args:
         statements: the texts, one statement each.
-        world: what they are said of.
-        source: what to call them in messages; their number follows it.
-        bounds: what working them out may take, all together.
+        world: the world that they change.
+        source: their name in messages; their number follows it.
+        bounds: work, seconds and cancellation for all of them together.
 
     Raises:
-        OutOfBoundsError: it takes more.
-        ParseError: a text is no statement.
-        UnknownNameError: an undeclared type, predicate or function, or a thing that is neither there nor named.
+        OutOfBoundsError: they exceed the bounds.
+        ParseError: a text is not a statement.
+        UnknownNameError: an undeclared type, predicate or function, or a thing that is neither known nor named.
         SchemaError: a wrong number of arguments or a wrong type, or a thing of another type.
     """
     effects = [_effect(text, _called(source, number)) for number, text in enumerate(statements, 1)]
@@ -55,10 +55,10 @@ def told(statements: Iterable[str], world: World, source: str | None = None, bou
 
 
 def retracted(statements: Iterable[str], world: World, source: str | None = None) -> Delta:
-    """The change that takes the facts back; of a thing with its type it takes the thing and all that is said of it.
+    """Return the change that retracts the facts; for a thing with its type, the thing and everything about it.
 
     Raises:
-        InputError: as for `told`; also a fact that does not hold, since something else was meant then.
+        InputError: as for `told`; also a fact that is not true, which must be a mistake.
     """
     view = Overlay(world)
     known = _known(view)
@@ -74,23 +74,23 @@ def _called(source: str | None, number: int) -> str | None:
 
 
 def _effect(text: str, source: str | None) -> Effect:
-    """The statement as an effect; a number said with `=` is assigned."""
+    """Return the statement as an effect; `=` assigns a number."""
     groups = read(text, source)
     if len(groups) != 1 or not isinstance(groups[0], Group) or groups[0].head() != "=":
         return parse_effect(text, source)
     said = parse_condition(groups[0])
     if not isinstance(said, Comparison) or not isinstance(said.left, Call):
-        raise ParseError("a number is said of a function: (= (FUNCTION ...) NUMBER)", place=said.place)
+        raise ParseError("'=' sets a number of a function: (= (FUNCTION ...) NUMBER)", place=said.place)
     return NumericEffect("assign", said.left, said.right, place=said.place)
 
 
 def _thing(effect: Effect, world: World) -> Mapping[str, str] | None:
-    """The thing that the statement names with its type, if it is that."""
+    """Return the thing that the statement names with its type, if it does."""
     if not isinstance(effect, Add) or not world.schema.is_type(effect.atom.predicate, len(effect.atom.args)):
         return None
     (arg,) = effect.atom.args
     if not isinstance(arg, Constant) or not isinstance(arg.value, str):
-        raise SchemaError(f"a thing is told by its name: ({effect.atom.predicate} NAME)", place=effect.place)
+        raise SchemaError(f"a type takes the name of a thing: ({effect.atom.predicate} NAME)", place=effect.place)
     return {arg.value: effect.atom.predicate}
 
 
@@ -100,7 +100,7 @@ def _known(world: World) -> dict[str, str]:
 
 def _atom(e: Expression) -> Atom:
     if not isinstance(e, Atom):
-        raise InputError("what is taken back is a fact or a thing: (on cup1 table), (cup cup1)", place=e.place)
+        raise InputError("a retraction names a fact or a thing: (on cup1 table), (cup cup1)", place=e.place)
     return e
 
 

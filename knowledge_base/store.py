@@ -1,4 +1,4 @@
-"""The knowledge base: one consistent world model for all who ask, change and listen (S4.2, S4.3)."""
+"""Knowledge base: one consistent world model for questions, changes and listeners (S4.2, S4.3)."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ Now = Callable[[], float]
 
 
 class KnowledgeBase(View):
-    """A world model that may be asked and changed from several threads.
+    """A world model that several threads may query and change.
 
     One lock orders questions and changes by arrival (`world.read_write_lock`). A question sees one version and its
     answer is a finished list. A change is made as a whole or, with an error, not at all. Listeners are called when the
     lock is released.
 
-    Made like this it is in memory only and remembers its last changes; `open` makes one that lasts.
+    The constructor makes one in memory, which keeps its last changes; `open` makes one in a file.
 
     Args:
-        schema: what may be said.
+        schema: the declarations.
         clock: gives the time of changes, in seconds.
-        history: what it goes on from and where its changes are kept; the schema is that of the history then.
+        history: its past, which keeps its changes and replaces the schema; by default the last changes in memory.
     """
 
     def __init__(self, schema: Schema, clock: Now = wall.time, history: History | None = None) -> None:
@@ -76,21 +76,21 @@ class KnowledgeBase(View):
         read_only: bool = False,
         new: bool = False,
     ) -> KnowledgeBase:
-        """A knowledge base in memory, or one that lasts in a file; close it, or use it in a `with` block.
+        """Open a knowledge base in memory or in a file; close it, or use it in a `with` block.
 
         Args:
-            schema: what may be said; for a file that is there already `None` takes what it was written with,
-                and an extension of that (more declarations, none changed) is accepted and recorded.
-            path: the store's file, made when nothing is there; `None` keeps everything in memory.
-            durability: what a committed change outlives: "memory" nothing (without a path), "process" the
-                death of this process by whatever means (the default with a path), "power" a power cut too.
+            schema: the declarations; `None` takes those of the file. An extension of those of the file (more
+                declarations, none changed) is recorded.
+            path: the store's file, made when it is missing; `None` is in memory.
+            durability: the event that a commit survives: "process" the death of this process (default with a path),
+                "power" also a power cut, "memory" none (no path).
             clock: gives the time of changes, in seconds.
-            read_only: look at a store that another process may be writing; `refresh` follows it.
-            new: the file must not be there yet.
+            read_only: read a store that another process may be writing; `refresh` follows it.
+            new: the file must be a new one.
 
         Raises:
-            StoreError: the file cannot be read or written, is no store, or somebody else is writing it; or a file
-                beside it has a name of the store's and is none of it. All files are as before.
+            StoreError: the file cannot be read or written, is not a store, or has another writer; a foreign file has
+                the name of a sidecar file. All files stay unchanged.
             SchemaMismatchError: the file was written with a schema that this one does not extend.
             InputError: there is no schema, or path and durability contradict each other.
         """
@@ -106,7 +106,7 @@ class KnowledgeBase(View):
         if durability == "memory":
             raise InputError(f"with the file '{path}' durability is 'process' or 'power', not 'memory'")
         if read_only and new:
-            raise InputError("a store that is opened read_only is there already, and not new")
+            raise InputError("a store that is opened read_only exists already, and is not new")
         file = _resolved(path)
         archive = Archive(file, schema) if read_only else Journal(file, schema, durability or "process", clock, new=new)
         try:
@@ -124,7 +124,7 @@ class KnowledgeBase(View):
         *,
         source: str | None = None,
     ) -> KnowledgeBase:
-        """What `to_json` wrote, from its text or a file (a `Path`), at the same version, in memory.
+        """Read the output of `to_json`, a text or a file (a `Path`), into memory at the same version.
 
         `source` names a text in messages.
 
@@ -141,10 +141,10 @@ class KnowledgeBase(View):
         self.close()
 
     def close(self) -> None:
-        """Give back the file, if there is one; nothing can be changed then. What was committed is in it already.
+        """Close the file, if there is one, which has all commits already; further changes are refused.
 
-        Installed conditions are cancelled, so that no timer goes on and whoever waits for one is told; watches
-        end and sources are closed. Repeating it is fine.
+        Conditions are cancelled with their timers and waiting coroutines, watches end, and sources are closed. Closing
+        it again has no effect.
         """
         with self._lock:
             self._closed = True
@@ -159,15 +159,14 @@ class KnowledgeBase(View):
             self._history.close()
 
     def refresh(self) -> int:
-        """Take in what the writer of a store that is opened `read_only` has committed meanwhile (S4.10).
+        """Apply the new commits of the writer to a store that is opened `read_only` (S4.10); return the version.
 
-        The changes are announced in order, as if they were made here, to subscribers, watches and installed
-        conditions. Returns the version reached.
+        Subscribers, watches and installed conditions receive the changes in order, as if they were made here.
 
         Raises:
             ConflictError: this one is not opened `read_only`, or this thread is inside a transaction.
-            HistoryError: the writer has compacted what was not taken in yet; open the store anew.
-            StoreError: the file cannot be read, or the writer has a longer schema now; likewise.
+            HistoryError: the writer has compacted some of these changes; open the store again.
+            StoreError: the file cannot be read, or the writer has extended the schema; open the store again.
         """
         with self._lock.changing():
             self._require_free()
@@ -181,16 +180,15 @@ class KnowledgeBase(View):
     def transaction(
         self, author: str, *, expect: int | None = None, key: str | None = None, along: Writer | None = None
     ) -> Iterator[Transaction]:
-        """Several changes as one: committed when the block ends, dropped when it raises.
+        """Make several changes as one: committed when the block ends, dropped when it raises.
 
-        Other threads ask meanwhile; a thread that changes something waits until the block is left. A block with a
-        `key` that was committed before runs, but changes nothing: its transaction has the first one's `change` from
-        the beginning.
+        Questions of other threads continue meanwhile; their changes wait for the end of the block. A block with a `key`
+        that was committed before runs, but changes nothing: its transaction has the first `change` from the beginning.
 
         Args:
-            author: who changes it.
+            author: the author of the change.
             expect: the version that the world must have at the beginning.
-            key: a name for this change, by which a repetition is known, also after a restart.
+            key: an idempotency key: a name of this change that recognises a repetition, also after a restart.
             along: writes more rows into the store's file in the same SQLite transaction.
 
         Raises:
@@ -225,13 +223,12 @@ class KnowledgeBase(View):
         key: str | None = None,
         along: Writer | None = None,
     ) -> Change:
-        """Commit `delta` as a whole; the change returned holds what really became different.
+        """Commit `delta` as a whole; return its effective change.
 
-        Arguments as for `transaction`; with a `key` that was committed before, that change is returned and
-        nothing is changed.
+        Arguments as for `transaction`; for a `key` that was committed before, return that change and change nothing.
 
         Raises:
-            UnknownNameError: an undeclared type, predicate or function, or a thing that is not there.
+            UnknownNameError: an undeclared type, predicate or function, or an unknown thing.
             SchemaError: a wrong number of arguments or a wrong type.
             InputError: a number that is not finite.
             ConflictError: the version is not the expected one, or this thread is inside a transaction.
@@ -250,18 +247,18 @@ class KnowledgeBase(View):
         return change
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
-        """What is committed inside the block is written to the file as one, together with what the block itself writes.
+        """Write the commits inside a block to the file as one transaction, together with the block's own rows.
 
-        Each change is a version of its own, and is seen and announced at once, as always; nobody may count on
-        it before the block is left. Other threads that change something, or ask for the past, wait until then.
+        Each commit is a separate version and is announced immediately; it lasts only after the block. Changes of other
+        threads, and their questions about the past, wait until then.
 
         Returns:
-            What gives the block the connection; whoever writes with it neither commits nor rolls back. Entering or
-            leaving it raises the errors.
+            A context manager with the connection; its user neither commits nor rolls back. Its entry or exit raises
+            the errors.
 
         Raises:
-            StoreError: there is no file, or it cannot be written. What is in memory is then ahead of it: every
-                further change is refused, and the file, opened anew, has what was before the block.
+            StoreError: there is no file, or it cannot be written. The memory is then ahead of the file: every further
+                change is refused, and the file, opened again, has the state before the block.
             ConflictError: this thread is inside a transaction, or the store is opened `read_only`.
         """
         return GroupCommit(self._lock, self._require_free, self._history)
@@ -269,9 +266,9 @@ class KnowledgeBase(View):
     def subscribe(self, listener: Listener) -> Callable[[], None]:
         """Call `listener` with every committed change from now on; the function returned ends that.
 
-        Changes come in commit order; a commit that changes nothing is not announced. A listener may ask and
-        change the knowledge base. When listeners raise, the committing call raises an `ExceptionGroup`
-        after all have been told; the change stays.
+        Changes come in commit order; a commit without effect is not announced. A listener may query and change the
+        knowledge base. If listeners raise, the committing call raises an `ExceptionGroup` after all calls; the change
+        stays.
         """
         return self._notifier.subscribe(listener)
 
@@ -288,19 +285,19 @@ class KnowledgeBase(View):
     ) -> Condition:
         """Keep a condition evaluated at every version from now on, and fire when it becomes true (S2.4).
 
-        What an update costs depends on what it changes, see `conditions.join`. What is true already does
-        not fire; it begins to hold.
+        The cost of an update depends on its change, see `conditions.join`. A condition that is true already does not
+        fire; its hold time begins.
 
         Args:
             text: a condition; it is true if there are values for its free variables, which then are its witness.
-            params: variables that have a value already.
+            params: variables with a given value.
             fire: `edge`, when it becomes true; `each`, also at every change of the set of its witnesses while
                 it is true.
-            hold_s: it fires when it has been true for so many seconds without a break.
-            once: it is cancelled by its first firing.
-            hysteresis: it stays true until its comparisons fail by more than that: `(> (level) 9)` becomes
-                true above 9 and false when `(> (level) (- 9 hysteresis))` is.
-            clock: what `hold_s` is measured with.
+            hold_s: time in seconds for which it must stay true before it fires.
+            once: its first firing cancels it.
+            hysteresis: margin by which its comparisons must fail before it is false: `(> (level) 9)` becomes true
+                above 9, and false when `(> (level) (- 9 hysteresis))` is false.
+            clock: measures `hold_s`.
 
         Raises:
             InputError: as for `query`; a negative or not finite time, a time without a clock, a hysteresis
@@ -319,18 +316,17 @@ class KnowledgeBase(View):
     def watch(
         self, pattern: str | Expression | None = None, params: Mapping[str, Value] | None = None, *, limit: int = 1000
     ) -> Watch:
-        """The committed changes from now on that touch `pattern`, as an asynchronous iterator.
+        """Watch the commits from now on that touch `pattern`, as an asynchronous iterator.
 
-        When `limit` changes wait to be read and another one comes, all of them are dropped and the next item
-        is a `Missed` that says since when.
+        If `limit` changes wait for the reader and another one comes, all are dropped; the next item is a `Missed`.
 
         Args:
             pattern: a predicate, function or type with arguments, e.g. `(on ?o table)`; `None` for all changes.
-            params: variables of the pattern that have a value.
-            limit: how many changes may wait, at least 1.
+            params: variables of the pattern with a given value.
+            limit: number of changes that may wait, at least 1.
 
         Raises:
-            InputError: the pattern is none, or names what is not declared.
+            InputError: the pattern is not a pattern, or has an undeclared name.
             StoreError: the knowledge base is closed.
         """
         with self._lock:
@@ -341,19 +337,19 @@ class KnowledgeBase(View):
             return made
 
     def bind_source(self, function: str, *args: Value, reference: str) -> DataSource:
-        """Let a function be fed from outside: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.
+        """Let a source feed a function: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.
 
-        Its latest value is what questions, snapshots and installed conditions see; versions, changes, watches,
-        past worlds and JSON do not have it. Until the first update and after closing the function reads as if
-        it were not bound; meanwhile it cannot be set. Removing a thing closes the sources about it.
+        Questions, snapshots and installed conditions see its latest value; versions, changes, watches, past worlds and
+        JSON do not. Before the first update and after closing, the function has the value that was set. It cannot be
+        set meanwhile. The removal of a thing closes the sources about it.
 
         Args:
             function: its name.
             args: its arguments.
-            reference: where the values come from, in words of whoever provides them.
+            reference: the origin of the values, in the provider's words.
 
         Raises:
-            UnknownNameError: an undeclared function, or a thing that is not there.
+            UnknownNameError: an undeclared function, or an unknown thing.
             SchemaError: a wrong number of arguments, a wrong type, or there is a source for it already.
             InputError: the reference is empty.
             ConflictError: this thread is inside a transaction or a question.
@@ -364,20 +360,20 @@ class KnowledgeBase(View):
             return self._sources.bind(Fact(function, args), reference)
 
     def sources(self) -> list[DataSource]:
-        """The sources that are open, in the order in which they were bound."""
+        """Return the open sources in the order in which they were bound."""
         return self._sources.listed()
 
     def at(self, *, version: int | None = None, time: float | None = None) -> View:
-        """The world as it was, to be asked like this one.
+        """Return a view of a past world.
 
         Args:
-            version: after so many changes.
-            time: in seconds of the clock; what was changed at that very time counts.
+            version: number of changes before.
+            time: time in seconds of the clock; changes at that very time count.
 
         Raises:
-            HistoryError: that is not kept any more (`compact`; in memory the last 10,000 things, facts and
-                numbers changed are kept), or it is not there yet.
-            InputError: not exactly one of the two is given, or it is no version or no time.
+            HistoryError: it is no longer kept (`compact`; memory keeps the last 10,000 changed things, facts and
+                numbers), or it is in the future.
+            InputError: not exactly one of the two is given, or it is neither a version nor a time.
         """
         if (version is None) == (time is None):
             raise InputError("at(...) takes a version or a time")
@@ -391,36 +387,35 @@ class KnowledgeBase(View):
 
     @property
     def oldest(self) -> int:
-        """The first version that can still be asked for (`at`), and since which changes are known."""
+        """The first version that is still kept, for `at` and `changes`."""
         return self._history.oldest()
 
     def changes(self, since: int = 0, until: int | None = None) -> list[Change]:
-        """The changes after version `since`, up to that which made version `until` (default: all).
+        """Return the changes after version `since` up to version `until` (default: all).
 
         Raises:
-            HistoryError: some of them are not kept any more, or are not there yet.
-            InputError: one of the two is no version, or `until` is before `since`.
+            HistoryError: some of them are no longer kept, or are in the future.
+            InputError: one of the two is not a version, or `until` is before `since`.
         """
         with self._lock.alone():
             self._require_reached(since)
             until = self._version if until is None else until
             self._require_reached(until)
             if until < since:
-                said = f"changes are told from a version on until a later one, not from {since} until {until}"
-                raise InputError(said)
+                raise InputError(f"changes are read from a version up to a later one, not from {since} to {until}")
             return self._history.changes(since, until)
 
     @property
     def digest(self) -> bytes:
-        """Of the newest version in the store's file and of everything before it; empty in memory."""
+        """Digest of the newest version in the store's file, which covers all versions before it; empty in memory."""
         return self._history.digest
 
     def compact(self, keep_since: int | None = None) -> None:
-        """Forget what only versions before `keep_since` need (default: the present one); keys are remembered.
+        """Forget the versions before `keep_since` (default: the present one); idempotency keys stay.
 
         Raises:
-            HistoryError: that version is not kept any more or not there yet.
-            InputError: it is no version.
+            HistoryError: that version is no longer kept, or in the future.
+            InputError: it is not a version.
             StoreError: the file cannot be written, or the knowledge base is closed.
         """
         with self._lock.changing():
@@ -430,14 +425,14 @@ class KnowledgeBase(View):
             self._history.compact(version, self._present)
 
     def _first(self, key: str | None, expect: int | None) -> Change | None:
-        """The change that `key` stands for already; only a new one must meet the expected version."""
+        """Return the change that was committed under `key`; a new one must meet the expected version."""
         first = None if key is None else self._history.first(key)
         if first is None and expect is not None and expect != self._version:
             raise ConflictError(f"version {expect} is expected, but the world is at version {self._version}")
         return first
 
     def _commit(self, effective: Delta, author: str, key: str | None, along: Writer | None) -> Change:
-        self._require_open()  # a transaction's own block may have closed it
+        self._require_open()  # the block of a transaction may have closed it
         self._time = max(self._time, self._clock())
         change = Change(self._version + bool(effective), author, effective, self._time)
         self._history.append(change, key, self._state, along)
@@ -446,7 +441,7 @@ class KnowledgeBase(View):
         return change
 
     def _take_in(self, change: Change) -> None:
-        """The change is kept; make it, and queue what others have to be told."""
+        """Make a change that the history keeps, and queue the notifications."""
         effective = change.delta
         departures = self._installed.departures(effective) if effective.removed_nodes else []
         if effective.removed_nodes:
@@ -467,11 +462,11 @@ class KnowledgeBase(View):
         if version < 0:
             raise gone(version, self.oldest)
         if version > self._version:
-            raise HistoryError(f"version {version} is not there yet; the newest is {self._version}")
+            raise HistoryError(f"version {version} is in the future; the newest is {self._version}")
 
     def _require_open(self) -> None:
         if self._closed:
-            raise StoreError("the knowledge base is closed; it can only be asked")
+            raise StoreError("the knowledge base is closed; it only answers questions")
 
     def _require_free(self) -> None:
         self._require_open()

@@ -73,7 +73,7 @@ class Transaction:
         self.apply(Delta(removed=(Fact(predicate, args),)))
 
     def replace(self, predicate: str, *args: Value) -> None:
-        """Make the fact true, and false all that differ in the last argument: `tx.replace("at", "cup1", "shelf")`.
+        """Make the fact true, each with another last argument false: `tx.replace("at", "cup1", "shelf")`.
 
         Errors as for `tell`. The predicate needs an argument; one with a single argument must be functional.
         """

@@ -68,19 +68,19 @@ class View:
         limit: int | None = None,
         bounds: Bounds | None = None,
     ) -> list[Binding]:
-        """The values of the free variables that make the text true, each choice once.
+        """Return the values of the free variables that make the text true, each choice once.
 
         Args:
             text: a condition such as `(and (on ?o ?table) (cup ?o))`.
             params: variables that have a value already; they are not part of the answers.
-            limit: at most so many answers; the search ends with the last of them.
+            limit: most answers; the search ends with the last of them.
             bounds: work, seconds and cancellation that end the search with an error.
 
         Raises:
             OutOfBoundsError: the search exceeds its bounds, or was cancelled.
-            ParseError: the text is no condition.
-            UnknownNameError: an undeclared predicate, function or type, a thing that is not there, or a parameter
-                that the text does not have.
+            ParseError: the text is not a condition.
+            UnknownNameError: an undeclared predicate, function or type, an unknown thing, or a parameter that the text
+                does not have.
             SchemaError: a wrong number of arguments or a type that can never fit.
             InputError: a variable occurs only under `not` or in a comparison.
         """
@@ -93,13 +93,13 @@ class View:
     def stream(
         self, text: str | Expression, params: Mapping[str, Value] | None = None, *, bounds: Bounds | None = None
     ) -> Iterator[Binding]:
-        """The answers of `query` in the same order, without a list of them all; each when it is found.
+        """Return the answers of `query` in the same order, each when it is found.
 
-        Other threads may ask and change the knowledge between two answers. An error about candidates that cannot be
+        Other threads may query and change the knowledge between two answers. An error about candidates that cannot be
         computed comes after all answers.
 
         Raises:
-            ConflictError: a change was committed before the last answer; `at` gives a world that stays as it is.
+            ConflictError: a change was committed before the last answer; `at` gives a world that stays unchanged.
             InputError: as for `query`.
         """
         meter = Meter(bounds)
@@ -120,7 +120,7 @@ class View:
                 try:
                     with meter.over(text):
                         for answer in islice(found, _TOGETHER):
-                            answers.append(answer)  # noqa: PERF402  what was found before an error counts
+                            answers.append(answer)  # noqa: PERF402  answers before an error count
                 except InputError as error:
                     wrong = error
             yield from answers
@@ -142,9 +142,9 @@ class View:
             return self._questions.ask(text, given, BoundedWorld(self._state, meter))
 
     def prepare(self, text: str | Expression, *parameters: str) -> Prepared:
-        """A question to be asked again and again: `kb.prepare("(on ?x ?place)", "place").query("table")`.
+        """Prepare a question for repeated use: `kb.prepare("(on ?x ?place)", "place").query("table")`.
 
-        The text is read and checked now, and asked with the values alone, in the order of the parameters' names.
+        The text is parsed and checked now; the question takes values alone, in the order of the parameters' names.
 
         Raises:
             ParseError, UnknownNameError, SchemaError, InputError: as for `query`.
@@ -168,7 +168,7 @@ class View:
             return plan_query(self._questions.query(text, params, self._state), self._state, params)
 
     def overlay(self) -> Overlay:
-        """A world of pending changes on top of this one, which stays as it is."""
+        """Return a world of pending changes on top of this one, which stays unchanged."""
         return Overlay(self)
 
     def snapshot(self) -> WorldState:

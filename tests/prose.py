@@ -94,9 +94,7 @@ WORDS = {
 }
 """Private or archaic words (patterns), and the words to use instead."""
 
-PENDING = {
-    "knowledge_base", "knowledge_base/world",
-}  # fmt: skip
+PENDING: set[str] = set()
 """Rooms that are not rewritten yet: pages, and folders without the folders inside. The list only shrinks."""
 
 

@@ -1,1 +1,1 @@
-"""A world in memory: what may be said of it, what is true in it, and what a change would make of it."""
+"""A world in memory: its schema, its state, and pending changes on top of it."""

@@ -1,7 +1,7 @@
-"""Predicates that Python computes from what the world says, e.g. `(near ?a ?b)` from two positions.
+"""Computed predicates: Python functions of facts and values, e.g. `(near ?a ?b)` of two positions.
 
-They are declared, not guessed: which facts and numbers a computed predicate reads is part of it, so that
-an installed condition is judged anew when one of those changes, and only then.
+A computed predicate declares the facts and values that it reads. An installed condition is evaluated again when one of
+them changes, and only then.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from knowledge_base.language.syntax.text import parse_term, to_text
 from knowledge_base.pddl.domain_text import parse_declaration
 
 MOST_NESTED = 8
-"""How many may read one through the other; each multiplies what judging the first costs."""
+"""Most computed predicates that read one through the other; each multiplies the cost of the first."""
 
 _Inputs = ParamSpec("_Inputs")
 _SOURCE = "@computed"
@@ -35,17 +35,17 @@ _SOURCE = "@computed"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Computed(Generic[_Inputs]):
-    """A predicate whose truth is what a function of its inputs gives; made by `computed`.
+    """A predicate with its truth from a function of inputs; made by `computed`.
 
-    It can be called like the function. Before a schema has it, a read such as `(clean ?a)` is taken for a
-    function's value; the schema knows which are predicates.
+    It can be called like the function. A read such as `(clean ?a)` is a function's value until a schema resolves it as
+    a predicate.
 
     Attributes:
         name: the predicate's name.
-        parameters: what it is about.
+        parameters: its parameters.
         reads: its inputs, over the parameters.
-        function: gets their values in order and gives the truth.
-        place: where it is declared.
+        function: takes their values in order and returns the truth.
+        place: the place of its declaration.
     """
 
     name: str
@@ -55,35 +55,35 @@ class Computed(Generic[_Inputs]):
     place: Place | None = field(default=None, repr=False)
 
     def __call__(self, *args: _Inputs.args, **kwargs: _Inputs.kwargs) -> bool:
-        """What the function gives."""
+        """Call the function."""
         return self.function(*args, **kwargs)
 
     def inputs(self, args: tuple[Term, ...]) -> tuple[Read, ...]:
-        """What it reads when it is about `args`."""
+        """Return its inputs for the arguments `args`."""
         given = {p.name: arg for p, arg in zip(self.parameters, args, strict=True)}
         return tuple(_put_in(read, given) for read in self.reads)
 
     def resolved(self, predicates: Callable[[str, int], bool]) -> Computed[_Inputs]:
-        """The same, with the reads of predicates told from those of functions.
+        """Return the same with resolved reads.
 
         Args:
-            predicates: whether that name with that many arguments is a predicate or type.
+            predicates: tells whether a name with a number of arguments is a predicate or type.
         """
         return replace(self, reads=tuple(_resolved(read, predicates) for read in self.reads))
 
     def refused(self, place: Place | None = None) -> SchemaError:
-        """The error for telling, retracting or watching it."""
+        """Return the error for asserting, retracting or watching it."""
         inputs = ", ".join(map(to_text, self.reads)) or "nothing"
         return SchemaError(
-            f"'{self.name}' is computed, so that no fact says it; told and watched is what it reads: {inputs}",
+            f"'{self.name}' is computed and has no facts; tell and watch its inputs: {inputs}",
             place=place,
         )
 
     def judge(self, values: Sequence[object]) -> bool:
-        """Its truth for these inputs.
+        """Return its truth for these inputs.
 
         Raises:
-            InputError: the function raised something or gave no truth value.
+            InputError: the function raised an exception, or did not return a truth value.
         """
         function: Callable[..., object] = self.function
         try:
@@ -96,17 +96,17 @@ class Computed(Generic[_Inputs]):
 
 
 def computed(declaration: str, *, reads: Sequence[str] = ()) -> Callable[[Callable[_Inputs, bool]], Computed[_Inputs]]:
-    """Make a function a predicate; `Schema.with_computed` makes it known.
+    """Make a function a predicate; `Schema.with_computed` declares it.
 
-    The function depends on its inputs alone: what else it looks at is not noticed when it changes.
+    The function must depend on its inputs alone; other changes have no effect on conditions.
 
     Args:
         declaration: the predicate as PDDL declares it: `(near ?a ?b - thing)`.
-        reads: for each of the function's arguments a term, e.g. `(x ?a)`, whose value it gets, or an atom,
-            e.g. `(clean ?a)`, whose truth it gets; their variables are the predicate's parameters.
+        reads: for each argument of the function a term, e.g. `(x ?a)` for its value, or an atom, e.g. `(clean ?a)` for
+            its truth. Their variables are the predicate's parameters.
 
     Raises:
-        ParseError: the declaration is none, or a read is neither a term nor an atom.
+        ParseError: the declaration cannot be parsed, or a read is neither a term nor an atom.
         SchemaError: a read has another variable, or the function takes another number of arguments.
     """
     declared = parse_declaration(declaration, _SOURCE)
@@ -115,7 +115,7 @@ def computed(declaration: str, *, reads: Sequence[str] = ()) -> Callable[[Callab
     for read in parsed:
         for name in sorted(free_variables(read) - set(names)):
             raise SchemaError(
-                f"'?{name}' in {to_text(read)} is no parameter of '{declared.name}'",
+                f"'?{name}' in {to_text(read)} is not a parameter of '{declared.name}'",
                 place=read.place, found=f"?{name}", valid=[f"?{n}" for n in names],
             )  # fmt: skip
 
@@ -131,10 +131,10 @@ def computed(declaration: str, *, reads: Sequence[str] = ()) -> Callable[[Callab
 
 
 def in_reading_order(known: Mapping[str, Computed[Any]]) -> list[Computed[Any]]:
-    """All of them, those that others read first.
+    """Return all of them, each after those that it reads.
 
     Raises:
-        SchemaError: they read each other in a circle, or more than `MOST_NESTED` one through the other.
+        SchemaError: they read each other in a cycle, or more than `MOST_NESTED` one through the other.
     """
     read = {
         name: [r.predicate for r in of.reads if isinstance(r, Atom) and r.predicate in known]
@@ -143,9 +143,8 @@ def in_reading_order(known: Mapping[str, Computed[Any]]) -> list[Computed[Any]]:
     try:
         names = list(TopologicalSorter(read).static_order())
     except CycleError as error:
-        circle = error.args[1]
-        said = " - ".join(circle)
-        raise SchemaError(f"computed predicates in a circle: {said}", place=known[circle[0]].place) from None
+        cycle = error.args[1]
+        raise SchemaError(f"computed predicates in a cycle: {' - '.join(cycle)}", place=known[cycle[0]].place) from None
     nested: dict[str, int] = {}
     for name in names:
         nested[name] = 1 + max((nested[other] for other in read[name]), default=0)
@@ -158,7 +157,7 @@ def in_reading_order(known: Mapping[str, Computed[Any]]) -> list[Computed[Any]]:
 def _takes(function: Callable[..., object], count: int) -> bool:
     try:
         signature = inspect.signature(function)
-    except ValueError:  # written in C, and does not say
+    except ValueError:  # a function in C without a signature
         return True
     try:
         signature.bind(*range(count))

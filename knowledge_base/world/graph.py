@@ -1,11 +1,10 @@
-"""The world model as a networkx graph, for everyone who wants to look at it or run algorithms on it.
+"""World graph: the world model as a networkx graph, for readers and graph algorithms.
 
-Things are nodes with a `type`. A fact about two things is an arc from the first to the second whose key is
-the predicate; a fact about one thing is an arc from it to itself (S4.4). What a function of one or two things
-is worth is an arc likewise, with the content as `value` (S4.3: symbolic or geometric content). Facts and
-fluents with another number of arguments, or with values among them, are nodes of their own: the `Fact` itself
-with `relation` set to its name (and `value`), and an arc to each thing in it whose key is the position. What is
-fed by a source has its reference as `source` (S4.9).
+Things are nodes with a `type`. A fact about two things is an arc from the first to the second, with the predicate as
+key. A fact about one thing is an arc from it to itself (S4.4). A fluent of one or two things is such an arc too, with
+its content as `value` (S4.3: symbolic or geometric content). Other facts and fluents are nodes: the `Fact` itself, with
+its name as `relation` (and its `value`). An arc leads to each thing in it, with the position as key. A fluent that a
+source feeds has its reference as `source` (S4.9).
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ class WorldGraph:
             self.feed(fluent, reference, state.value(fluent.predicate, fluent.args))
 
     def commit(self, effective: Delta) -> None:
-        """Make a change that lists exactly what becomes different."""
+        """Apply an effective change."""
         for fact in effective.removed:
             self._remove(fact)
         for name in effective.removed_nodes:
@@ -50,11 +49,11 @@ class WorldGraph:
             self._put(fluent, {"value": content})
 
     def feed(self, fluent: Fact, reference: str, content: Content) -> None:
-        """A fluent is fed from outside and worth this now."""
+        """Set the latest value of a fluent that a source feeds."""
         self._put(fluent, {"value": content, "source": reference})
 
     def unfeed(self, fluent: Fact, kept: Content | None) -> None:
-        """It is not fed any more; `kept` is what it was set to, if it was."""
+        """Remove the source of a fluent; `kept` is the value that was set, if there is one."""
         self._remove(fluent)
         if kept is not None:
             self._put(fluent, {"value": kept})

@@ -41,7 +41,7 @@ class Overlay:
 
     @property
     def delta(self) -> Delta:
-        """All changes so far as one, without those that change nothing."""
+        """All pending changes as one effective change."""
         return Delta(
             nodes=dict(self._nodes),
             removed=tuple(self._removed),
@@ -54,7 +54,7 @@ class Overlay:
         """Change the view, as a whole or, with an error, not at all.
 
         Raises:
-            InputError: a name that is not declared or not there, a wrong type or number of arguments.
+            InputError: an undeclared or unknown name, a wrong type or number of arguments.
         """
         check_delta(delta, self)
         for name in delta.removed_nodes:
@@ -198,8 +198,8 @@ def check_delta(delta: Delta, world: World) -> None:
 
     Raises:
         UnknownNameError: an undeclared type, predicate or function, or an unknown thing.
-        SchemaError: a wrong number of arguments, a wrong type, a second type for a thing, a second fact of a
-            functional predicate, a value that a source feeds.
+        SchemaError: wrong arguments, a second type of a thing, a second fact of a functional predicate, or a value that
+            a source feeds.
         InputError: a number that is not finite, or a new thing with a name that PDDL cannot spell.
     """
     schema, admission = world.schema, _Admission(delta, world)

@@ -1,7 +1,7 @@
 """Read-write lock: questions and changes take turns in order of arrival, and an interrupt never leaves it taken.
 
 Python raises an interrupt (`KeyboardInterrupt`) as it enters a function, begins a loop again, or returns from a call.
-So each `__exit__` is that of Python's own lock: one call into C, before which no interrupt comes. A gate is a queue,
+So each `__exit__` is the method of Python's own lock: one call into C, which no interrupt precedes. A gate is a queue,
 because a queue may be opened twice.
 """
 
@@ -41,8 +41,8 @@ class Exit(Protocol):
 class FairLock:
     """Re-entrant lock, taken in order of arrival; used as a context manager.
 
-    A thread that finds the lock free goes first as long as the first in line is within its patience; then all join
-    the line at its end. (Handing the lock over each time costs more than most of the work done with it.)
+    A thread that finds the lock free goes first while the first in line has patience; then all join the line at its
+    end. A handover costs more than most of the work under the lock.
 
     Args:
         patience_s: time in which the first in line lets others go first, in seconds.
@@ -50,7 +50,7 @@ class FairLock:
     Attributes:
         held: tells whether this thread has the lock.
         release: gives the lock back, once.
-        marked: set by the thread that has the lock; cleared each time it is taken anew.
+        marked: set by the thread that has the lock; cleared when a thread takes it from free.
     """
 
     __slots__ = ("__exit__", "_acquire", "_due", "_gates", "_patience_s", "held", "marked", "release")
@@ -93,11 +93,11 @@ class FairLock:
             return
 
     def take_if_free(self) -> bool:
-        """Take the lock unless another thread has it or stands in line; return whether this thread has it now."""
+        """Take the lock unless another thread has it or waits in line; return whether this thread has it now."""
         return not self._gates and self._acquire(False)  # noqa: FBT003  as above
 
     def _wait(self) -> None:
-        """Stand in line until the lock is taken; leaving the line opens the next gate."""
+        """Wait in line and take the lock; the end of the wait opens the next gate."""
         gate: SimpleQueue[None] = SimpleQueue()
         try:
             try:

@@ -1,4 +1,4 @@
-"""What may be said about a world: types, constants, predicates and functions (from a PDDL domain)."""
+"""Schema of a world: types, constants, predicates and functions, from a PDDL domain."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Schema:
         """The schema of a PDDL domain given as text.
 
         Raises:
-            InputError: the text is no domain or does not declare a consistent schema.
+            InputError: the text is not a domain or does not declare a consistent schema.
         """
         return cls.from_text(parse_domain(text, source))
 
@@ -153,8 +153,8 @@ class Schema:
 
         Raises:
             UnknownNameError: one reads a function, predicate or type that is not declared.
-            SchemaError: its name is in use, what it reads does not fit its parameters' types, or computed
-                predicates read each other in a circle or more than `MOST_NESTED` one through the other.
+            SchemaError: its name is in use, its reads do not fit its parameters' types, or computed predicates read
+                each other in a cycle or too deep.
         """
         known = dict(self.computed)
         for one in predicates:
@@ -172,7 +172,7 @@ class Schema:
         return type_name in self.fitting(tuple(wanted))
 
     def fitting(self, wanted: tuple[str, ...]) -> frozenset[str]:
-        """All types that fit the `wanted` ones; worked out once, for every argument of every change is tested."""
+        """Return all types that fit the `wanted` ones; computed once, since each argument of a change needs it."""
         found = self._fitting.get(wanted)
         if found is None:
             all_types = (*self.types, *VALUE_TYPES)
@@ -223,18 +223,18 @@ class Schema:
             return found
         if name not in self.computed:
             if name in self.functions:
-                hint = f"compare what it is worth: (= ({name} ...) VALUE)"
+                hint = f"compare its value: (= ({name} ...) VALUE)"
                 raise SchemaError(f"'{name}' is a function; {hint}", place=place)
             if name in self.types:
-                said = f"'{name}' is a type, which is asked of one thing, ({name} THING)"
-                raise SchemaError(f"{said}; things get theirs when they come", place=place)
+                said = f"'{name}' is a type, which a condition tests of one thing: ({name} THING)"
+                raise SchemaError(f"{said}; a new thing gets its type with its name", place=place)
             valid = (*self.predicates, *self.computed, *self.types, *KEYWORDS)
             raise UnknownNameError(f"there is no predicate '{name}'", place=place, found=name, valid=valid)
         of = self.computed[name]
         return Signature(of.name, of.parameters, place=of.place)
 
     def told(self, name: str, place: Place | None = None) -> Signature:
-        """The predicate of that name, whose facts can be told.
+        """Return the predicate of that name, which must have facts.
 
         Raises:
             UnknownNameError: there is none.
@@ -259,11 +259,11 @@ class Schema:
         return found
 
     def result(self, function: str, place: Place | None = None) -> str:
-        """The type of what the function is worth; raises `UnknownNameError` as `function`."""
+        """Return the type of the function's values; raises `UnknownNameError` as `function`."""
         return self.function(function, place).result or "number"
 
     def unset(self, function: str) -> Content:
-        """What the function is worth where it was not set; raises `UnknownNameError` as `function`."""
+        """Return the value of the function until it is set; raises `UnknownNameError` as `function`."""
         found = self._unset.get(function)
         return UNSET[self.result(function)] if found is None else found
 
@@ -276,7 +276,7 @@ class Schema:
                 raise SchemaError(said, place=self.places.get(type_name))
             if here in seen:
                 cycle = " - ".join([*list(seen)[list(seen).index(here) :], here])
-                raise SchemaError(f"types in a circle: {cycle}", place=self.places.get(type_name))
+                raise SchemaError(f"types in a cycle: {cycle}", place=self.places.get(type_name))
             if here not in self.types:
                 raise SchemaError(
                     f"the type '{type_name}' has an unknown parent '{here}'",
@@ -308,7 +308,7 @@ class Schema:
             check_reads(of, self)
 
     def _is_asked(self, name: str, arity: int) -> bool:
-        """Whether that is something true or false, and no function."""
+        """Whether the name is a predicate or a type, not a function."""
         return name in self.predicates or name in self.computed or (arity == 1 and name in self.types)
 
     def _check_types(self) -> None:
@@ -337,7 +337,7 @@ class Schema:
         if type_name in self.types or (values and type_name in VALUE_TYPES):
             return
         if type_name == GEOMETRY:
-            raise SchemaError(f"{owner} cannot be a geometry; only what a function is worth can", place=place)
+            raise SchemaError(f"{owner} cannot be a geometry; only the value of a function can", place=place)
         raise SchemaError(f"{owner} has an unknown type '{type_name}'", place=place, found=type_name, valid=self.types)
 
 
@@ -351,7 +351,7 @@ def _twice(kind: str, name: str, first: Declared, second: Declared) -> SchemaErr
 
 
 def typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
-    """The names that one file declares, each with its one type; `object` beside another type says nothing.
+    """Return the names that one file declares, each with its one type; another type replaces `object`.
 
     Raises:
         SchemaError: a name has two types; both places are named.
@@ -362,7 +362,7 @@ def typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
             raise SchemaError(f"the {kind} '{name}' can have only one type", place=place)
         declared = TypedName(name, types or (ROOT_TYPE,), place)
         first = found.setdefault(name, declared)
-        if first.types == (ROOT_TYPE,):  # says nothing: everything is an object
+        if first.types == (ROOT_TYPE,):  # every thing is an object
             found[name] = declared
         elif declared.types not in (first.types, (ROOT_TYPE,)):
             before = f"{name} - {first.types[0]}", first.place
@@ -371,7 +371,7 @@ def typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
 
 
 def agreed_names(files: Iterable[Iterable[TypedName]], kind: str) -> tuple[TypedName, ...]:
-    """The names that several files declare; among these, `object` is a type like any other.
+    """Return the names that several files declare; here `object` is a type like any other.
 
     Raises:
         SchemaError: two files, or one, give a name different types; both places are named.

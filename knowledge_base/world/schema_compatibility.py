@@ -1,4 +1,4 @@
-"""Whether what was written with one schema can be read with another: when nothing was taken away or changed."""
+"""Compatibility of schemas: a store or world can be read with an extension of its schema."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from knowledge_base.world.state import WorldState
 
 
 def require_extension(written: Schema, given: Schema, place: Place | None = None) -> None:
-    """Raise an error unless `given` declares all that `written` does, and that alike.
+    """Raise an error unless `given` has every declaration of `written`, unchanged.
 
-    New types, constants, predicates and functions are welcome, and more predicates that are functional;
-    parameters' names do not matter.
+    It may have more types, constants, predicates, functions and functional predicates, and other names of parameters.
 
     Raises:
         SchemaMismatchError: each difference is named, with the nearest name of `given` for a missing one.
@@ -42,7 +41,7 @@ def _declared(schema: Schema) -> set[str]:
 
 
 def require_functional(state: WorldState, place: Place | None = None) -> None:
-    """Raise an error if the world says two things of what the schema made functional after it was written.
+    """Raise an error if two facts exclude each other by a predicate that the extended schema made functional.
 
     Raises:
         SchemaMismatchError: the two facts are named.
@@ -54,10 +53,10 @@ def require_functional(state: WorldState, place: Place | None = None) -> None:
 
 
 def missing_constants(state: WorldState, place: Place | None = None) -> Delta:
-    """The change that adds those constants that the schema got after the world was written.
+    """Return the change that adds the constants of the extended schema.
 
     Raises:
-        SchemaMismatchError: a thing of that name is there already, and of another type.
+        SchemaMismatchError: the world has a thing of that name and another type.
     """
     known, constants = state.nodes, state.schema.constants
     wrong = [
@@ -82,7 +81,7 @@ def _differences(
 
 
 def _shapes(signatures: Mapping[str, Signature]) -> dict[str, str | None]:
-    """What a declaration means, in words: the types of its arguments, and of a function's content."""
+    """Return the meaning of each declaration as text: types of its arguments, and of a function's content."""
     return {
         name: " ".join([name, *("/".join(p.types or (ROOT_TYPE,)) for p in signature.parameters)])
         + ("" if signature.result in (None, "number") else f" - {signature.result}")

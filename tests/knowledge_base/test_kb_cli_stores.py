@@ -121,7 +121,7 @@ def test_the_past_is_shown_and_asked(store) -> None:
     assert json.loads(run("at", store, iso, "--json"))["version"] in (0, 1)  # isoformat cuts at microseconds
     with pytest.raises(InputError, match="a moment is a version such as 12"):
         run("at", store, "yesterday")
-    with pytest.raises(InputError, match="version 9 is not there yet"):
+    with pytest.raises(InputError, match="version 9 is in the future"):
         run("at", store, "9")
 
 

@@ -162,7 +162,7 @@ ILL_TYPED = [
     ("(on (label cup1) map)", "1:5", "the argument is of type text, but '\\?a' of 'on' is of type thing"),
     ("(said (pose cup1 map))", "1:7", "the argument is of type geometry, but '\\?t' of 'said' is of type text"),
     ("(said (weight cup1))", "1:7", "is of type number"),
-    ("(powered lamp)", "1:1", r"'powered' is a function; compare what it is worth: \(= \(powered ...\) VALUE\)"),
+    ("(powered lamp)", "1:1", r"'powered' is a function; compare its value: \(= \(powered ...\) VALUE\)"),
     ("(said (geometry 1 2))", "1:7", "is of type geometry"),
 ]
 
@@ -189,7 +189,7 @@ def test_a_geometry_has_at_most_sixteen_numbers(kb):
     ("declarations", "message"),
     [
         ("(:types geometry)", "d:1:28: 'geometry' is a type of values, not of things"),
-        ("(:predicates (at ?p - geometry))", r"'\?p' of 'at' cannot be a geometry; only what a function is worth can"),
+        ("(:predicates (at ?p - geometry))", r"'\?p' of 'at' cannot be a geometry; only the value of a function can"),
         ("(:functions (f) - pose)", "d:1:38: .*functions whose values are things.*Tamer"),
         ("(:functions (f) - numer)", "did you mean 'number'"),
         ("(:functions (f) -)", "'-' without a type after it"),

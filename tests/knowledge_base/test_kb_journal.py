@@ -142,9 +142,9 @@ def test_changes_since_a_version_come_in_order_with_author_and_delta(kb):
 @pytest.mark.parametrize(
     ("ask", "means"),
     [
-        (lambda kb: kb.at(version=9), "version 9 is not there yet; the newest is 1"),
-        (lambda kb: kb.changes(since=9), "version 9 is not there yet; the newest is 1"),
-        (lambda kb: kb.compact(keep_since=9), "version 9 is not there yet; the newest is 1"),
+        (lambda kb: kb.at(version=9), "version 9 is in the future; the newest is 1"),
+        (lambda kb: kb.changes(since=9), "version 9 is in the future; the newest is 1"),
+        (lambda kb: kb.compact(keep_since=9), "version 9 is in the future; the newest is 1"),
         (lambda kb: kb.at(version=-1), "version -1 is no longer kept; the oldest kept is 0"),
         (lambda kb: kb.changes(since=-1), "version -1 is no longer kept; the oldest kept is 0"),
         (lambda kb: kb.compact(keep_since=-1), "version -1 is no longer kept; the oldest kept is 0"),
@@ -353,7 +353,7 @@ def test_a_closed_knowledge_base_is_asked_but_not_changed(kb, change):
     kb.close()
     kb.close()
     before = everything(kb)
-    with pytest.raises(StoreError, match=r"^the knowledge base is closed; it can only be asked$"):
+    with pytest.raises(StoreError, match=r"^the knowledge base is closed; it only answers questions$"):
         change(kb)
     assert everything(kb) == before
     assert kb.ask("(quiet)")

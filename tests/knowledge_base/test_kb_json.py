@@ -84,7 +84,7 @@ BAD = {
     "missing part": (world(facts=...), "the part 'facts' is missing"),
     "unknown part": (world(fact=[]), "no part 'fact'; did you mean 'facts'?"),
     "twice": ('{"format": 1, "format": 2}', "'format' is there twice in one object"),
-    "not a number": (world().replace("1]]", "NaN]]"), "NaN is no number"),
+    "not a number": (world().replace("1]]", "NaN]]"), "NaN is not a number"),
     "infinite": (world().replace("1]]", "1e999]]"), "(weight cup1) is a finite number, not inf"),
     "version": (world(version=-1), "'version' is a whole number from 0, not -1"),
     "version of truth": (world(version=True), "'version' is a whole number from 0, not True"),

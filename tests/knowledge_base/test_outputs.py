@@ -247,9 +247,9 @@ def test_a_fifo_that_nobody_reads_is_not_waited_for(tmp_path, monkeypatch) -> No
     monkeypatch.setattr(output_files, "PATIENCE_S", 0.0)
     os.mkfifo(tmp_path / "fifo")
     out = Output(tmp_path / "fifo", "--to")
-    with pytest.raises(InputError, match="nobody reads it"):
+    with pytest.raises(InputError, match="it has no reader"):
         out.write("x")
-    with pytest.raises(InputError, match="nobody reads it"), out.stream():
+    with pytest.raises(InputError, match="it has no reader"), out.stream():
         pass
 
 
@@ -288,7 +288,7 @@ def test_a_stream_empties_only_what_begins_like_its_own(tmp_path) -> None:
             assert (tmp_path / name).read_text() == "line\n"  # while it goes on
     for name in ("notes", "short"):
         before = (tmp_path / name).read_text()
-        with pytest.raises(InputError, match="it is there already, and is no file of that kind"):
+        with pytest.raises(InputError, match="it exists already and is not a file of that kind"):
             Output(tmp_path / name, "--trace", over='{"format"')
         assert (tmp_path / name).read_text() == before
 
@@ -296,7 +296,7 @@ def test_a_stream_empties_only_what_begins_like_its_own(tmp_path) -> None:
 def test_what_comes_after_the_check_is_kept_too(tmp_path) -> None:
     streamed, written = Output(tmp_path / "a", "--trace", over="{"), Output(tmp_path / "b", "--to")
     (tmp_path / "a").write_text("notes")
-    with pytest.raises(InputError, match="no file of that kind"), streamed.stream():
+    with pytest.raises(InputError, match="not a file of that kind"), streamed.stream():
         pass
     with KnowledgeBase.open(SCHEMA, tmp_path / "b"), pytest.raises(InputError, match="it is a store"):
         written.write("x")
