@@ -133,7 +133,7 @@ DOMAINS = [
     ("(:derived p)", ParseError, "1:20", r"written \(:derived \(NAME", None),
     ("(:types a) (:types b)", ParseError, "1:31", "the first is at d:1:20", None),
     ("(:types cup - itm item)", SchemaError, "1:28", "unknown parent", "item"),
-    ("(:types a - b b - a)", SchemaError, "1:28", "circle: a - b - a", None),
+    ("(:types a - b b - a)", SchemaError, "1:28", "cycle: a - b - a", None),
     ("(:types b c - object a - b a - c)", SchemaError, "1:", "declared differently before", None),
     ("(:types a - (either b c) b c)", SchemaError, "1:28", "only one type", None),
     ("(:predicates (p ?x) (p ?x ?y))", SchemaError, "1:40", r"differently before: \(p .*\) \(at d:1:33\)", None),
