@@ -14,15 +14,7 @@ from typing import Any, Generic, ParamSpec
 
 from knowledge_base.errors import InputError, Place, SchemaError, described, text_of
 from knowledge_base.language.checking.vocabulary import Read
-from knowledge_base.language.syntax.expression import (
-    Arithmetic,
-    Atom,
-    Call,
-    Term,
-    TypedVariable,
-    Variable,
-    free_variables,
-)
+from knowledge_base.language.syntax.expression import Atom, Call, Term, TypedVariable, free_variables, substitute
 from knowledge_base.language.syntax.text import parse_term, to_text
 from knowledge_base.pddl.domain_text import parse_declaration
 
@@ -61,7 +53,7 @@ class Computed(Generic[_Inputs]):
     def inputs(self, args: tuple[Term, ...]) -> tuple[Read, ...]:
         """Return its inputs for the arguments `args`."""
         given = {p.name: arg for p, arg in zip(self.parameters, args, strict=True)}
-        return tuple(_put_in(read, given) for read in self.reads)
+        return tuple(substitute(read, given) for read in self.reads)
 
     def resolved(self, predicates: Callable[[str, int], bool]) -> Computed[_Inputs]:
         """Return the same with resolved reads.
@@ -170,21 +162,3 @@ def _resolved(read: Read, predicates: Callable[[str, int], bool]) -> Read:
     if isinstance(read, Call) and predicates(read.function, len(read.args)):
         return Atom(read.function, read.args, place=read.place)
     return read
-
-
-def _put_in(read: Read, given: Mapping[str, Term]) -> Read:
-    return replace(read, args=_terms(read.args, given)) if isinstance(read, Atom) else _term(read, given)
-
-
-def _term(term: Term, given: Mapping[str, Term]) -> Term:
-    match term:
-        case Variable(name):
-            return given[name]
-        case Call(_, args) | Arithmetic(_, args):
-            return replace(term, args=_terms(args, given))
-        case _:
-            return term
-
-
-def _terms(terms: tuple[Term, ...], given: Mapping[str, Term]) -> tuple[Term, ...]:
-    return tuple(_term(t, given) for t in terms)

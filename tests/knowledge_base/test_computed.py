@@ -135,7 +135,10 @@ def test_it_only_tests(text: str, hint: str) -> None:
 )
 def test_nobody_can_tell_or_retract_it(change: Delta) -> None:
     kb = room()
-    with pytest.raises(SchemaError, match=r"'near' is computed and has no facts; tell and watch its inputs: \(x \?a\), \(y \?a\), \(x \?b\)"):
+    with pytest.raises(
+        SchemaError,
+        match=r"'near' is computed and has no facts; tell and watch its inputs: \(x \?a\), \(y \?a\), \(x \?b\)",
+    ):
         kb.apply(change, author="test")
     assert kb.version == 1
 

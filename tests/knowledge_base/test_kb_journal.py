@@ -148,7 +148,7 @@ def test_changes_since_a_version_come_in_order_with_author_and_delta(kb):
         (lambda kb: kb.at(version=-1), "version -1 is no longer kept; the oldest kept is 0"),
         (lambda kb: kb.changes(since=-1), "version -1 is no longer kept; the oldest kept is 0"),
         (lambda kb: kb.compact(keep_since=-1), "version -1 is no longer kept; the oldest kept is 0"),
-        (lambda kb: kb.changes(1, 0), "from 1 until 0"),
+        (lambda kb: kb.changes(1, 0), "from 1 to 0"),
         (lambda kb: kb.changes(0, -1), "version -1 is no longer kept; the oldest kept is 0"),
         (lambda kb: kb.at(), "takes a version or a time"),
         (lambda kb: kb.at(version=1, time=1.0), "takes a version or a time"),
