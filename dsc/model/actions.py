@@ -119,16 +119,16 @@ class Block(Frozen):
     block: tuple[InternalAction, ...]
 
 
-InternalAction = Annotated[
+_Internal = (
     Annotated[Assign, Tag("assign")]
     | Annotated[Tell, Tag("tell")]
     | Annotated[Emit, Tag("emit")]
     | Annotated[Withdraw, Tag("withdraw")]
     | Annotated[Log, Tag("log")]
     | Annotated[Choose, Tag("if")]
-    | Annotated[Block, Tag("block")],
-    by_key("assign", "tell", "emit", "withdraw", "log", "if", "block"),
-]
+    | Annotated[Block, Tag("block")]
+)
+InternalAction = Annotated[_Internal, by_key("assign", "tell", "emit", "withdraw", "log", "if", "block")]
 """Actions of a transition."""
 Choose.model_rebuild()
 Block.model_rebuild()
@@ -141,13 +141,7 @@ Action = Annotated[
     | Annotated[Configure, Tag("set")]
     | Annotated[Switch, Tag("switch")]
     | Annotated[Send, Tag("send")]
-    | Annotated[Assign, Tag("assign")]
-    | Annotated[Tell, Tag("tell")]
-    | Annotated[Emit, Tag("emit")]
-    | Annotated[Withdraw, Tag("withdraw")]
-    | Annotated[Log, Tag("log")]
-    | Annotated[Choose, Tag("if")]
-    | Annotated[Block, Tag("block")],
+    | _Internal,
     by_key("trigger", "set", "switch", "send", "assign", "tell", "emit", "withdraw", "log", "if", "block"),
 ]
 """Actions of entry and exit; internal ones only in dialect `scxml` (SCXML 3.8)."""

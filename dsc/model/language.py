@@ -22,7 +22,7 @@ from knowledge_base.language.syntax.expression import Constant, Expression, Term
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text
 
-_Parsed = TypeVar("_Parsed", Expression, Term, Effect)
+_Read = TypeVar("_Read")
 
 _SYMBOL = re.compile(r"[a-z0-9_][a-z0-9_\-#~.]*", re.IGNORECASE)
 
@@ -81,40 +81,34 @@ def _written_keys(kind: Any) -> set[str]:
     return {field.alias or name for name, field in fields.items()}
 
 
-def _not_too_deep(value: _Parsed) -> _Parsed:
+def _read(read: Callable[[Any], _Read], value: Any) -> _Read:
+    """Return the result of a reader of the language; its errors become errors of validation."""
     try:
-        check_depth(value)
+        return read(value)
     except InputError as error:
         raise ValueError(str(error)) from error
-    return value
 
 
 def _condition(value: Any) -> Expression:
     if isinstance(value, Expression):
-        return _not_too_deep(value)
+        _read(check_depth, value)
+        return value
     if not isinstance(value, str):
         raise ValueError(f"a condition was expected, as text such as (on ?o table); found {value!r}")
-    try:
-        return parse_condition(value)
-    except InputError as error:
-        raise ValueError(str(error)) from error
+    return _read(parse_condition, value)
 
 
 def _term(value: Any) -> Term:
     if isinstance(value, Term):
-        return _not_too_deep(value)
+        _read(check_depth, value)
+        return value
     if isinstance(value, bool | int | float):
         if not math.isfinite(value):
             raise ValueError(f"a finite number was expected; found {value!r}")
         return Constant(value)
     if not isinstance(value, str):
         raise ValueError(f"a value was expected: a constant, ?variable or (+ ?n 1); found {value!r}")
-    if not value.startswith(("?", "(")):
-        return _named(value)
-    try:
-        return parse_term(value)
-    except InputError as error:
-        raise ValueError(str(error)) from error
+    return _read(parse_term, value) if value.startswith(("?", "(")) else _named(value)
 
 
 @lru_cache(maxsize=4096)  # most names repeat in a sequence of plots, e.g. those made from plans
@@ -124,15 +118,13 @@ def _named(text: str) -> Constant:
 
 def _effect(value: Any) -> Effect:
     if isinstance(value, Effect):
-        return _not_too_deep(value)
+        _read(check_depth, value)
+        return value
     if isinstance(value, list | tuple):
-        return AllOf(tuple(_effect(part) for part in value))
+        return AllOf(tuple(map(_effect, value)))
     if not isinstance(value, str):
         raise ValueError(f"an effect was expected, as text such as (not (on ?o table)); found {value!r}")
-    try:
-        return parse_effect(value)
-    except InputError as error:
-        raise ValueError(str(error)) from error
+    return _read(parse_effect, value)
 
 
 _texts: IdentityCache[Expression | Effect, str] = IdentityCache()

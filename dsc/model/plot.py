@@ -35,7 +35,18 @@ _STATE_NAME = re.compile(r"[^/#][^/]*")
 # Paths contain state names between slashes; in a stored state, a name that begins with # is a region's index.
 
 
-class PlotParameter(Frozen):
+class _Declaration(Frozen):
+    """A typed name; the type alone is its short form."""
+
+    type: str
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_form(cls, value: Any) -> Any:
+        return {"type": value} if isinstance(value, str) else value
+
+
+class PlotParameter(_Declaration):
     """A one-way parameter with its role (S1.11).
 
     Attributes:
@@ -48,7 +59,6 @@ class PlotParameter(Frozen):
             use it.
     """
 
-    type: str
     default: TermField | None = None
     least: float | None = Field(default=None, strict=True)
     most: float | None = Field(default=None, strict=True)
@@ -65,22 +75,11 @@ class PlotParameter(Frozen):
         """Return whether its range is narrower than its type."""
         return self.least is not None or self.most is not None or bool(self.among)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _short_form(cls, value: Any) -> Any:
-        return {"type": value} if isinstance(value, str) else value
 
-
-class PlotVariable(Frozen):
+class PlotVariable(_Declaration):
     """A variable or output in the plot's scope; it ends with the plot (S0.7)."""
 
-    type: str
     initial: TermField | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _short_form(cls, value: Any) -> Any:
-        return {"type": value} if isinstance(value, str) else value
 
 
 class ActionPlot(Written):
