@@ -165,7 +165,7 @@ class Connector(TransitionSource):
     def _leads_on(self) -> Connector:
         for path, _, transition in self.placed_transitions():
             if transition.target is None:
-                problem = "nothing rests in a connector; say with `to` where this leads"
+                problem = "nothing rests in a connector; name the next state with `to`"
                 raise PydanticCustomError(LOCATED, problem, {"path": path})
         return self
 

@@ -72,7 +72,7 @@ def find_profile(name: str, folder: Path) -> Profile:
 
 
 def profile_schema() -> dict[str, Any]:
-    """The JSON Schema of profile files, for editors."""
+    """Return the JSON Schema of profile files, for editors."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "profile",

@@ -111,7 +111,7 @@ def _title(name: str, state: AnyState) -> str:
         case SubmachineState(use=use):
             return f"{name} = {use}"
         case DynamicState(dynamic=candidates):
-            return f"{name} = one of {', '.join(candidates) or 'what is planned'}"
+            return f"{name} = one of {', '.join(candidates) or 'the planned plots'}"
         case _:
             return name
 

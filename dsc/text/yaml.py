@@ -287,7 +287,7 @@ _PLAINER = {
     r"found unexpected end of stream": "a quote is never closed",
     r"'<stream end>'": "the end of the text",
 }
-"""The library's words -> this project's."""
+"""Messages of the YAML library -> plainer ones."""
 
 
 def _parse_error(error: MarkedYAMLError, source: str | None) -> ParseError:

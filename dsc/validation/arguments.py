@@ -20,7 +20,7 @@ from dsc.validation.subject import Subject
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.syntax.expression import Constant, Term
 
-_ALLOW = "say it in a profile, or let `changed_by` allow it"
+_ALLOW = "set it in a profile, or let `changed_by` allow it"
 
 
 # -- values and roles ----------------------------------------------------------------------------------------
@@ -53,7 +53,7 @@ def _own(subject: Subject, name: str, parameter: PlotParameter) -> Iterator[Find
     if parameter.default is None:
         if parameter.changed_by != "plots":
             message = f"'{name}' needs a default, because not every user of the plot may set it"
-            yield subject.finding(here, "parameter roles", message, "a profile may say another one")
+            yield subject.finding(here, "parameter roles", message, "a profile may set another one")
     elif isinstance(parameter.default, Constant) and parameter.bounded:
         yield from _fits(subject, f"{subject.plot.name}.{name}", parameter, parameter.default, (*here, "default"))
 

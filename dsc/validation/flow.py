@@ -73,7 +73,7 @@ def _rule_targets(subject: Subject) -> Iterator[Finding]:
                     yield subject.finding(
                         ("rules", number, "do", "then"), "no border crossing",
                         f"the rule's way from {where} to '{rule.then}' crosses a border",
-                        "say with `of` for which states the rule is", found=rule.then, valid=scope.states,
+                        "name the states of the rule with `of`", found=rule.then, valid=scope.states,
                     )  # fmt: skip
 
 

@@ -102,7 +102,7 @@ def _nothing_leads_to(name: str, subject: Subject) -> Finding:
         replaces = rule.before and rule.when is None and rule.then != ENTER
         if replaces and isinstance(state, Step) and concerns(rule, name, state, subject.library):
             message = f"the rule '{rule.label}' always replaces step '{name}', which is never entered"
-            return subject.finding(path, "reachable", message, "say with `when` when the rule does so", found=name)
+            return subject.finding(path, "reachable", message, "give the rule a `when`", found=name)
     fix = "add a transition to it, or make it `initial`"
     return subject.finding(path, "reachable", f"nothing leads to the state '{name}'", fix, found=name)
 

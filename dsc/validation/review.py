@@ -35,7 +35,7 @@ Conditions = Mapping[str, Expression]
 """Candidates in their order, with their conditions over their common parameters."""
 
 
-_LEFT_OUT = "leave it out, or say when it is meant"
+_LEFT_OUT = "remove it, or change its condition"
 
 
 def _candidates(subject: Subject) -> Iterator[Finding]:

@@ -35,7 +35,7 @@ def check_rules(subject: Subject) -> Iterator[Finding]:
     for number, handler in enumerate(plot.handlers):
         if handler.interrupt and not handler.do.acts:
             message = "a handler that only tells something interrupts nothing"
-            fix = "leave `interrupt` out, or say what to `use`"
+            fix = "remove `interrupt`, or name a plot to `use`"
             yield subject.finding(("handlers", number), "handler", message, fix)
 
 
@@ -116,7 +116,7 @@ class RuleScope:
         """Yield findings about variables of the plot in a rule that answers for steps of plans."""
         for name in sorted(self._subject.types.keys() & set(read) if self._in_plans(rule) else ()):
             message = f"'?{name}' is a variable of this plot; a rule that answers for steps of plans cannot read it"
-            fix = "a fact says it as well; or name with `of` steps that are states of this plot"
+            fix = "read a fact instead; or name with `of` steps that are states of this plot"
             yield self._subject.finding(path, "declared variable", message, fix, found=f"?{name}")
 
     def never(self, rule: Rule, path: Path) -> Finding:

@@ -58,7 +58,7 @@ def _shape(subject: Subject) -> Iterator[Finding]:
                 yield from _scope(subject, region, (*path, "regions", key))
         yield from _uses(subject, state, path)
         if subject.strict and isinstance(state, State) and not any(map(subject.leaving, subject.way_to(path))):
-            fix = "wire what it ends with, or make it `final: true`"
+            fix = "wire its outcomes, or make it `final: true`"
             yield subject.finding(path, "no dead end", f"no transition leaves the state '{name}'", fix)
     yield from check_rules(subject)
 
@@ -178,7 +178,7 @@ def check_size(subject: Subject) -> Iterator[Finding]:
         what = "rules and handlers" if plot.rules and plot.handlers else "rules" if plot.rules else "handlers"
         message = f"the {what} would make {made} transitions; at most {MAX_ANSWERS} are made"
         here = ("rules",) if plot.rules else ("handlers",)
-        yield subject.finding(here, "bounded rules", message, "say with `of` for which states a rule is")
+        yield subject.finding(here, "bounded rules", message, "name the states of a rule with `of`")
 
 
 def _answers(rule: Rule, answered: Mapping[str, int], subject: Subject) -> int:

@@ -239,7 +239,7 @@ WRONG = [
         "declared variable",
         ITEM + "  a:\n    goal: (free)\n    on: {done: e, no_plan: e, gave_up: e}\n" + E
         + "rules:\n  - on: lost\n    when: (on ?item table)\n    do: {then: e}\n",
-        9, "'?item' is a variable of this plot; a rule that answers for steps of plans cannot read it", "a fact says it",
+        9, "'?item' is a variable of this plot; a rule that answers for steps of plans cannot read it", "read a fact instead",
     ),
     (
         "declared variable",
@@ -484,7 +484,7 @@ WRONG = [
      + "rules:\n  - {before: [a, b], when: (free), do: {then: continue}}\n", 6, "all steps of a cycle", "`then`"),
     # -- parameters of components
     ("parameter roles", "parameters:\n  n: {type: number, default: 5, most: 3}\n" + S + E, 2, "'p.n' is 3 or less; found 5", ""),
-    ("parameter roles", "parameters:\n  n: {type: number, changed_by: profile}\n" + S + E, 2, "'n' needs a default", "a profile may say another one"),
+    ("parameter roles", "parameters:\n  n: {type: number, changed_by: profile}\n" + S + E, 2, "'n' needs a default", "a profile may set another one"),
     ("component parameter", S + "  a:\n    entry:\n      set: lift.pace\n      to: 3\n    on: {done: e}\n" + E, 6, "from 0 to 2; found 3", ""),
     ("component parameter", S + "  a:\n    entry:\n      set: lift.port\n      to: x\n    on: {done: e}\n" + E, 5, "not changed by plots", "changed_by"),
     # -- rules are transitions too
