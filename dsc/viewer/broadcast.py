@@ -6,15 +6,11 @@ import asyncio
 import json
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from dsc.viewer.records import MOST_RECORDS, RecordLog
-
-if TYPE_CHECKING:
-    from dsc.viewer.records import RecordLog
-
 
 FORMAT = "dsc-view/1"
 UNSUPPORTED = 1003

@@ -7,20 +7,15 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Event, Thread
-from typing import TYPE_CHECKING
 
 from dsc.runs.archive import archive, has_run
 from dsc.trace import Record, header
 from dsc.viewer.records import RecordLog, read_trace
 from knowledge_base.errors import HistoryError, Place, StoreError
 from knowledge_base.exchange import delta_form, schema_form, world_form
+from knowledge_base.facts import Change
 from knowledge_base.journal.sidecar_files import is_database
 from knowledge_base.store import KnowledgeBase
-
-if TYPE_CHECKING:
-    from dsc.viewer.records import RecordLog
-    from knowledge_base.facts import Change
-
 
 LOOK_EVERY_S = 0.2
 
