@@ -61,7 +61,9 @@ class Execution:
         """Exit all states of a plot and of the plots inside."""
         self._exit(frame, leaving_reaction(frame.configuration).exits)
 
-    def take(self, reactions: Mapping[Frame, CompiledReaction], parts: Sequence[tuple[Frame, ReactionPart]]) -> None:
+    def take(
+        self, reactions: Sequence[tuple[Frame, CompiledReaction]], parts: Sequence[tuple[Frame, ReactionPart]]
+    ) -> None:
         """Exit states, execute actions and enter states for reactions of plots.
 
         Args:
@@ -69,22 +71,22 @@ class Execution:
             parts: the parts of all, in execution order; the actions of all transitions precede any entry.
         """
         if len(reactions) == 1:
-            for frame, reaction in reactions.items():
-                self._exit(frame, reaction.exits)
+            ((frame, reaction),) = reactions
+            self._exit(frame, reaction.exits)
         else:
-            leaving = [(frame, one) for frame, reaction in reactions.items() for one in reaction.exits]
+            leaving = [(frame, one) for frame, reaction in reactions for one in reaction.exits]
             for frame, one in sorted(leaving, key=lambda at: at[0].position(at[1].node.index), reverse=True):
                 self._exit(frame, (one,))
-        for frame, reaction in reactions.items():
+        for frame, reaction in reactions:
             frame.configuration = reaction.following
         passed: list[Mapping[str, Any]] = [NOTHING] * len(parts)
         for number, (frame, part) in enumerate(parts):
             if part.acts:
                 passed[number] = self._act(frame, part)
         for (frame, part), arguments in zip(parts, passed, strict=True):
+            target = part.edge.targets[0] if arguments and part.edge is not None else -1
             for entrance in part.entrances:
-                is_target = part.edge is not None and entrance.node.index == part.edge.targets[0]
-                self._enter(frame, entrance, arguments if is_target else NOTHING)
+                self._enter(frame, entrance, arguments if entrance.node.index == target else NOTHING)
 
     def _act(self, frame: Frame, part: ReactionPart) -> Mapping[str, Any]:
         """Execute the internal actions of a transition; return the arguments for its target."""

@@ -93,11 +93,11 @@ class Frame:
 
     def frozen(self) -> FrameState:
         """Return the frame as a value: the original object if nothing has changed."""
-        now = FrameState(
+        now = (
             self.serial, self.compiled, self.configuration, self.variables, self.activations,
             self._frozen_children() if self.children else self.resting, self.kept,
         )  # fmt: skip
-        return self.was if all(map(is_, now, self.was)) else now
+        return self.was if all(map(is_, now, self.was)) else FrameState(*now)
 
     def _frozen_children(self) -> Mapping[str, FrameState]:
         """Return the plots inside, in document order: the original mapping if none has changed."""

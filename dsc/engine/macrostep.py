@@ -159,7 +159,7 @@ class Macrostep:
             return kept
         if len(self._performer.microsteps) >= MAX_MICROSTEPS:
             raise self._runaway()
-        self._execution.take({frame: choice}, [*zip(repeat(frame), choice.parts, strict=False)])
+        self._execution.take([(frame, choice)], [*zip(repeat(frame), choice.parts, strict=False)])
         taken = choice.taken_in(frame.compiled, frame.prefix) if frame.prefix else choice.taken
         self._performer.end_microstep(event, taken)
         return True
@@ -178,7 +178,7 @@ class Macrostep:
         reactions = {frame: reaction_of(frame.configuration, tuple(edges)) for frame, edges in by_frame.items()}
         parts = [(one.frame, _part_of(one, reactions[one.frame])) for one in taken]
         reports = tuple([report(one.edge, one.frame.compiled, one.frame.prefix) for one in taken])
-        self._execution.take(reactions, parts)
+        self._execution.take([*reactions.items()], parts)
         self._performer.end_microstep(event, reports)
         return True
 
