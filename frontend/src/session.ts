@@ -38,7 +38,7 @@ const LOADING_MS = 250;
 const NOTED_MS = 300;
 
 export class Session {
-  readonly history = new History();
+  readonly history = new History(() => this.later()); // what shows the record is being drawn just now
   private shown: Shown = {
     moment: beginning(), last: 0, playing: false, speed: 10, following: false, live: false, control: false,
     connected: false, paused: null, header: {}, wrong: null, expected: 0, selection: null,

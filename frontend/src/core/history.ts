@@ -38,6 +38,9 @@ export class History {
   private tip = beginning();
   private kept = beginning();
 
+  /** `noticed` is called when a record turns out to be damaged as it is first shown. */
+  constructor(private readonly noticed: () => void = () => {}) {}
+
   /** Number of the last record. */
   get last(): number {
     return this.records.length;
@@ -55,7 +58,10 @@ export class History {
   record(seq: number): Rec | undefined {
     const rec = this.records[seq - 1];
     const found = rec && (this.records[seq - 1] = whole(rec));
-    if (found && found !== rec && isDamaged(found)) this.damages.push(found);
+    if (found && found !== rec && isDamaged(found)) {
+      this.damages.push(found);
+      this.noticed();
+    }
     return found;
   }
 
