@@ -38,7 +38,7 @@ $(VENV)/.engines: $(VENV)/.test   # planning engines that no one is forced to ha
 
 test-engines: $(VENV)/.engines   ## every planning engine for real
 	$(BIN)/dsc doctor
-	$(BIN)/python -m pytest -rs tests/planning/test_real_engines.py
+	$(BIN)/python -m pytest -rs tests/planning/engines/test_real_engines.py
 
 test-all: $(VENV)/.engines check   ## as test, with every planning engine and the page in a browser
 	$(BIN)/dsc doctor
@@ -65,13 +65,13 @@ soak: $(VENV)/.run   ## simulated runs of the clean-up table with faults and cra
 	$(BIN)/python benchmarks/soak.py --runs $(or $(RUNS),1000) --first $(or $(FIRST),0) --faults $(or $(FAULTS),0.1)
 
 kill-kb: $(VENV)/.test   ## kill -9 a process that writes a store, for each durability: is all that it acknowledged there? (KILLS=N)
-	KILLS=$(or $(KILLS),100) $(BIN)/python -m pytest tests/knowledge_base/test_kb_kill.py
+	KILLS=$(or $(KILLS),100) $(BIN)/python -m pytest tests/knowledge_base/journal/test_kb_kill.py
 
 kill-runs: $(VENV)/.test   ## kill -9 runs of the clean-up table and resume them: do they end like runs never killed? (KILLS=N)
 	KILLS=$(or $(KILLS),50) $(BIN)/python -m pytest tests/domains/test_kill_runs.py
 
 soak-kb: $(VENV)/.test   ## four threads and an event loop change, ask and watch one knowledge base at once (SECONDS=N)
-	$(BIN)/python tests/knowledge_base/kb_soak.py $(or $(SECONDS),30)
+	$(BIN)/python tests/support/kb_soak.py $(or $(SECONDS),30)
 
 memory: $(VENV)/.run   ## a run of 24 simulated hours and 1,000,000 events: is its memory flat after the first tenth? (EVENTS=N)
 	$(BIN)/python benchmarks/memory.py $(if $(EVENTS),--events $(EVENTS))
@@ -87,10 +87,10 @@ $(LOWER)/.made: pyproject.toml tests/dependencies.py   # the core and what its t
 lower-bounds: $(LOWER)/.made   ## tests of every room with the oldest packages that pyproject.toml allows
 	$(LOWER)/bin/dsc run clean-up-table --json
 	$(LOWER)/bin/python -m pytest -W ignore::DeprecationWarning -p no:cacheprovider tests/test_command.py \
-		tests/knowledge_base/test_kb_store.py tests/knowledge_base/test_kb_drawing.py tests/knowledge_base/test_kb_cli.py \
-		tests/dsc/test_yaml_plots.py tests/dsc/test_model.py tests/dsc/test_plot_schema.py tests/dsc/test_plot_cli.py \
-		tests/dsc/test_diagram.py tests/dsc/test_run_store.py tests/dsc/viewer/test_viewer_server.py \
-		tests/planning/test_planner.py tests/planning/test_unified.py tests/planning/test_cli.py
+		tests/knowledge_base/test_kb_store.py tests/knowledge_base/drawing/test_kb_drawing.py tests/knowledge_base/cli/test_kb_cli.py \
+		tests/dsc/text/test_yaml_plots.py tests/dsc/model/test_model.py tests/dsc/text/test_plot_schema.py tests/dsc/cli/test_plot_cli.py \
+		tests/dsc/drawing/test_diagram.py tests/dsc/runs/test_run_store.py tests/dsc/viewer/test_viewer_server.py \
+		tests/planning/engines/test_planner.py tests/planning/test_unified.py tests/planning/cli/test_cli.py
 
 fuzz: $(VENV)/.test   ## mutated inputs for every reader and command: no traceback, no hang, no growth (SECONDS=N SEED=N ONLY=NAMES REPRODUCE=FILE)
 	$(BIN)/python tests/fuzz/fuzz.py --seconds $(or $(SECONDS),60) --seed $(or $(SEED),0) $(if $(ONLY),--only $(ONLY)) $(if $(REPRODUCE),--reproduce $(REPRODUCE))
@@ -106,7 +106,7 @@ mutation: $(MUTATION)/.made   ## change one thing at a time: do the tests of the
 	$(MUTATION)/bin/python tests/mutation/mutation.py $(ROOM) $(if $(SAMPLE),--sample $(SAMPLE)) $(if $(SEED),--seed $(SEED)) $(if $(JOBS),--jobs $(JOBS))
 
 corrupt-stores: $(VENV)/.test   ## stores damaged in every way: does any reader answer what never was? (CORRUPTIONS=N FIRST=SEED)
-	$(BIN)/python tests/dsc/stores_soak.py $(or $(CORRUPTIONS),1000) $(or $(FIRST),0)
+	$(BIN)/python tests/support/stores_soak.py $(or $(CORRUPTIONS),1000) $(or $(FIRST),0)
 
 bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare interpreter
 	$(BIN)/python benchmarks/startup.py

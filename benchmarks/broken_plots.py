@@ -1,6 +1,6 @@
 """Time until the command reports the error in a broken plot: median and longest time over the files.
 
-`python benchmarks/broken_plots.py [--runs N]` runs the corpus and the bombs of `tests/dsc`, slowest first.
+`python benchmarks/broken_plots.py [--runs N]` runs the corpus and the bombs of `tests/support`, slowest first.
 """
 
 import argparse
@@ -11,7 +11,7 @@ import tempfile
 import time
 from pathlib import Path
 
-TESTS = Path(__file__).parents[1] / "tests" / "dsc"
+TESTS = Path(__file__).parents[1] / "tests" / "support"
 DSC = Path(sys.executable).with_name("dsc")
 SHOWN = 15
 

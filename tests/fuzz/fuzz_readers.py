@@ -542,14 +542,17 @@ class StoreTarget(Target):
 
 READERS = (
     Target(
-        "plot", read_plot, ("domains/*/plots/*.yaml", "planning/plots/*.yaml", "tests/dsc/broken/yaml/*.yaml"), share=6
+        "plot",
+        read_plot,
+        ("domains/*/plots/*.yaml", "planning/plots/*.yaml", "tests/support/broken/yaml/*.yaml"),
+        share=6,
     ),
-    Target("chart", read_chart, ("tests/dsc/broken/scxml/*.scxml",), share=6),
+    Target("chart", read_chart, ("tests/support/broken/scxml/*.scxml",), share=6),
     Target("profile", read_profile, ("domains/*/profiles/*.yaml",), share=3),
     Target("scenario", read_scenario, (), share=2),
     Target("state", read_state, (), "json", share=3),
     Target(
-        "domain", read_domain, ("domains/*/domain.pddl", "examples/*.pddl", "tests/dsc/broken/domain.pddl"), share=5
+        "domain", read_domain, ("domains/*/domain.pddl", "examples/*.pddl", "tests/support/broken/domain.pddl"), share=5
     ),
     Target("fragment", read_fragment, ("examples/kitchen/domain.pddl",), share=2),
     Target("problem", read_problem_file, ("examples/kitchen/problem.pddl",), share=5),

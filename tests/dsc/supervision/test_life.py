@@ -27,7 +27,7 @@ from knowledge_base.world.schema import Schema
 def test_the_surface_for_builders_is_small_and_documented():
     surface = {name for name in vars(ComponentHooks) if not name.startswith("_")}
     table = (
-        Path(__file__).parents[2].joinpath("docs", "skills.md").read_text("utf-8").split("### The class `Component`")[1]
+        Path(__file__).parents[3].joinpath("docs", "skills.md").read_text("utf-8").split("### The class `Component`")[1]
     )
     rows = [
         line.split("|")[1] for line in table.partition("`self.parameters`")[0].splitlines() if line.startswith("| `")

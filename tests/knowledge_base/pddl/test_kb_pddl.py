@@ -15,7 +15,7 @@ from knowledge_base.language.syntax.expression import And
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, to_text
 from knowledge_base.pddl import read_domain, read_problem
 
-CLEAN_UP = Path(__file__).parents[2] / "domains" / "clean_up_table" / "domain.pddl"
+CLEAN_UP = Path(__file__).parents[3] / "domains" / "clean_up_table" / "domain.pddl"
 
 WILD = """
 ;; IPC style: upper case, missing sections, comments anywhere ;; (even (here

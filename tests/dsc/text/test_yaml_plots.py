@@ -12,7 +12,7 @@ from dsc.text.yaml import MAX_BYTES, load_document
 from knowledge_base.errors import InputError, ParseError, Place
 from knowledge_base.language.syntax.expression import Variable
 
-SHIPPED = sorted((Path(__file__).parents[2] / "domains").glob("*/plots/*.yaml"))
+SHIPPED = sorted((Path(__file__).parents[3] / "domains").glob("*/plots/*.yaml"))
 
 
 def test_variables_stand_in_braces_without_quotes():

@@ -10,7 +10,7 @@ from dsc.chance import uniform
 from knowledge_base.world.overlay import Overlay
 from planning.engines.planner import PlannerProcess
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "two_tables.py"
+EXAMPLE = Path(__file__).parents[3] / "examples" / "two_tables.py"
 
 
 @pytest.fixture(scope="module")

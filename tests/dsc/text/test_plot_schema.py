@@ -12,7 +12,7 @@ from test_model import EVERYTHING
 from dsc.text.plot_files import json_schema, plot_to_yaml
 from dsc.text.yaml import load_document
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SHIPPED = sorted(file for room in ("domains", "planning") for file in (ROOT / room).glob("**/plots/*.yaml"))
 SCHEMA = Draft202012Validator(json_schema())
 

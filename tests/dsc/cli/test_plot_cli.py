@@ -16,7 +16,7 @@ from dsc.components.robot import robot_of
 from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SHIPPED = ROOT / "domains" / "clean_up_table" / "plots"
 
 GOOD = """

@@ -19,7 +19,7 @@ from domains.cli import main
 from dsc.text.yaml import MAX_BYTES
 from dsc.validation.library import MAX_FINDINGS
 
-BROKEN = Path(__file__).parent / "broken"
+BROKEN = Path(__file__).parents[2] / "support" / "broken"
 HELPERS = {"grasp.yaml", "wait.yaml"}
 """Plots that broken ones use."""
 BYTES = {

@@ -514,7 +514,7 @@ RULE_IN = {"Finding": 1, "finding": 1, "caught": 2, "_unbound": 3, "_untaken": 4
 
 
 def test_every_rule_of_the_validator_is_tested():
-    sources = Path(__file__).parents[2] / "dsc" / "validation"
+    sources = Path(__file__).parents[3] / "dsc" / "validation"
     trees = [
         ast.parse(file.read_text()) for file in sources.glob("*.py") if file.name != "review.py"
     ]  # see test_review
@@ -617,7 +617,7 @@ def test_the_helpers_of_these_tests_are_right_themselves():
 
 
 def test_the_shipped_plots_pass_without_skills():
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     library = load_library(root / "domains" / "clean_up_table" / "plots")
     schema = Schema.from_pddl(root / "domains" / "clean_up_table" / "domain.pddl")
     assert [str(f) for f in validate_library(library, schema, None)] == []

@@ -21,7 +21,7 @@ from dsc.validation import validate_plot
 from knowledge_base.errors import InputError
 from knowledge_base.world.schema import Schema
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 FILES = sorted([*ROOT.glob("domains/*/plots/*.yaml"), *ROOT.glob("planning/plots/*.yaml")])
 TEXTS = [file.read_text() for file in FILES]
 LIBRARY = [load_plot(file) for file in FILES]

@@ -1,6 +1,6 @@
 """Stores are damaged in every way there is, and every reader is asked: no answer is wrong without an error.
 
-`python tests/dsc/stores_soak.py N [FIRST]` damages stores with the seeds FIRST to FIRST + N - 1. A store that was
+`python tests/support/stores_soak.py N [FIRST]` damages stores with the seeds FIRST to FIRST + N - 1. A store that was
 closed answers as before or with an error of ours. One that was not closed may lack its end, as after a power cut, and
 answers as it did at an earlier moment.
 """

@@ -15,7 +15,7 @@ from dsc.dynamic.library import Library
 from dsc.text.plot_files import Neighbours, load_plot, parse_plot
 from dsc.validation import review_plot, validate_plot
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SHIPPED = sorted(file for room in ("domains", "planning") for file in (ROOT / room).glob("**/plots/*.yaml"))
 
 STEP = plot("""

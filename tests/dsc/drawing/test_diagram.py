@@ -22,7 +22,7 @@ from dsc.model.states import State
 from dsc.text.plot_files import load_library, parse_plot
 from knowledge_base.errors import UnknownNameError
 
-SHIPPED = Path(__file__).parents[2] / "domains" / "clean_up_table" / "plots"
+SHIPPED = Path(__file__).parents[3] / "domains" / "clean_up_table" / "plots"
 NS = "{http://www.w3.org/2000/svg}"
 HULLS = {BoxKind.PLOT, BoxKind.GENERATED, BoxKind.COMPOSITE, BoxKind.ORTHOGONAL, BoxKind.REGION}
 EVENTS = ("done", "failed", "seen", "nothing_found", "gone")

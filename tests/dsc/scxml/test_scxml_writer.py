@@ -16,7 +16,7 @@ from dsc.text.text_diagrams import to_mermaid, to_plantuml
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.text import to_text
 
-SHIPPED = sorted((Path(__file__).parents[2] / "domains" / "clean_up_table" / "plots").glob("*.yaml"))
+SHIPPED = sorted((Path(__file__).parents[3] / "domains" / "clean_up_table" / "plots").glob("*.yaml"))
 
 CHART = """<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0" name="c">
 <datamodel><data id="x" expr="0"/></datamodel>
