@@ -1,4 +1,4 @@
-"""State charts: what a plot is, how it runs, which plot is chosen and why."""
+"""Public names of package `dsc`: state charts, their run time, and the choice among plots with its reasons."""
 
 from knowledge_base._lazy import lazy_exports
 

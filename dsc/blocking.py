@@ -1,8 +1,9 @@
-"""Skills that block: in a thread, or in a new process. Cancellation and deadline always take effect.
+"""Execution of skills whose body blocks, in a thread or in a new process.
 
-While a body blocks, simulated time stands still, so deadlines count real seconds. Threads are daemons: one that does
-not stop is abandoned after `STOPPING` seconds and does not keep the program alive. A process is ended, also when the
-program dies. So nothing moves while another program resumes the run.
+A cancellation and a deadline always take effect. While a body blocks, simulated time does not advance, so its deadline
+counts real seconds. Threads are daemons: a thread that ignores the stop request is abandoned after `STOPPING` seconds
+and does not keep the program alive. A process is ended, also when the program dies. So no body of the old program acts
+while another program resumes the run.
 """
 
 from __future__ import annotations
@@ -28,35 +29,35 @@ from knowledge_base.errors import described
 from knowledge_base.facts import Delta
 
 STOPPING = 2.0
-"""Real seconds for a body to stop after the request."""
+"""Real seconds between the stop request and the end of a body, at most."""
 _KILLING = 3
-"""Multiples of `STOPPING` until a process is abandoned: it is terminated, then killed."""
+"""Number of `STOPPING` periods after which a process is abandoned; before, it is terminated, then killed."""
 _POLL = 0.02
 """Real seconds between two checks for a stop request."""
 MOST_REPORTED = 1_000
-"""Reports that the loop has not taken; the body waits before the next one."""
+"""Number of reports that may wait for the event loop; with more, the body waits before its next report."""
 _PR_SET_PDEATHSIG = 1
-"""Of Linux's `prctl`: the signal that a process gets when its parent dies."""
+"""Option of Linux's `prctl`: the signal that a process receives when its parent dies."""
 
 
 class DeadlineError(TimeoutError):
-    """The time of a skill is over."""
+    """The deadline of a skill has passed."""
 
 
 class StoppedError(BaseException):
-    """A blocking body must stop; not an `Exception`, so that no handler catches it by mistake."""
+    """The request that a blocking body stops. No handler of `Exception` catches it by mistake."""
 
 
 @dataclass(frozen=True, slots=True)
 class BlockingCall:
-    """One execution of a skill, as its blocking body sees it.
+    """One execution of a skill, as its blocking body receives it.
 
     Attributes:
         action_id: as in `SkillCall`.
-        report: as in `SkillCall`; may be used from the thread or process that the body runs in. It waits while
-            `MOST_REPORTED` are on their way, and raises as `sleep`.
-        seconds: real seconds that the body has at most.
-        stopping: is set when the body must stop; never in a process, which is ended instead.
+        report: as in `SkillCall`; callable from the thread or process of the body. While `MOST_REPORTED` reports wait
+            for the event loop, the call waits too, and raises `StoppedError` as `sleep` does.
+        seconds: real seconds until the deadline, from the start of the body.
+        stopping: is set when a body in a thread must stop. A body in a process never sees it set: the process is ended.
     """
 
     action_id: str
@@ -65,11 +66,11 @@ class BlockingCall:
     stopping: threading.Event = field(default_factory=threading.Event)
 
     def observe(self, observed: Delta) -> None:
-        """As in `SkillCall`."""
+        """Report observed facts immediately, as `SkillCall.observe` does."""
         self.report(Outcome(OBSERVED, observed=observed))
 
     def sleep(self, seconds: float = 0.0) -> None:
-        """Wait for real seconds; with none, only look whether to stop.
+        """Wait for `seconds` of real time; with 0, only check for a stop request.
 
         Raises:
             StoppedError: the skill was cancelled, or its deadline has passed.
@@ -79,7 +80,7 @@ class BlockingCall:
 
 
 async def in_thread(body: Callable[..., Outcome], call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-    """Run `body(BlockingCall, **arguments)` in a thread.
+    """Run `body(BlockingCall, **arguments)` in a thread, and return its outcome.
 
     Raises:
         DeadlineError: the deadline has passed.
@@ -89,10 +90,11 @@ async def in_thread(body: Callable[..., Outcome], call: SkillCall, arguments: Ma
 
 
 async def in_process(body: Callable[..., Outcome], name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-    """Run `body(BlockingCall, **arguments)` in a fresh process; raises as `in_thread`.
+    """Run `body(BlockingCall, **arguments)` in a fresh process, and return its outcome.
 
     Raises:
-        RuntimeError: the body raised, or its process ended by itself.
+        DeadlineError: the deadline has passed.
+        RuntimeError: the body raised an error, or its process ended without an outcome.
     """
     blocking = _blocking(call)
     work = partial(_in_child, body, name, blocking, arguments)
@@ -119,9 +121,10 @@ def _blocking(call: SkillCall) -> BlockingCall:
 async def _supervised(
     work: Callable[[], Outcome], blocking: BlockingCall, call: SkillCall, what: str, stopping: float
 ) -> Outcome:
-    """Run work in a daemon thread; request its stop at the cancellation of the skill or at its deadline.
+    """Run `work` in a daemon thread; request its stop when the skill is cancelled or reaches its deadline.
 
-    If it has not stopped after `stopping` real seconds, `what` the body runs in is abandoned and reported.
+    Work that has not stopped `stopping` real seconds after the request is abandoned. The call then reports `what` was
+    abandoned: the thread or the process.
     """
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[Outcome] = loop.create_future()
@@ -133,7 +136,7 @@ async def _supervised(
     def run() -> None:
         try:
             outcome = work()
-        except BaseException as error:  # noqa: BLE001  # e.g. SystemExit: it must not end in silence
+        except BaseException as error:  # noqa: BLE001  # e.g. SystemExit, which would otherwise end the thread without a report
             stopped = issubclass(type(error), StoppedError) and blocking.stopping.is_set()
             post(ended.set_exception, DeadlineError() if stopped else _carried_over(error))
         else:
@@ -160,8 +163,12 @@ async def _supervised(
 
 
 def _carried_over(error: BaseException) -> Exception:
-    """A thread's error in a form for a future: not `StopIteration`, and not one that would end the program."""
-    with suppress(BaseException):  # an exception may fail when it is asked for its class
+    """Return a thread's error in a form that a future accepts.
+
+    A future rejects `StopIteration`. An error that is not an `Exception`, e.g. `SystemExit`, would end the program. The
+    function replaces both by a `RuntimeError`.
+    """
+    with suppress(BaseException):  # an exception may fail while its class is inspected
         if isinstance(error, Exception) and not isinstance(error, StopIteration | type):
             return error
     return RuntimeError(described(error))
@@ -207,7 +214,7 @@ def _in_child(body: Callable[..., Outcome], name: str, blocking: BlockingCall, a
 
 
 def _heard(ours: Connection, process: BaseProcess, blocking: BlockingCall) -> Outcome:
-    """Pass on the child's reports until its end; return its outcome."""
+    """Pass the child's reports to `blocking.report` until the child ends; return the child's outcome."""
     while True:
         while not ours.poll(_POLL):
             blocking.sleep()
@@ -230,7 +237,7 @@ def _end(process: BaseProcess) -> None:
     process.join(STOPPING)
     if process.is_alive():
         process.kill()
-        process.join()  # a process that hangs in a device takes time even then: it is abandoned
+        process.join()  # a process that hangs in a device driver is slow to end even after a kill: it is abandoned
     process.close()
 
 
@@ -242,21 +249,22 @@ def _child(
     try:
         theirs.send(("ended", body(call, **arguments)))
     except BaseException as error:  # noqa: BLE001  # any error reaches the parent as text
-        with suppress(OSError):  # the parent is gone
+        with suppress(OSError):  # the parent has ended
             theirs.send(("error", described(error)))
 
 
 def _end_with_parent() -> None:
-    """End this process with its parent: it has no deadline itself, and a resumed run acts again.
+    """End this process when its parent ends.
 
-    Linux's kernel does so also while the body blocks all other threads of this process. It reacts to the death of the
-    thread that started this process, which lives as long as its supervision.
+    This process checks no deadline itself, and a resumed run executes the action again. On Linux, the kernel ends this
+    process also while the body blocks all its other threads. The kernel reacts to the end of the parent's thread that
+    started this process. That thread exists as long as it supervises the skill.
     """
     parent = multiprocessing.parent_process()
     assert parent is not None  # noqa: S101
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if not parent.is_alive():  # it died before the kernel was asked
+    if not parent.is_alive():  # the parent died before `prctl` took effect
         os._exit(1)
 
     def watch() -> None:

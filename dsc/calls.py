@@ -1,4 +1,4 @@
-"""Calls of skills: arguments of a component's skill, its reports, its outcome, and its status after a crash."""
+"""Calls of skills: a call's identity and clock, its reports, its outcome, and its status after a crash."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ OBSERVED = "(observed)"
 
 
 class Clock(Protocol):
-    """Time as skills and the sequencer see it: simulated or real, always injected."""
+    """The clock of skills and the sequencer, in simulated or real time; callers always inject it."""
 
     def now(self) -> float:
-        """Seconds of run time."""
+        """Return the seconds of run time."""
         ...
 
     async def sleep(self, seconds: float) -> None:
-        """Let `seconds` of run time pass."""
+        """Wait until `seconds` of run time have passed."""
         ...
 
 
@@ -30,7 +30,7 @@ class Clock(Protocol):
 class Outcome:
     """The end of a skill: its outcome event, the event's attributes, and its observations.
 
-    `observed` is applied to the knowledge base, with the component as author, before the event is handled.
+    Before the event is handled, `observed` is applied to the knowledge base, with the component as author.
     """
 
     event: str
@@ -43,14 +43,14 @@ class SkillCall:
     """One execution of a skill.
 
     Attributes:
-        action_id: names this execution; stable across restarts, never used for another one.
-        clock: the only time a skill may use.
+        action_id: identifies this execution; it is stable across restarts and never used for another execution.
+        clock: the only clock that a skill may use.
         report: posts an intermediate event while the skill continues (e.g. progress, a perception).
         deadline: second of run time at which the skill is cancelled.
-        give_up: reports a part of the skill that continues and cannot be stopped.
+        give_up: reports a part of the skill that continues and cannot be stopped, as text.
 
-    After a crash, a resumed run may repeat a call with the same id. Its clock then begins at the start of the action,
-    and repeated reports are dropped. So a skill that acts once for an id executes the same steps again.
+    After a crash, a resumed run may repeat a call with an equal id. Its clock then begins at the start of the action,
+    and repeated reports are dropped. So a skill that acts only one time for each id executes the same steps again.
     """
 
     action_id: str
@@ -60,7 +60,7 @@ class SkillCall:
     give_up: Callable[[str], None] = lambda _: None
 
     def observe(self, observed: Delta) -> None:
-        """Assert an observation immediately, regardless of the outcome and without an event for the chart."""
+        """Report observed facts immediately, before the outcome and without an event for the chart."""
         self.report(Outcome(OBSERVED, observed=observed))
 
     @property
@@ -79,25 +79,29 @@ class Status(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """The action has ended, with this outcome."""
+    """The component's report that an action has ended, with its outcome."""
 
     outcome: Outcome
 
 
 MOST_WAITING = 5_000
-"""Reports of one action that wait to be taken; each has 750 bytes, and a run takes about 10,000 in a second."""
+"""Number of reports of one action that may wait for the sequencer.
+
+A report needs about 750 bytes, and a run handles about 10,000 reports in a second.
+"""
 _AT_ONCE = 250
-"""Observations that become one change together; the duration of each merge grows with the change."""
+"""Number of observed changes that are merged together; the duration of each merge grows with the size of the change."""
 
 
 class Reports:
-    """Intermediate events of one action: posts reports in order, at most `MOST_WAITING` that were not taken.
+    """Queue of the intermediate events of one action.
 
-    Further reports are conflated: the newest of each event waits, and their observations become one change, so that no
-    knowledge is lost. They are posted when half of the others are taken, or at the end.
+    The queue posts reports in order; at most `MOST_WAITING` posted reports wait for the sequencer. Further reports are
+    conflated: the queue keeps the newest report of each event, and merges all their observations into one change. So no
+    observation is lost. The conflated reports are posted when half of the posted ones were consumed, or at the end.
 
     Args:
-        post: receives a report, and the number of older ones of its event that it replaces.
+        post: receives a report, and the number of older reports of its event that the report replaces.
     """
 
     __slots__ = ("_aside", "_observed", "_post", "_waiting")
@@ -109,7 +113,7 @@ class Reports:
         self._observed: list[Delta] = []
 
     def put(self, report: Outcome) -> None:
-        """Post a report, now or later."""
+        """Post a report now, or conflate it while too many reports wait."""
         if self._waiting < MOST_WAITING and not self._aside:
             self._waiting += 1
             self._post(report, 0)
@@ -122,13 +126,13 @@ class Reports:
                 self._observed = [_as_one(self._observed)]
 
     def taken(self) -> None:
-        """A posted report was taken."""
+        """Count one posted report as consumed; post the conflated reports if few reports wait."""
         self._waiting -= 1
         if self._aside and self._waiting <= MOST_WAITING // 2:
             self.flush()
 
     def flush(self) -> None:
-        """Post the conflated reports; the first has their observations."""
+        """Post the conflated reports; the first of them contains all their observations."""
         if not self._aside:
             return
         aside, self._aside = self._aside, {}
@@ -140,7 +144,7 @@ class Reports:
 
 
 def _as_one(observed: list[Delta]) -> Delta:
-    """Merge consecutive changes; halves first, as most are small."""
+    """Merge consecutive changes in order. The merge recurses on halves, as most changes are small."""
     if len(observed) < 2:
         return observed[0] if observed else Delta()
     half = len(observed) // 2

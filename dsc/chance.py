@@ -1,7 +1,7 @@
-"""Chance without a shared random stream: every draw is a function of the seed and an action's id.
+"""Random draws without a shared random stream: each draw is a function of the seed and an action's id.
 
-A resumed or replayed run asks with the same action ids and therefore meets the same world, no matter how
-many draws were made before.
+A resumed or replayed run draws with the same action ids. So its simulated world behaves identically, regardless of the
+number of earlier draws.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ _Option = TypeVar("_Option")
 
 
 def uniform(seed: int, action_id: str, purpose: str) -> float:
-    """A number in [0, 1), the same for the same three arguments on every machine and in every process."""
+    """Return a number in [0, 1), equal for equal arguments on every machine and in every process."""
     text = f"{seed}\x1f{action_id}\x1f{purpose}".encode()
     digest = hashlib.blake2b(text, digest_size=8).digest()
     return (int.from_bytes(digest, "big") >> 11) / 2**53  # 53 bits: a float never rounds up to 1.0
 
 
 def choose(seed: int, action_id: str, purpose: str, options: Sequence[_Option]) -> _Option:
-    """One of `options` (at least one), each as likely as the others."""
+    """Return one of `options` (at least one); all options are equally probable."""
     return options[int(uniform(seed, action_id, purpose) * len(options))]

@@ -1,4 +1,4 @@
-"""Errors of plots: findings in their text, failures of a run, and forms that another language cannot express."""
+"""Errors of plots: mistakes in their text, failures of a run, and forms that another language cannot express."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from knowledge_base.errors import InputError, Place
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing wrong with a plot: where, which rule of the profile, and what to do.
+    """A mistake of a plot: its place, the violated rule of the profile, and a remedy.
 
-    A `warning` is about what is allowed and hardly meant; a plot with warnings runs.
+    A finding of level `warning` concerns a form that is allowed, but rarely intended. A plot with warnings can run.
     """
 
     error: InputError
@@ -23,17 +23,17 @@ class Finding:
 
     @property
     def place(self) -> Place | None:
-        """Its place in the text."""
+        """Place of the mistake in the text; `None` if unknown."""
         return self.error.place
 
     def __str__(self) -> str:
-        """One line for people."""
+        """One line for people: the error and its remedy, and the level of a warning."""
         text = f"{self.error}" + (f" ({self.fix})" if self.fix else "")
         return text if self.level == "error" else f"{text} [{self.level}]"
 
 
 class PlotError(InputError):
-    """A plot that cannot be used; carries all findings, and prints them one a line."""
+    """Mistakes that make a plot unusable, as `findings`; its text has one line for each."""
 
     def __init__(self, findings: Sequence[Finding]) -> None:
         first = findings[0].error
@@ -41,12 +41,12 @@ class PlotError(InputError):
         self.findings = tuple(findings)
 
     def __str__(self) -> str:
-        """All findings, one a line."""
+        """All findings, one per line."""
         return "\n".join(map(str, self.findings))
 
 
 class RunawayError(Exception):
-    """A macrostep does not come to rest; carries the states it keeps entering."""
+    """A macrostep that does not end; `trail` lists the states that it enters repeatedly."""
 
     def __init__(self, problem: str, trail: Sequence[str]) -> None:
         super().__init__(f"{problem}: {' -> '.join(trail)}")
@@ -54,14 +54,14 @@ class RunawayError(Exception):
 
 
 class UncertainActionError(Exception):
-    """An action may or may not have happened before a restart, and must not be done again unseen."""
+    """An action with unknown effect before a restart, which must not be repeated without an observation."""
 
 
 class ChangedError(InputError):
-    """A run cannot be resumed with other plots, or another domain, than it was begun with.
+    """A resumed run has other plots, or another domain, than at its start.
 
     Attributes:
-        differences: one sentence each.
+        differences: one sentence for each difference.
     """
 
     def __init__(self, differences: Sequence[str], *, place: Place | None = None) -> None:
@@ -71,7 +71,7 @@ class ChangedError(InputError):
 
 
 class NotExpressibleError(InputError):
-    """Something has no counterpart in the other form; `element` is what it is, for counting."""
+    """An element without a counterpart in the other language; `element` is its kind, for statistics."""
 
     def __init__(self, element: str, why: str, *, place: Place | None = None) -> None:
         super().__init__(f"{element}: {why}", place=place, found=element)

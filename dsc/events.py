@@ -1,4 +1,4 @@
-"""Events as values, with the scope in which they are visible (S0.6, S2.5)."""
+"""Events as values, with the scope in which each is visible (S0.6, S2.5)."""
 
 from __future__ import annotations
 
@@ -9,60 +9,67 @@ from typing import Any, NamedTuple
 DONE = "done"
 """Completion of a state's content (S0.11)."""
 AFTER = "after"
-"""A timeout of a state; `index` says which."""
+"""Timeout of a state; `Event.number` is the index of the timeout."""
 EVERY = "every"
-"""A period of a state has passed again; `index` says which of its cyclic transitions."""
+"""End of a period of a state; `Event.number` is the index of the cyclic transition."""
 AT_LEAST = "at_least"
-"""The time that a state stays at least has passed."""
+"""End of the minimum duration of a state."""
 NO_CANDIDATE = "no_candidate"
-"""A dynamic state without goal found no candidate that fits (S0.4)."""
+"""Failure of a dynamic state without a goal: no candidate fits (S0.4)."""
 NO_PLAN = "no_plan"
-"""A dynamic state's goal cannot be planned for."""
+"""Failure of a dynamic state with a goal: the planner finds no plan."""
 GAVE_UP = "gave_up"
-"""A dynamic state's goal was abandoned by a rule, or because its budget was spent."""
+"""Failure of a dynamic state with a goal: a rule abandoned the goal, or the goal's budget is exhausted."""
 TIMED_OUT = "timed_out"
-"""A skill did not end within its time and was cancelled."""
+"""Failure of a skill: it did not end before its deadline and was cancelled."""
 SKILL_ERROR = "skill_error"
-"""A skill raised an exception, or ended without a valid outcome."""
+"""Failure of a skill: it raised an exception, or ended without a valid outcome."""
 ERROR = "error"
-"""An action or guard could not be evaluated."""
+"""Failure of the evaluation of an action or guard."""
 DONE_STATE = "done.state."
-"""The name of `done` in dialect `scxml`, with the state's name as suffix (SCXML 3.13)."""
+"""Prefix of event `done` in dialect `scxml`; the state's name is the suffix (SCXML 3.13)."""
 EXECUTION_ERROR = "error.execution"
-"""The name of `error` in dialect `scxml` (SCXML 3.13)."""
+"""Name of event `error` in dialect `scxml` (SCXML 3.13)."""
 FAILURES = frozenset({SKILL_ERROR, TIMED_OUT})
-"""Ends of any skill. If no state of its plot takes one, the states around the plot may."""
+"""Failures that any skill can have.
+
+If no state of the skill's plot handles such an event, the states around the plot may handle it.
+"""
 LED_AWAY = "then."
-"""Prefix of outcomes of generated plots that lead to a state of the plot with the goal."""
+"""Prefix of an outcome of a generated plot; the outcome leads to a state of the plot that has the goal."""
 ERRORS = frozenset({ERROR, EXECUTION_ERROR})
 
 TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
-"""Events of the executive's clock for one state; no transition has them under `on`."""
+"""Events of the executive's clock for one state; no transition may have them under `on`."""
 RESERVED = TIMERS | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, SKILL_ERROR, ERROR}
-"""Events that only the executive fires, except that plots and skills for planning may end with `no_plan` and
-`gave_up`."""
+"""Events that only the executive fires, with one exception.
+
+Plots and skills for planning may also end with `no_plan` and `gave_up`.
+"""
 EXECUTIVES = RESERVED - {NO_PLAN, GAVE_UP}
 """Events that only the executive fires, without exception."""
 
 NO_ATTRIBUTES: Mapping[str, Any] = MappingProxyType({})
-"""Of most events; shared, as it is immutable."""
+"""Empty attributes, which most events share; the mapping is immutable."""
 
 
 def goes_outwards(event: str) -> bool:
-    """Whether the states around a plot may take the event if no state inside does."""
+    """Return whether the states around a plot may handle the event if no state of the plot handles it."""
     return event in FAILURES or event.startswith(LED_AWAY)
 
 
 class Event(NamedTuple):
-    """Something that happened; a named tuple, since many are made and a frozen dataclass takes four times as long.
+    """An occurrence that transitions react to.
+
+    A named tuple, as a run creates many events and a frozen dataclass takes four times as long to create.
 
     Attributes:
         name: the label of transitions.
         attributes: data, read in charts as `?event.attribute`.
-        to: the activation (serial number of one entry into one state) that it is for. Only that state and the states
-            around it in the same plot see it. An event for a state that was left is dropped.
-        exact: with `to`: that state alone may take it.
-        frame: the plot instance inside which it is visible; without `to` and `frame`, it is visible everywhere.
+        to: the activation (serial number of one entry into one state) that receives the event. Only that state and the
+            states around it in the same plot see the event. The event is dropped if that state is no longer active.
+        exact: with `to`: only that state may handle the event.
+        frame: the plot instance in which the event is visible. Without `to` and `frame`, it is visible everywhere.
         number: the index of the state's timeout or period.
     """
 
@@ -74,5 +81,5 @@ class Event(NamedTuple):
     number: int | None = None
 
     def bindings(self) -> dict[str, Any]:
-        """Its attributes under the names charts use, `event.attribute`."""
+        """Return the attributes by their name in charts, `event.attribute`."""
         return {f"event.{name}": value for name, value in self.attributes.items()}

@@ -13,15 +13,15 @@ from knowledge_base.facts import Delta, Value
 
 @dataclass(frozen=True, slots=True)
 class SkillMessage:
-    """A component's answer for an activation.
+    """A component's report or outcome for one execution of a skill.
 
     Attributes:
-        start: of the skill.
+        start: the start of the skill.
         outcome: event, attributes and observed facts.
-        final: whether the skill has ended with it.
-        goes_on: whether the skill only counts as ended, and is to be cancelled.
-        conflated: number of older reports of the same event that it replaces, see `dsc.calls`.
-        declared: the declared types of the outcome's attributes; `None` if there are none to validate.
+        final: whether this message ends the skill.
+        goes_on: whether the skill still executes although it counts as ended; the sequencer then cancels it.
+        conflated: number of older reports of the same event that this message replaces, see `dsc.calls`.
+        declared: the declared types of the outcome's attributes; `None` if there are no types to validate.
     """
 
     start: Start
@@ -34,14 +34,14 @@ class SkillMessage:
 
 @dataclass(frozen=True, slots=True)
 class TimerMessage:
-    """A timer is due."""
+    """The expiry of a timer."""
 
     timer: StartTimer
 
 
 @dataclass(frozen=True, slots=True)
 class KnowledgeMessage:
-    """An author outside of this run changes the knowledge."""
+    """A change of the knowledge by an author outside of this run."""
 
     delta: Delta
     author: str
@@ -49,11 +49,12 @@ class KnowledgeMessage:
 
 @dataclass(frozen=True, slots=True)
 class ParameterMessage:
-    """An operator sets a parameter.
+    """An operator's change of a parameter.
 
     Attributes:
         owner: the component or plot of the parameter.
-        name, value: of the parameter; `None` takes back the value set before, of a component's.
+        name: the parameter's name.
+        value: the new value; `None` restores the value that a component's parameter had before.
         of_plot: whether the owner is a plot.
     """
 
@@ -65,7 +66,7 @@ class ParameterMessage:
 
 @dataclass(frozen=True, slots=True)
 class LateMessage:
-    """A message from outside with a later time, which has come; `number` tells it from others."""
+    """A message from outside whose scheduled time has come; `number` distinguishes it from other messages."""
 
     message: FromOutside
     number: int
@@ -74,6 +75,6 @@ class LateMessage:
 FromOutside = Event | KnowledgeMessage | ParameterMessage
 """Messages from outside of the run."""
 Message = SkillMessage | TimerMessage | KnowledgeMessage | ParameterMessage | LateMessage | SendLater | Event
-"""A `SendLater` is the chart's own event whose time has come."""
+"""Messages that the sequencer handles; a `SendLater` is the chart's own event whose scheduled time has come."""
 Told = SetParameter | SwitchMode | SendMessage
 """Commands to components without an answer: parameters, modes and messages."""

@@ -1,4 +1,4 @@
-"""Settings profiles: apply one to components and plots, after validation of all its values."""
+"""Application of a settings profile to components and plots, after validation of all its values."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
     """Set the components' parameters to the values of the profile.
 
     Args:
-        components: of one robot; each instance has separate values.
-        profile: its settings; without one, the defaults are effective.
+        components: the components of one robot; each instance has separate values.
+        profile: the settings; without a profile, each parameter has its default.
 
     Raises:
-        UnknownNameError: there is no such component or parameter.
-        SchemaError: a value is of another type, out of range or not for profiles, a relation is violated, or a
-            parameter has no value. The message has the place and the range.
+        UnknownNameError: a component or parameter of the profile does not exist.
+        SchemaError: a value has another type, is out of range, or may not be set by a profile. Or a relation between
+            parameters is violated, or a parameter has no value. The message has the place and the range.
     """
     by_name = {component.name: component for component in components}
     settings = {} if profile is None else profile.components
@@ -36,11 +36,11 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
 
 
 def adapted(plots: Iterable[ActionPlot], profile: Profile | None = None) -> tuple[ActionPlot, ...]:
-    """The plots with the profile's values as defaults of their parameters.
+    """Return the plots with the profile's values as defaults of their parameters.
 
     Raises:
-        UnknownNameError: there is no such plot or parameter.
-        InputError: a value is of another type than the parameter or out of its range, or a profile may not change it.
+        UnknownNameError: a plot or parameter of the profile does not exist.
+        InputError: a value has another type than the parameter or is out of its range, or a profile may not change it.
     """
     plots = tuple(plots)
     if profile is None or not profile.plots:

@@ -1,7 +1,7 @@
 """The design in the knowledge base: plots, their rules, components and skills as objects of queries (S1.6, S1.13).
 
-The run time has the design in the same graph and language as the world. It has the plots that implement a planning
-action, the components that offer a skill, and the rules that react to a failure.
+At run time, queries reach the design in the same graph and language as the world. The design includes the plots that
+implement a planning action, the components that offer a skill, and the rules that react to a failure.
 """
 
 from __future__ import annotations
@@ -35,20 +35,20 @@ MODELS = Schema.parse(
     (leads-to ?r - rule ?next - text)))""",
     "models",
 )
-"""Predicates about the design; merge it into a world's own schema (`Schema.merged`)."""
+"""Predicates about the design; `Schema.merged` adds them to a world's schema."""
 
 
 def design_facts(library: Library, skills: Iterable[SkillSignature] = ()) -> Delta:
-    """The design as one change for a knowledge base whose schema has `MODELS`.
+    """Return the design as one change for a knowledge base whose schema includes `MODELS`.
 
-    A name has its kind as prefix, unlike names of the world: `plot:search`, `skill:arm.grasp`, `component:arm`,
-    `action:pick-up`, `rule:search.1`, `handler:patrol.1`. Rules and handlers count from 1 in their plot. An `answers`
-    fact is a rule for an outcome, with the rule's label. `concerns` has the steps that a rule names, `leads-to` the
-    continuation after its response.
+    The name of each object has its kind as prefix, which distinguishes it from objects of the world: `plot:search`,
+    `skill:arm.grasp`, `component:arm`, `action:pick-up`, `rule:search.1`, `handler:patrol.1`. Rules and handlers are
+    numbered from 1 within their plot. An `answers` fact states a plot's rule for an outcome, with the rule's label. A
+    `concerns` fact states a plan step of a rule. A `leads-to` fact states the continuation after a rule's response.
 
     Args:
         library: the plots.
-        skills: the skills of the components that are deployed.
+        skills: the skills of the deployed components.
     """
     nodes: dict[str, str] = {}
     facts: dict[Fact, None] = {}
@@ -61,7 +61,7 @@ def design_facts(library: Library, skills: Iterable[SkillSignature] = ()) -> Del
 
 
 _Said = Fact | tuple[str, str]
-"""A fact, or a thing with its type."""
+"""A fact, or an object with its type."""
 
 
 def _skills(skills: Iterable[SkillSignature]) -> Iterator[_Said]:

@@ -1,6 +1,7 @@
-"""Skills: typed actions of components, and the smallest plot around one (S0.7, S0.8, S1.1).
+"""Skills: typed actions of components, and the smallest plot around one skill (S0.7, S0.8, S1.1).
 
-A skill ends with an outcome event and observations, which the plot interprets. It is one decorated coroutine:
+A skill ends with an outcome event and observations, which the plot interprets. A skill is one decorated coroutine
+function:
 
 ```python
 class Gripper(Component):
@@ -27,26 +28,32 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
 
 AfterCrash = Literal["repeat", "same_id", "sense"]
-"""The reaction to an action with unknown effect. `repeat` it, as it is idempotent. Execute it with the `same_id`, which
-the component executes once. Or `sense` the world first, without a repetition."""
+"""The reaction to an action whose effect is unknown after a crash.
+
+`repeat` executes the action again, as it is idempotent. `same_id` executes it with its former id, for which the
+component acts only one time. `sense` observes the world first, without a repetition.
+"""
 
 SkillBody = Callable[..., Any]
-"""The decorated function: a coroutine function or, if it blocks, a plain one, that returns an `Outcome`."""
+"""The decorated function: a coroutine function or, if it blocks, a plain function; both return an `Outcome`."""
 _Body = TypeVar("_Body", bound=SkillBody)
 Pattern = Literal["skill", "query", "event"]
-"""The pattern of communication of a `trigger` (S1.1). A skill ends by itself, a query with its answer; an event stays
-active until the state is left."""
+"""The communication pattern of a `trigger` (S1.1).
+
+A `skill` ends by itself, and a `query` ends with its answer. An `event` stays active until its state is left.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class SkillSignature:
-    """A skill's interface.
+    """The interface of a skill.
 
     Attributes:
-        component, name: its name in charts is `component.name`.
-        parameters: names with types (`None`: anything).
+        component: the component's name. The skill's name in charts is `component.name`.
+        name: the skill's name.
+        parameters: types by parameter name; `None` accepts any value.
         defaults: values of optional parameters.
-        outcomes: events it may end with or report, with their attributes and types.
+        outcomes: events that the skill may end with or report, with their attributes and types.
         pattern: see `Pattern`.
         after_crash: see `AfterCrash`.
     """
@@ -61,7 +68,7 @@ class SkillSignature:
 
 
 CarryOut = Callable[[Any, SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
-"""Executes a decorated body; receives the component, the bound body, the call and the arguments."""
+"""Function that executes a decorated body; receives the component, the bound body, the call and the arguments."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +76,10 @@ class Declared:
     """The declaration of a decorated body.
 
     Attributes:
-        types: types of parameters by name; others follow from the annotations `int`, `float` and `bool`.
+        types: types of parameters by name; the annotations `int`, `float` and `bool` declare the other types.
         outcomes: as in `SkillSignature`.
-        carry_out: passes a call to the body.
-        own: number of the body's first parameters without a value from charts.
+        carry_out: executes a call with the body.
+        own: number of leading parameters of the body that charts do not set.
         pattern: see `Pattern`.
         after_crash: see `AfterCrash`.
     """
@@ -85,14 +92,18 @@ class Declared:
     after_crash: AfterCrash = "sense"
 
     def __call__(self, body: _Body) -> _Body:
-        """Note it; raises `SchemaError` for an outcome that is an event of the executive's own."""
+        """Attach this declaration to `body`, and return `body`.
+
+        Raises:
+            SchemaError: an outcome has the name of an event that only the executive fires.
+        """
         refuse_reserved(body.__qualname__.rpartition("<locals>.")[2], self.outcomes)
         setattr(body, DECLARED, self)
         return body
 
 
 DECLARED = "__dsc_skill__"
-"""The attribute of a body with its declaration."""
+"""Name of the attribute in which a body stores its declaration."""
 _ANNOTATED: Mapping[Any, str] = {"int": "number", "float": "number", "bool": "boolean"} | {
     int: "number", float: "number", bool: "boolean",
 }  # fmt: skip
@@ -108,15 +119,15 @@ def skill(
     """Declare a component's method, or a function (see `dsc.components.robot`), as a skill.
 
     Args:
-        outcomes: every event it may end with or report, with the event's attributes and their types.
-        types: types of its parameters by name; others follow from the annotations `int`, `float` and `bool`, and
-            what is left takes any value.
-        blocking: the body is a plain function that blocks. It runs in a thread, with a `BlockingCall` for periodic
-            checks; or in a process, which is ended instead. Arguments, outcome and component are pickled for it.
-        after_crash: the reaction if a run is resumed and the component does not know the action's result.
+        outcomes: every event that the skill may end with or report, with the event's attributes and their types.
+        types: types of the skill's parameters by name. The annotations `int`, `float` and `bool` declare other types; a
+            parameter without a type accepts any value.
+        blocking: whether the body is a plain function that blocks, and where it runs. In a thread, the body checks its
+            `BlockingCall` periodically. A process is ended instead; its arguments, outcome and component are pickled.
+        after_crash: the reaction if a run is resumed and the component cannot report the action's result.
 
     Raises:
-        InputError: the outcomes are not a mapping, or `blocking` has another value.
+        InputError: the outcomes are not a mapping, or `blocking` has an invalid value.
     """
     require_names(outcomes, "the outcomes of a skill", "@skill(outcomes={'grasped': {}})")
     for event, attributes in outcomes.items():
@@ -129,7 +140,7 @@ def skill(
 
 
 def require_names(declared: object, what: str, example: str) -> None:
-    """Raise `InputError` unless it is a mapping whose keys are names."""
+    """Raise `InputError` unless `declared` is a mapping whose keys are names."""
     if not isinstance(declared, Mapping) or not all(isinstance(name, str) for name in declared):
         raise InputError(f"{what} are a mapping of names, as in {example}, not {shown(declared)}")
 
@@ -154,9 +165,9 @@ _CARRIED_OUT: Mapping[str | None, CarryOut] = {None: _awaited, "thread": _in_thr
 
 @cache
 def signatures(kind: type[object], name: str) -> Mapping[str, SkillSignature]:
-    """The signatures of a component class's decorated methods, for a component of that name.
+    """Return the signatures of the decorated methods of a component class, for a component with that `name`.
 
-    Found once for a class and name: every skill call asks for them.
+    The result is cached by class and name, as each skill call reads it.
     """
     found = {}
     for attribute, body in inspect.getmembers(kind, inspect.isfunction):
@@ -176,7 +187,7 @@ def refuse_reserved(skill_name: str, outcomes: Iterable[str]) -> None:
 
 
 def check_arguments(signature: SkillSignature, arguments: Mapping[str, Any]) -> None:
-    """Raise `InputError` for an argument that is missing or that the skill does not take."""
+    """Raise `InputError` for an argument that is missing or that the skill does not declare."""
     name = f"{signature.component}.{signature.name}"
     for given in arguments:
         if given not in signature.parameters:
@@ -189,7 +200,7 @@ def check_arguments(signature: SkillSignature, arguments: Mapping[str, Any]) -> 
 
 
 def signature_of(component: str, name: str, body: SkillBody, declared: Declared) -> SkillSignature:
-    """The interface of a decorated body under that name."""
+    """Return the interface of a decorated body as skill `name` of `component`."""
     given = list(inspect.signature(body).parameters.values())[declared.own :]
     return SkillSignature(
         component=component,
@@ -211,17 +222,18 @@ def primitive_plot(
     when: str | None = None,
     effects: Literal["observed", "assumed"] = "observed",
 ) -> ActionPlot:
-    """A plot that triggers the skill, is done after the outcome `done`, and emits every other outcome.
+    """Return a plot that triggers the skill, completes after outcome `done`, and emits every other outcome.
 
-    A skill that raises or takes too long leaves it where it is; as a step of a plan, it has failed.
+    If the skill raises an error or exceeds its deadline, the plot stays in state `execute`. As a step of a plan, the
+    plot has then failed.
 
     Args:
         skill: the skill's signature, e.g. `arm.skills()["grasp"]`.
         done: the outcome that completes the plot.
         name: the plot's name; by default the skill's.
-        implements: the planning action that it executes; both have the same names of parameters.
-        when: as a candidate, the condition under which it fits.
-        effects: whether the action's effects are observed by the skill or assumed after `done`.
+        implements: the planning action that the plot executes; plot and action must have equal parameter names.
+        when: the condition under which the plot fits as a candidate.
+        effects: whether the skill observes the action's effects, or the executive assumes them after `done`.
 
     Raises:
         UnknownNameError: the skill has no outcome `done`.
@@ -253,7 +265,7 @@ def primitive_plot(
 
 
 def _can_be_given(skill: SkillSignature, key: str) -> bool:
-    """A default that no plot can say (a list, `None`) is left to the skill."""
+    """Return whether a chart can set the parameter. Plots cannot express a default such as a list or `None`."""
     return key not in skill.defaults or isinstance(skill.defaults[key], str | int | float | bool)
 
 

@@ -1,7 +1,7 @@
 """The record of a run: one format for files, tests, listeners and the viewer (JSON lines).
 
-Every record is `{seq, t, type, cause, …}`: `t` in seconds of run time, `cause` the seq that led to it. No wall
-time, process id or random id is in it, so that equal runs give equal bytes.
+Every record is `{seq, t, type, cause, …}`. `t` is in seconds of run time, and `cause` is the `seq` of the record that
+led to this one. A record contains no wall time, process id or random id, so that equal runs produce equal bytes.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ BEGINS = f'{{"format": "{FORMAT}"'
 
 
 class Record(NamedTuple):
-    """One thing that happened; a named tuple, as `Event` is one.
+    """An entry of the trace; a named tuple for speed, like `Event`.
 
     Attributes:
-        seq: its number, from 1.
+        seq: the record's number, from 1.
         t: seconds of run time.
-        type: `world`, `plot`, `event`, `step`, `rule`, `decision`, `knowledge`, `action`, `log`, `end`, or an upper
-            room's (`plan.found`, `scene`, …).
-        cause: seq of the record that led to it; `None` for the first.
-        data: its content, plain data.
+        type: `world`, `plot`, `event`, `step`, `rule`, `decision`, `knowledge`, `action`, `log`, `end`, or a type of a
+            higher package (`plan.found`, `scene`, …).
+        cause: `seq` of the record that led to this one; `None` for the first.
+        data: the record's content, as plain data.
     """
 
     seq: int
@@ -38,32 +38,32 @@ class Record(NamedTuple):
     data: Mapping[str, Any] = MappingProxyType({})
 
     def to_line(self) -> str:
-        """One line of JSON, keys in a fixed order."""
+        """Return one line of JSON, with the keys in a fixed order."""
         seq, t, type_, cause, data = self
         head = f'{{"seq": {seq}, "t": {round(t, 6)}, "type": "{type_}", "cause": {"null" if cause is None else cause}'
         return f"{head}, {text_of(data)[1:]}" if data else f"{head}}}"
 
     @staticmethod
     def from_line(line: str) -> Record:
-        """The inverse of `to_line`; the time is rounded."""
+        """Return the record of a line that `to_line` wrote; its time has six decimal places."""
         data = json.loads(line)
         return Record(data.pop("seq"), data.pop("t"), data.pop("type"), data.pop("cause"), data)
 
 
 Listener = Callable[[Record], None]
-"""Receives every record immediately; must not block. It may keep the record, which is immutable."""
+"""Function that receives every record immediately; it must not block. It may keep the record, which is immutable."""
 
 
 class Trace:
-    """Numbers records and hands them to listeners; keeps none itself.
+    """Source of numbered records for listeners; it stores no record.
 
     Args:
-        now: tells the seconds of run time.
-        last: number of the last record of a run that is resumed.
+        now: returns the seconds of run time.
+        last: number of the last record of a resumed run.
 
     Attributes:
         heard: whether there is a listener.
-        cause: seq of the record that leads to the next ones.
+        cause: `seq` of the record that leads to the next records.
     """
 
     def __init__(self, now: Callable[[], float], last: int = 0) -> None:
@@ -74,12 +74,12 @@ class Trace:
         self.cause: int | None = None
 
     def listen(self, listener: Listener) -> None:
-        """Tell `listener` every record from now on."""
+        """Send `listener` every later record."""
         self._listeners.append(listener)
         self.heard = True
 
     def record(self, type_: str, /, **data: Any) -> int:
-        """Add a record, caused by the current `cause`; returns its seq."""
+        """Send a record with the current `cause` to the listeners; return its `seq`."""
         self._seq += 1
         if not self.heard:
             return self._seq
@@ -90,12 +90,12 @@ class Trace:
 
 
 def header(**data: Any) -> str:
-    """The first line of a trace file: format, version, and what determines the run (seed, hashes)."""
+    """Return the first line of a trace file: format, version, and the inputs that determine the run (seed, hashes)."""
     return json.dumps({"format": FORMAT, "version": VERSION, **data}, ensure_ascii=False)
 
 
 def write_to(stream: IO[str]) -> Listener:
-    """A listener that writes each record as a line."""
+    """Return a listener that writes each record as a line to `stream`."""
 
     def write(record: Record) -> None:
         stream.write(record.to_line() + "\n")
@@ -104,13 +104,15 @@ def write_to(stream: IO[str]) -> Listener:
 
 
 def text_of(value: Any) -> str:
-    """JSON without spaces, on one line; numbers that JSON lacks (`Infinity`) are written as Python reads them.
+    """Return the value as JSON without spaces, on one line.
+
+    A number that JSON lacks, e.g. `Infinity`, is written as Python's `json` reads it.
 
     Raises:
-        TypeError: a part of it is not plain data.
-        RecursionError: it is nested too deeply.
+        TypeError: a part of the value is not plain data.
+        RecursionError: the value is nested too deeply.
     """
     try:
         return to_json(value, inf_nan_mode="constants").decode()
-    except PydanticSerializationError:  # half a character, which no encoding has; or nested more than 255 times
+    except PydanticSerializationError:  # half a surrogate pair, or more than 255 levels of nesting
         return json.dumps(value, separators=(",", ":"))
