@@ -1,8 +1,8 @@
-"""Bundles: components, the plots that use them, and part of a planning domain, distributed together (S0.9).
+"""Bundles: components, the plots that use them, and a fragment of a planning domain, distributed together (S0.9).
 
-A component builder bundles components with primitive plots that use them. A task expert bundles abstract plots, which
-use only plots. An integrator combines bundles. Python packages are the repository ("robot app store"): a package
-declares its bundles in the entry point group `dsc.bundles`.
+A component builder bundles components with primitive plots, which use these components. A task expert bundles abstract
+plots, which use only other plots. An integrator combines bundles. A Python package declares its bundles in the entry
+point group `dsc.bundles`, so a package index serves as the repository ("robot app store").
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domai
 from planning.domain import PlanningDomain
 
 GROUP = "dsc.bundles"
-"""The entry point group; each entry point names a `Bundle`, or a function that makes one."""
+"""The entry point group; each entry point refers to a `Bundle`, or to a function that returns one."""
 
 
 def _none() -> Iterable[Component]:
@@ -33,15 +33,15 @@ def _none() -> Iterable[Component]:
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """Components, plots and domain fragment, distributed together.
+    """Components, plots and a domain fragment, distributed together.
 
     Attributes:
-        name: the name in other bundles' `needs`.
+        name: the name of the bundle, which other bundles list in `needs`.
         plots: primitive plots, which use components, and abstract plots, which use only plots.
-        components: makes new components for each program.
-        domain: its planning actions, predicates and types; components may bring more.
-        needs: names of bundles whose plots or components its own plots use.
-        about: one line for readers.
+        components: a function that returns new components for each robot program.
+        domain: the bundle's planning actions, predicates and types. The components' classes may contain more fragments.
+        needs: the names of other bundles whose plots or components this bundle's plots use.
+        about: a description of one line.
     """
 
     name: str
@@ -61,17 +61,18 @@ class Bundle:
         needs: Iterable[str] = (),
         about: str = "",
     ) -> Bundle:
-        """Return the bundle of a folder's `plots/*.yaml` and `domain.pddl`, either of which may be missing.
+        """Return the bundle of a folder with `plots/*.yaml`, `domain.pddl`, or both.
 
         Args:
-            folder: e.g. `Path(__file__).parent`.
-            name: the bundle's name; by default the folder's.
-            components: as the attribute.
-            needs: as the attribute.
-            about: as the attribute.
+            folder: the folder, e.g. `Path(__file__).parent`.
+            name: the name of the bundle; by default the name of the folder.
+            components: see the attribute.
+            needs: see the attribute.
+            about: see the attribute.
 
         Raises:
-            InputError: the folder has neither, or a file contains a mistake; with the place.
+            InputError: the folder has neither plots nor a domain, or a file contains an error; the message contains the
+                place.
         """
         folder = Path(folder)
         plots, domain = folder / "plots", folder / "domain.pddl"
@@ -88,16 +89,16 @@ class Bundle:
 
     @property
     def primitive(self) -> tuple[str, ...]:
-        """Names of the plots that use components."""
+        """The names of the plots that use components."""
         return tuple(plot.name for plot in self.plots if addressed_by(plot))
 
     @property
     def abstract(self) -> tuple[str, ...]:
-        """Names of the plots that use only plots."""
+        """The names of the plots that use only plots."""
         return tuple(plot.name for plot in self.plots if not addressed_by(plot))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the bundle's content as plain data."""
+        """Return the content of the bundle as JSON data."""
         components = tuple(self.components())
         own = [] if self.domain is None else [self.domain]
         fragments: list[PlanningDomain | DomainText] = [*own, *shipped_by(components)]
@@ -116,7 +117,8 @@ def installed() -> dict[str, Bundle]:
     """Return the bundles of all installed packages, by name.
 
     Raises:
-        InputError: an entry point does not name a bundle, or two bundles have one name; with the packages.
+        InputError: an entry point does not refer to a bundle, or two bundles have equal names; the message identifies
+            the packages.
     """
     found: dict[str, Bundle] = {}
     whose: dict[str, str] = {}
@@ -129,15 +131,17 @@ def installed() -> dict[str, Bundle]:
 
 
 def gathered(wanted: Iterable[Bundle | str], among: Mapping[str, Bundle] | None = None) -> tuple[Bundle, ...]:
-    """Return the bundles and their transitive needs, each once, after its own needs.
+    """Return the wanted bundles and the bundles that they need, directly or indirectly.
+
+    Each bundle appears once, after the bundles that it needs.
 
     Args:
-        wanted: bundles, or names of installed ones.
-        among: other available bundles, by name; by default the installed ones, loaded on first use.
+        wanted: bundles, or names of installed bundles.
+        among: the available bundles by name; by default the installed bundles, which are loaded on first use.
 
     Raises:
-        UnknownNameError: a bundle is missing; with the bundle that needs it.
-        InputError: two different bundles have one name.
+        UnknownNameError: a bundle is missing; the message identifies the bundle that needs it.
+        InputError: two different bundles have equal names.
     """
     wanted = tuple(wanted)
     given = {one.name: one for one in wanted if isinstance(one, Bundle)}
@@ -150,7 +154,7 @@ def gathered(wanted: Iterable[Bundle | str], among: Mapping[str, Bundle] | None 
         return among
 
     def add(name: str, whose: str) -> None:
-        if name in begun:  # bundles may need each other
+        if name in begun:  # two bundles may need each other
             return
         bundle = given.get(name) or there().get(name)
         if bundle is None:
@@ -170,10 +174,10 @@ def gathered(wanted: Iterable[Bundle | str], among: Mapping[str, Bundle] | None 
 
 
 def plots_of(bundles: Collection[Bundle]) -> list[ActionPlot]:
-    """Return all plots of the bundles.
+    """Return the plots of all bundles.
 
     Raises:
-        InputError: two bundles have different plots of one name.
+        InputError: two bundles contain different plots with equal names.
     """
     found: dict[str, tuple[ActionPlot, str]] = {}
     for bundle in bundles:
@@ -188,7 +192,7 @@ def components_of(bundles: Collection[Bundle]) -> list[Component]:
     """Return new components of all bundles.
 
     Raises:
-        InputError: two bundles have components of one name.
+        InputError: two bundles contain components with equal names.
     """
     found: dict[str, tuple[Component, str]] = {}
     for bundle in bundles:
@@ -201,20 +205,20 @@ def components_of(bundles: Collection[Bundle]) -> list[Component]:
 
 
 def domain_of(bundles: Collection[Bundle]) -> PlanningDomain:
-    """Return the merged domain of the bundles.
+    """Return the merged planning domain of the bundles.
 
     Raises:
-        InputError: two fragments contradict each other.
+        InputError: two domain fragments contradict each other.
     """
     parts = [one.domain for one in bundles if one.domain is not None]
     return PlanningDomain.from_fragments(parts or ["(define (domain bundles))"])
 
 
 def shipped_by(components: Iterable[Component]) -> list[DomainText]:
-    """Return the fragments that components ship, once for each class.
+    """Return the domain fragments that the classes of the components declare, one for each class.
 
     Raises:
-        InputError: a file cannot be read, or does not contain a domain.
+        InputError: a file cannot be read, or does not contain a planning domain.
     """
     kinds = dict.fromkeys(type(component) for component in components)
     return [_read(kind.domain, kind.__name__) for kind in kinds if kind.domain is not None]

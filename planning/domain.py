@@ -1,7 +1,7 @@
-"""A planning domain: schema and planning actions of PDDL files, checked against each other (S4.6).
+"""A planning domain: schema and planning actions of PDDL files, with each name in the actions checked (S4.6).
 
-Fragments are merged as text forms, before name resolution: one may use names that another declares, in any order. Equal
-declarations are merged; contradictory ones raise an error with both places.
+Fragments are merged as text forms, before name resolution. A fragment may therefore use names that another fragment
+declares, in any order. Equal declarations are merged; contradictory declarations raise an error with both places.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ __all__ = ["Axiom", "Duration", "PlanningAction", "PlanningDomain"]
 
 @dataclass(frozen=True, slots=True)
 class GroundStep:
-    """The precondition and effect of a step, with arguments for parameters.
+    """Precondition and effect of a plan step, with the step's arguments instead of parameters.
 
     Attributes:
-        condition: the precondition, without the types of the arguments.
-        typed: the types and the precondition, as one conjunction.
+        condition: the precondition, without conditions about the types of the arguments.
+        typed: the conditions about types and the precondition, as one conjunction.
         effect: the effect.
     """
 
@@ -67,9 +67,9 @@ class GroundStep:
 
 @dataclass(frozen=True, slots=True)
 class PlanningDomain:
-    """Planning actions over a schema.
+    """Planning actions and axioms over a schema.
 
-    `axioms` define derived predicates. `notes` list harmless oddities of the files, with their places.
+    `axioms` define derived predicates. `notes` list harmless irregularities of the files, with their places.
 
     Methods that take a step and a world raise `UnknownNameError` if the domain lacks the step's action. They raise
     `InputError` for a wrong number of arguments.
@@ -84,15 +84,15 @@ class PlanningDomain:
 
     @classmethod
     def from_pddl(cls, path: str | Path, *more: str | Path, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
-        """Return the domain of a PDDL file, or of several files with a part each.
+        """Return the domain of a PDDL file, or of several PDDL files that each declare a part of it.
 
         Args:
-            path: the file.
-            *more: further files.
-            computed: predicates in its conditions that Python computes.
+            path: the first file; it determines the name of the domain.
+            *more: the other files.
+            computed: predicates in the conditions that Python code computes.
 
         Raises:
-            InputError: a file cannot be read or contains a mistake; with the place.
+            InputError: a file cannot be read or contains an error; the message contains the place.
         """
         return cls.from_fragments([Path(one) for one in (path, *more)], computed)
 
@@ -100,16 +100,18 @@ class PlanningDomain:
     def from_fragments(
         cls, fragments: Iterable[PlanningDomain | DomainText | Path | str], computed: Iterable[Computed[Any]] = ()
     ) -> PlanningDomain:
-        """Return the domain that fragments form together, with the name of the first.
+        """Return the domain that fragments form together, with the name of the first fragment.
 
-        A fragment may use names that another declares, in any order. Equal declarations may repeat.
+        A fragment may use names that another fragment declares, in any order. Equal declarations may repeat.
 
         Args:
-            fragments: PDDL files (a `Path`, or a name), PDDL texts, or domains; at least one.
-            computed: predicates in their conditions that Python computes; a domain brings its own.
+            fragments: at least one domain, PDDL file (a `Path`, or a file name) or PDDL text.
+            computed: predicates in the conditions that Python code computes. A `PlanningDomain` among the fragments
+                adds its own.
 
         Raises:
-            InputError: a fragment cannot be read or contains a mistake, or two contradict each other; with the place.
+            InputError: a fragment cannot be read or contains an error, or two fragments contradict each other; the
+                message contains the place.
         """
         pieces = list(fragments)
         if not pieces:
@@ -122,19 +124,19 @@ class PlanningDomain:
 
     @classmethod
     def parse(cls, text: str, source: str | None = None, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
-        """Return the domain of a PDDL text; `source` names the text in messages.
+        """Return the domain of a PDDL text; error messages identify the text by `source`.
 
         Raises:
-            InputError: the text contains a mistake; with the place.
+            InputError: the text contains an error; the message contains the place.
         """
         return cls.from_text(parse_domain(text, source), computed)
 
     @classmethod
     def from_text(cls, read: DomainText, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
-        """Return the domain that a file, or several merged, declare.
+        """Return the domain of a parsed file, or of several files that were merged.
 
         Raises:
-            InputError: the text contains a mistake; with the place.
+            InputError: the text contains an error; the message contains the place.
         """
         schema = Schema.from_text(read).with_computed(*computed)
         actions = {a.name: checked(a, schema) for a in read.actions}
@@ -143,7 +145,7 @@ class PlanningDomain:
         return cls(read.name, schema, actions, axioms, tuple(dict.fromkeys(read.remarks())))
 
     def to_text(self) -> DomainText:
-        """Return the domain as one file would declare it, the inverse of `from_text`."""
+        """Return the domain as the text form of one file, so that `from_text` returns an equal domain."""
         schema = self.schema
         return DomainText(
             name=self.name,
@@ -163,10 +165,10 @@ class PlanningDomain:
         )
 
     def to_pddl(self) -> str:
-        """Return the domain as one PDDL file, which reads back as the same domain.
+        """Return the domain as the text of one PDDL file; `parse` returns an equal domain for this text.
 
         Raises:
-            InputError: PDDL cannot spell a name, or Python computes a predicate.
+            InputError: PDDL cannot express a name, or Python code computes a predicate.
         """
         if self.schema.computed:
             computed = next(iter(self.schema.computed))
@@ -174,7 +176,7 @@ class PlanningDomain:
         return domain_to_text(self.to_text())
 
     def statements(self) -> dict[str, str]:
-        """Return the actions and derived predicates by their names in messages, each as PDDL on one line."""
+        """Return each action and derived predicate as PDDL on one line, by its name in messages."""
         text = self.to_text()
         found = {f"planning action '{one.name}'": action_to_text(one) for one in text.actions}
         for axiom in text.axioms:
@@ -183,7 +185,7 @@ class PlanningDomain:
         return {name: " ".join(one.split()) for name, one in found.items()}
 
     def applicable(self, step: PlanStep, world: World) -> bool:
-        """Return whether the arguments fit the parameters' types and the precondition holds."""
+        """Return whether the step's arguments fit the types of the parameters and the precondition holds in `world`."""
         action, bindings = self._filled(step)
         fitting, type_of = world.schema.fitting, world.type_of
         for parameter in action.parameters:
@@ -192,16 +194,16 @@ class PlanningDomain:
         return holds(action.precondition, world, bindings)
 
     def effects(self, step: PlanStep, world: World) -> Delta:
-        """Return the changes of the step, applicable or not."""
+        """Return the changes that the step causes in `world`, even if the step is not applicable."""
         action, bindings = self._filled(step)
         return apply_effect(action.effect, world, bindings)
 
     def precondition(self, step: PlanStep) -> Expression:
-        """Return the step's precondition with its arguments as one conjunction, types first."""
+        """Return one conjunction of the conditions about the arguments' types and the step's precondition."""
         return self.ground(step).typed
 
     def ground(self, step: PlanStep) -> GroundStep:
-        """Return the step with its arguments; cached, since a new plan shares most steps with the last."""
+        """Return the precondition and effect of the step, cached because successive plans share most steps."""
         known = self._ground.get(step)
         if known is None:
             if len(self._ground) >= _MOST_GROUND:
@@ -217,7 +219,7 @@ class PlanningDomain:
         return GroundStep(condition, typed, substitute_effect(action.effect, bindings))
 
     def why_not(self, step: PlanStep, world: World) -> Explanation:
-        """Return the precondition with truth values; its deciding leaf names the missing fact."""
+        """Return the step's precondition with truth values; its deciding leaf is the missing fact."""
         return explain(self.precondition(step), world)
 
     def action(self, step: PlanStep) -> PlanningAction:
@@ -230,7 +232,7 @@ class PlanningDomain:
         return found
 
     def bindings(self, step: PlanStep) -> dict[str, str]:
-        """Return the action's parameters with the step's arguments."""
+        """Return the step's arguments by the names of the action's parameters."""
         return self._filled(step)[1]
 
     def _filled(self, step: PlanStep) -> tuple[PlanningAction, dict[str, str]]:
@@ -241,11 +243,11 @@ class PlanningDomain:
 
 
 def _merged(texts: Sequence[DomainText]) -> DomainText:
-    """Return the union of the fragments, under the name of the first.
+    """Return the union of the fragments, with the name of the first fragment.
 
     Raises:
-        SchemaError: two types, constants or actions of one name differ. (The schema made from the result detects
-            this for other declarations.)
+        SchemaError: two types, constants or actions with equal names differ. `Schema.from_text` detects contradictions
+            of other declarations.
     """
     first = texts[0]
     return DomainText(
@@ -263,7 +265,7 @@ def _merged(texts: Sequence[DomainText]) -> DomainText:
 
 @contextmanager
 def _searched(texts: Sequence[DomainText]) -> Iterator[None]:
-    """Add the names of the fragments to an error about a name that none of them declares."""
+    """Add the names of the fragments to an error about a name that no fragment declares."""
     sources = dict.fromkeys(text.source or text.name for text in texts)
     try:
         yield
@@ -298,7 +300,7 @@ def _typed(schema: Schema, name: str, kind: str) -> TypedName:
 
 def _type_test(parameter: TypedVariable, arg: str, schema: Schema) -> Expression:
     types = parameter.types or (ROOT_TYPE,)
-    if not all(schema.is_type(one, 1) for one in types):  # a predicate has the name
+    if not all(schema.is_type(one, 1) for one in types):  # a predicate has the name of the type
         it = Variable(parameter.name)
         return Exists((parameter,), Comparison("=", it, Constant(arg)))
     tests = tuple(Atom(one, (Constant(arg),)) for one in types)

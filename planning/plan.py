@@ -1,4 +1,7 @@
-"""Plans and planning outcomes: values, since "no plan" is an answer and not an error."""
+"""Plans and outcomes of planning requests.
+
+A missing plan is an outcome too, and not an error.
+"""
 
 from __future__ import annotations
 
@@ -16,40 +19,40 @@ class PlanStep:
     args: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        """PDDL: `(pick-up cup1 table)`."""
+        """Return the step in PDDL, e.g. `(pick-up cup1 table)`."""
         return "(" + " ".join((self.action, *self.args)) + ")"
 
     def to_json(self) -> list[str]:
-        """Return the name of the action, then its arguments."""
+        """Return a list of the action's name and the arguments."""
         return [self.action, *self.args]
 
     @classmethod
     def from_json(cls, form: Sequence[str]) -> PlanStep:
-        """Return the step of a form; the inverse of `to_json`."""
+        """Return the step that `to_json` wrote as `form`."""
         action, *args = form
         return cls(action, tuple(args))
 
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Start of a step, in seconds from the plan's beginning, and its duration in seconds."""
+    """Start of a step, in seconds from the plan's beginning, and duration of the step in seconds."""
 
     start: float
     duration: float = 0.0
 
     @property
     def end(self) -> float:
-        """The end, in seconds from the plan's beginning."""
+        """The end of the step, in seconds from the plan's beginning."""
         return self.start + self.duration
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Steps in order; empty if the goal already holds.
+    """Sequence of plan steps; empty if the goal already holds.
 
     Attributes:
-        steps: the steps; with a schedule in the order of their starts.
-        schedule: the times of the steps, from an engine that plans with durations; otherwise empty.
+        steps: the steps; a plan with a schedule lists them in the order of their starts.
+        schedule: the timing of each step, from an engine that plans with durations; otherwise empty.
     """
 
     steps: tuple[PlanStep, ...] = ()
@@ -62,28 +65,28 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """The makespan of the schedule in seconds; 0 without one."""
+        """The makespan of the schedule in seconds; 0 if the plan has no schedule."""
         return max((timing.end for timing in self.schedule), default=0.0)
 
     def __str__(self) -> str:
-        """One step a line, as planners write plans."""
+        """Return the plan as planners write it, one step per line."""
         return "\n".join(map(str, self.steps))
 
 
 @dataclass(frozen=True, slots=True)
 class PlanFound:
-    """A plan that solves the problem.
+    """A plan that solves the problem, and the measurements of the search.
 
     Attributes:
-        plan: its steps.
-        engine: the engine that found it.
-        seconds: real time of the search; differs from run to run.
+        plan: the plan.
+        engine: the name of the engine that found the plan.
+        seconds: real time of the search; differs between runs.
         simulated_seconds: simulated time of the search; depends on the problem only.
-        reproducible: whether no limit in real time influenced it, so that the same problem gives the same plan.
-        cost: the total cost of its actions, by default their number; with a schedule, its makespan in seconds.
-        from_cache: whether a cache answered.
-        failures: the failures of other engines asked as well.
-        translated: the part of `seconds`, in processor time, for the translation into the engine's input.
+        reproducible: whether equal problems lead to equal plans, because no limit in real time influenced the search.
+        cost: the total cost of the plan's actions, by default their number; with a schedule, the makespan in seconds.
+        from_cache: whether the plan comes from a cache.
+        failures: the failures of other engines that received the same problem.
+        translated: processor time of the translation into the engine's input, in seconds; a part of `seconds`.
     """
 
     plan: Plan
@@ -99,7 +102,13 @@ class PlanFound:
 
 @dataclass(frozen=True, slots=True)
 class ProvenUnsolvable:
-    """Proof that there is no plan, with its known `reason`. For `failures` see `PlanFound`."""
+    """Proof that the problem has no plan.
+
+    Attributes:
+        engine: the name of the engine that found the proof.
+        reason: the explanation of the proof.
+        failures: as in `PlanFound`.
+    """
 
     engine: str
     reason: str
@@ -108,7 +117,13 @@ class ProvenUnsolvable:
 
 @dataclass(frozen=True, slots=True)
 class NoneFound:
-    """Proof that there is no plan of a narrower kind, which `reason` names. For `failures` see `PlanFound`."""
+    """Proof that the problem has no plan of a restricted kind, e.g. without concurrent actions.
+
+    Attributes:
+        engine: the name of the engine that found the proof.
+        reason: the restriction, and the explanation of the proof.
+        failures: as in `PlanFound`.
+    """
 
     engine: str
     reason: str
@@ -117,7 +132,13 @@ class NoneFound:
 
 @dataclass(frozen=True, slots=True)
 class TimedOut:
-    """The engine was stopped after `seconds` of real time; nothing is known. For `failures` see `PlanFound`."""
+    """End of a search without a result: the time limit stopped the engine.
+
+    Attributes:
+        engine: the name of the engine.
+        seconds: real time of the search.
+        failures: as in `PlanFound`.
+    """
 
     engine: str
     seconds: float
@@ -126,7 +147,7 @@ class TimedOut:
 
 @dataclass(frozen=True, slots=True)
 class EngineFailed:
-    """The engine crashed, gave unreadable output, or gave a plan that does not solve the problem."""
+    """Failure of an engine: it crashed, wrote unreadable output, or returned a plan that does not solve the problem."""
 
     engine: str
     message: str
@@ -134,12 +155,13 @@ class EngineFailed:
 
 @dataclass(frozen=True, slots=True)
 class NobodyCan:
-    """No engine was asked, since no permitted engine supports the problem's features.
+    """Refusal of a problem: no permitted engine supports the problem's features, so no engine received the problem.
 
     Attributes:
-        engine: the only engine permitted; empty if all installed ones are.
+        engine: the only permitted engine; empty if all installed engines are permitted.
         needs: the features of the problem, see `planning.strips.FEATURES`.
-        could: engines that support them, each with the step that makes it usable; empty if its name suffices.
+        could: engines that support these features, each with the step that makes the engine usable, e.g. an
+            installation. The step is empty if the caller only needs to select the engine.
     """
 
     engine: str
@@ -148,14 +170,14 @@ class NobodyCan:
 
     @property
     def who(self) -> str:
-        """The missing support and the engines that have it, in words."""
+        """The missing support, and the engines that provide it, as text."""
         nobody = f"{self.engine} cannot do that" if self.engine else "no installed engine can do that"
         others = ", ".join(f"{name} could ({how or 'name it as the planner'})" for name, how in self.could)
         return f"{nobody}, {others or 'nor can any engine known here'}"
 
     @property
     def message(self) -> str:
-        """One line: `the problem needs numeric; no installed engine can do that, enhsp could (pip install ...)`."""
+        """The message on one line: `the problem needs numeric; no installed engine can do that, enhsp could ...`."""
         return f"the problem needs {', '.join(self.needs) or 'STRIPS'}; {self.who}"
 
 

@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PlanningAction:
-    """A PDDL action; with arguments it becomes a `PlanStep`.
+    """A PDDL action. A planning action with arguments is a `PlanStep`.
 
     Attributes:
         name, parameters: as declared.
-        precondition: the condition before; of a durative action, the condition if it is executed alone.
-        effect: the changes afterwards; of a durative action, the changes if it is executed alone.
-        place: its place in the source file.
-        duration: its duration in seconds; `None` for an instantaneous action.
-        timed: a durative action's conditions and effects at start, over all and at end.
+        precondition: the condition before the action; of a durative action, the condition for its execution alone.
+        effect: the changes after the action; of a durative action, the changes by its execution alone.
+        place: the place of the declaration in the source file.
+        duration: the bounds of the duration in seconds; `None` for an instantaneous action.
+        timed: the conditions and effects of a durative action at start, over all and at end.
     """
 
     name: str
@@ -43,9 +43,10 @@ class PlanningAction:
 
 @dataclass(frozen=True, slots=True)
 class Axiom:
-    """A derived predicate (PDDL 2.2): it holds for the parameters for which the condition holds.
+    """Definition of a derived predicate (PDDL 2.2).
 
-    Several axioms for one predicate are alternatives.
+    The predicate holds for the arguments for which the condition holds. Several axioms of one predicate are
+    alternatives.
     """
 
     predicate: str
@@ -55,16 +56,16 @@ class Axiom:
 
 
 def checked(action: ActionText, schema: Schema) -> PlanningAction:
-    """Return the action, checked against the schema.
+    """Return the planning action of a parsed action, checked against the schema.
 
     Raises:
-        InputError: the action uses a name that is not declared.
+        InputError: the action uses an undeclared name.
     """
     for parameter in action.parameters:
         for one in parameter.types:
-            schema.require_type(one, parameter.place)  # a parameter is an object, which a plan names
+            schema.require_type(one, parameter.place)  # an argument is an object
     variables = check_parameters(action.parameters, schema)
-    # An unknown constant is a mistake here: a domain has no objects of a problem.
+    # An unknown constant is an error, because a domain does not contain the objects of a problem.
     timed = action.timed or DurativeParts(start=action.precondition, end_effect=action.effect)
     for condition in (timed.start, timed.over_all, timed.end):
         check(condition, schema, variables, objects=schema.constants)
@@ -79,7 +80,10 @@ def checked(action: ActionText, schema: Schema) -> PlanningAction:
 
 
 def checked_axiom(axiom: AxiomText, schema: Schema) -> Axiom:
-    """Return the checked axiom; types missing in it are taken from its predicate."""
+    """Return the axiom of a parsed axiom, checked against the schema.
+
+    A parameter without a type receives the type that the predicate declares.
+    """
     head = axiom.head
     signature = schema.predicate(head.name, head.place)
     check_arity(signature, len(head.parameters), head.place)
@@ -92,7 +96,7 @@ def checked_axiom(axiom: AxiomText, schema: Schema) -> Axiom:
 
 
 def refuse_changed(actions: Iterable[PlanningAction], axioms: tuple[Axiom, ...]) -> None:
-    """Raise `SchemaError` if an action changes a derived predicate."""
+    """Raise `SchemaError` if a planning action changes a derived predicate."""
     derived = {axiom.predicate: axiom for axiom in axioms}
     for action in actions:
         for leaf in effect_leaves(action.effect):

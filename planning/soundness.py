@@ -1,4 +1,4 @@
-"""Soundness of a robot program, checked before a run: its parts have their types; plots, skills and domain match."""
+"""Soundness of a robot program, checked before a run: types of the parts; agreement of plots, skills and domain."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ from planning.domain import PlanningDomain
 
 
 def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[Finding]:
-    """Yield findings: an unknown action, a parameter that the action lacks, an action without a plot.
+    """Yield a finding for each disagreement between plots and planning actions.
 
-    Plots of one action must agree on `observed` or `assumed` effects. A generated plot cannot know which of them will
-    be chosen, and might wait for effects that no skill reports.
+    A plot may implement an unknown action or have a parameter that its action lacks. An action may lack a plot.
 
-    A domain without any implemented action is valid: programs then use it without a planner.
+    All plots of one action must declare the same `effects`, either `observed` or `assumed`. A generated plot is made
+    before one of these plots is chosen, and might otherwise wait for effects that no skill reports.
+
+    A domain without any implemented action is valid, because a program may use the domain without a planner.
     """
     implemented = set()
     for plot in library:
@@ -66,7 +68,7 @@ def _mixed_effects(action: str, library: Library) -> Iterator[Finding]:
 
 
 _sound: dict[tuple[int, ...], tuple[object, ...]] = {}
-"""Sound combinations, keyed by identity; references keep the parts alive, so that no identity is reused."""
+"""Sound combinations, keyed by identity; references to the parts prevent that a new object has a used identity."""
 _MOST_SOUND = 16
 
 
@@ -77,7 +79,7 @@ def require_sound(
     skills: Collection[SkillSignature],
     declared: Mapping[str, Mapping[str, Parameter]],
 ) -> None:
-    """Raise `PlotError` with the validator's findings; an unchanged combination is not checked again."""
+    """Raise `PlotError` with the findings of the validator; a combination that passed before is not checked again."""
     parts = (domain, schema, *library, *skills, *declared, *declared.values())
     key = tuple(map(id, parts))
     if key in _sound:
@@ -90,7 +92,7 @@ def require_sound(
 
 
 def require_parts(knowledge: object, planner: object, foresight: object, store: object) -> None:
-    """Raise `InputError` unless each part has its declared type, or is `None`."""
+    """Raise `InputError` if a part is not `None` and lacks its declared type."""
     if knowledge is not None:
         require(knowledge, KnowledgeBase, "the knowledge is a KnowledgeBase")
     if store is not None:

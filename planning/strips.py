@@ -1,7 +1,7 @@
-"""A planning problem as a value: ground STRIPS with numbers (PDDL 2.1 after grounding), the input of every engine.
+"""Planning problems as immutable values: ground STRIPS with numbers (PDDL 2.1), the input of every engine.
 
 Facts are positive. For each condition `(not (p a))` the problem maintains the complementary fact (positive normal
-form). Its predicate is written `not p`, with a blank, so that no declared name clashes.
+form). The predicate of the complementary fact is `not p`, with a blank, so that it differs from every declared name.
 """
 
 from __future__ import annotations
@@ -23,29 +23,31 @@ if TYPE_CHECKING:
 
 
 FEATURES = ("numeric", "costs", "durations", "derived")
-"""Features beyond STRIPS that a problem may need; problem construction compiles all others away."""
+"""Features beyond STRIPS that a problem may need; problem construction compiles all other features away."""
 
 _NONE: Numbers = MappingProxyType({})
 
 
 class UnsupportedGoalError(InputError):
-    """The goal has a construct without support by any engine; the message names it."""
+    """Error: the goal contains a construct that no engine supports; the message identifies the construct."""
 
 
 class UnsupportedActionError(InputError):
-    """A relevant planning action has a construct without support by any engine."""
+    """Error: a relevant planning action contains a construct that no engine supports."""
 
 
 @dataclass(frozen=True, slots=True)
 class ActionSpan:
-    """The durative part of a ground action, whose own conditions and effects are those at its start.
+    """Duration, later conditions and later effects of a durative ground action.
+
+    The attributes `precondition`, `adds` and `deletes` of the `GroundAction` apply to the action's start.
 
     Attributes:
-        least, most: bounds of its duration, in seconds.
-        over_all: facts that must hold from its start to its end.
-        end: facts that must hold just before its end.
-        adds: facts that hold after its end.
-        deletes: facts that no longer hold then, none of them in `adds`.
+        least, most: bounds of the duration, in seconds.
+        over_all: facts that must hold from the start of the action to its end.
+        end: facts that must hold just before the end of the action.
+        adds: facts that hold after the end of the action.
+        deletes: facts that no longer hold after the end of the action, none of them in `adds`.
     """
 
     least: float
@@ -60,17 +62,17 @@ class ActionSpan:
 class GroundAction:
     """One alternative of a plan step.
 
-    A step with a disjunctive precondition or conditional effects has several of these.
+    A step with a disjunctive precondition or conditional effects has several ground actions.
 
     Attributes:
-        step: the plan step; `None` for bookkeeping of a disjunctive goal, which no plan shows.
-        precondition: facts that must hold before.
-        adds: facts that hold afterwards.
-        deletes: facts that no longer hold afterwards, none of them in `adds`.
-        cost: its share of the plan's cost; never negative, by default 1.
-        bounds: numeric conditions before.
-        assignments: numeric changes, one for each fluent, all computed from the numbers before.
-        span: conditions and effects of a durative action after its start; such an action has no numbers.
+        step: the plan step; `None` for a bookkeeping action, which no plan shows.
+        precondition: facts that must hold before the action.
+        adds: facts that hold after the action.
+        deletes: facts that no longer hold after the action, none of them in `adds`.
+        cost: the share of the plan's cost; never negative, by default 1.
+        bounds: numeric conditions that must hold before the action.
+        assignments: numeric changes, one for each fluent, computed from the numbers before the action.
+        span: conditions and effects of a durative action after its start; a durative action has no numbers.
     """
 
     step: PlanStep | None
@@ -83,35 +85,35 @@ class GroundAction:
     span: ActionSpan | None = None
 
     def applicable(self, state: Collection[Fact], numbers: Numbers = _NONE) -> bool:
-        """Return whether the precondition holds in `state` and with these numbers."""
+        """Return whether the precondition holds in `state` and the numeric conditions hold for `numbers`."""
         return self.lacks(state, numbers) is None
 
     def lacks(self, state: Collection[Fact], numbers: Numbers = _NONE) -> Fact | NumericBound | None:
-        """Return the first part of the precondition that does not hold, or `None`."""
+        """Return the first fact or numeric condition of the precondition that does not hold, or `None`."""
         missing = next((needed for needed in self.precondition if needed not in state), None)
         return missing or next((bound for bound in self.bounds if not bound.holds(numbers)), None)
 
     def apply(self, state: Iterable[Fact]) -> frozenset[Fact]:
-        """Return the state afterwards."""
+        """Return the state after the action."""
         return (frozenset(state) - frozenset(self.deletes)) | frozenset(self.adds)
 
     def count(self, numbers: Numbers) -> Numbers:
-        """Return the numbers afterwards.
+        """Return the numbers after the action.
 
         Raises:
-            ArithmeticError: a number cannot be computed.
+            ArithmeticError: the new value of a fluent cannot be computed.
         """
         if not self.assignments:
             return numbers
         return {**numbers, **{one.fluent: one.result(numbers) for one in self.assignments}}
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return every fact in it."""
+        """Return every fact that the action mentions."""
         later = () if self.span is None else (*self.span.over_all, *self.span.end, *self.span.adds, *self.span.deletes)
         return (*self.precondition, *self.adds, *self.deletes, *later)
 
     def act(self, timing: Timing) -> Act[frozenset[Fact]]:
-        """Return the action at its time, in a state of facts."""
+        """Return the action as an act on the time line, for a state that is a set of facts."""
         start, span = _event(self.precondition, self.adds, self.deletes), self.span
         if span is None:
             return Act(timing, start)
@@ -120,22 +122,22 @@ class GroundAction:
 
 @dataclass(frozen=True)
 class Problem:
-    """The input of an engine; made by `planning.problem.construction.build_problem`.
+    """The input of an engine, made by `planning.problem.construction.build_problem`.
 
-    Attributes:
-        domain: the planning domain's name.
-        objects: the objects in it, name -> type.
-        init: the relevant facts that hold now.
-        goal: the facts to reach; empty if the goal already holds.
-        actions: the ground actions that can contribute.
-        unreachable: goal facts, as text, that are unreachable even without deletes. If there are any, the problem is
-            proven unsolvable without an engine.
-        unsliced: makes `whole`; `None` if no object was removed.
-        numbers: the relevant numeric fluents' values now.
-        bounds: numeric conditions to reach.
-        notes: requests without support, e.g. a metric that no engine receives; for readers.
-        one_at_a_time: whether durative actions are seen as instantaneous, so that a missing plan proves nothing.
-        timed: then the same problem with durations, for a temporal engine.
+    domain: the name of the planning domain.
+    objects: the type of each object, by the object's name.
+    init: the relevant facts that hold initially.
+    goal: the facts that must hold at the end; empty if the goal already holds.
+    actions: the ground actions that can contribute to the goal.
+    unreachable: goal facts, as text, that are unreachable even without deletes. If it is not empty, the problem is
+        proven unsolvable without an engine.
+    unsliced: constructs `whole`; `None` if no object was removed.
+    numbers: the initial values of the relevant numeric fluents.
+    bounds: numeric conditions that must hold at the end.
+    notes: requests that no engine supports, e.g. a metric; text for users.
+    one_at_a_time: whether the problem treats durative actions as instantaneous ones. Then a missing plan is not a
+        proof of unsolvability.
+    timed: the problem with durations, for a temporal engine, if `one_at_a_time` is true; otherwise `None`.
     """
 
     domain: str
@@ -153,9 +155,9 @@ class Problem:
 
     @property
     def whole(self) -> Problem | None:
-        """The problem with all interchangeable objects, for use when the slice has no plan.
+        """The problem with all interchangeable objects, for use if the slice has no plan.
 
-        It is made on access; `None` if no object was removed.
+        Each access constructs the problem; the value is `None` if no object was removed.
         """
         return None if self.unsliced is None else self.unsliced()
 
@@ -163,7 +165,7 @@ class Problem:
     def features(self) -> frozenset[str]:
         """The features that an engine must support beyond STRIPS: a subset of `FEATURES`.
 
-        An engine without `costs` still solves the problem, but its plan may be expensive.
+        An engine without support for `costs` still solves the problem, but its plan may be expensive.
         """
         costs = {action.cost for action in self.actions if action.step is not None}
         numeric = bool(self.bounds) or any(action.bounds or action.assignments for action in self.actions)
@@ -177,15 +179,16 @@ class Problem:
 
     @property
     def simulated_seconds(self) -> float:
-        """A planning duration for simulated time, from the problem's size alone (never from a clock).
+        """The planning duration in simulated time, computed from the size of the problem and never from a clock.
 
-        It is 0.1 s for construction, 1 ms for each ground action and 20 ms for each goal fact. The embedded engine
+        The duration is 0.1 s for construction, 1 ms for each ground action and 20 ms for each goal fact. The embedded
+        engine
         needs time of this order of magnitude.
         """
         return round(0.1 + 0.001 * len(self.actions) + 0.02 * len(self.goal), 3)
 
     def plan(self, chosen: Sequence[int]) -> Plan | str:
-        """Return the plan of the actions with these indices, or the reason why it is not a solution."""
+        """Return the plan of the actions with these indices, or the reason why the actions are not a solution."""
         state, numbers = frozenset(self.init), self.numbers
         for index in chosen:
             if not 0 <= index < len(self.actions):

@@ -1,6 +1,6 @@
-"""Tests of programs that plan: a planner with seeded faults that fails, hangs, crashes or lies.
+"""Support for tests of programs that plan: a planner with seeded faults.
 
-No other module imports it.
+The faults are a failure, a planner that hangs, a crash and a wrong plan. No other module imports this module.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ async def _nothing(_: str) -> None:
 
 
 class FaultyPlanner:
-    """A `Planner` with faults; each problem always gets the same fault, so that a resumed run meets it again.
+    """A `Planner` with faults. Equal problems have equal faults, so that a resumed run meets a fault again.
 
     The faults:
 
-    - It reports a failure.
-    - It hangs until its caller cancels it, in simulated time if the run is simulated.
-    - It raises an error.
-    - It lies: its plan lacks the last step.
+    - The planner reports a failure.
+    - The planner hangs until its caller cancels it, in simulated time if the run is simulated.
+    - The planner raises an error.
+    - The planner returns a wrong plan, which lacks the last step.
 
     Args:
-        planner: finds the plans.
-        faults: selects the problems with a fault.
-        reached: called with `while planning`, see `Crashes.reached`.
+        planner: the planner that finds the plans.
+        faults: selects the problems that have a fault.
+        reached: called with `while planning` before each search, see `Crashes.reached`.
     """
 
     def __init__(self, planner: Planner, faults: Faults, reached: Callable[[str], Awaitable[None]] = _nothing) -> None:
@@ -46,7 +46,7 @@ class FaultyPlanner:
         self._reached = reached
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        """Return the planner's outcome, or that of the fault drawn for the problem."""
+        """Return the outcome of the planner, or the effect of the fault that was drawn for the problem."""
         await self._reached("while planning")
         fault = self._faults.draw(_subject(problem), _FAULTS)
         if fault is Fault.PLANNER_FAILS:

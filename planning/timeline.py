@@ -1,7 +1,8 @@
-"""Acts on a time line, with conditions and effects at start, over all and at end (PDDL 2.1, Fox & Long 2003).
+"""Simulation of durative actions on a time line, by the semantics of PDDL 2.1 (Fox & Long 2003).
 
-Events at one moment need the state before it and must not interfere: each order of them must have the same effect. A
-condition over all holds after each moment from the act's start until before its end.
+An act has conditions and effects at start, over all and at end. Simultaneous events must not interfere: each of them
+must be possible in the state before, and each order of them must have the same effect. A condition over all must
+hold after each event from the start of the act until before its end.
 """
 
 from __future__ import annotations
@@ -16,21 +17,21 @@ from planning.plan import Timing
 
 State = TypeVar("State")
 Changes = Mapping[Fact, Content]
-"""New truth values of facts and new values of numbers."""
+"""New truth values of facts and new values of numeric fluents."""
 Lacks = Callable[[State], str | None]
-"""Returns the first condition that does not hold, as text."""
+"""Returns the first condition that does not hold in a state, as text; `None` if all conditions hold."""
 
 FINEST = 1e-6
-"""Resolution in seconds; events closer than this happen at one moment."""
+"""Resolution in seconds; events that are closer together than this are simultaneous."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimelineEvent(Generic[State]):
-    """One end of an act.
+    """The start or the end of an act.
 
     Attributes:
-        lacks: evaluates its condition.
-        changes: its effect.
+        lacks: returns the first condition of the event that does not hold, or `None`.
+        changes: returns the effect of the event.
     """
 
     lacks: Lacks[State]
@@ -42,10 +43,10 @@ class Act(Generic[State]):
     """An act with a start time and a duration.
 
     Attributes:
-        timing: start and duration.
-        start: the event at its start.
-        lasting: evaluates the condition over all.
-        end: the event at its end; `None` without a duration.
+        timing: start and duration of the act.
+        start: the event at the start of the act.
+        lasting: returns the first violated part of the condition over all, or `None`.
+        end: the event at the end of the act; `None` for an act without a duration.
     """
 
     timing: Timing
@@ -56,19 +57,24 @@ class Act(Generic[State]):
 
 @dataclass(frozen=True, slots=True)
 class Flaw:
-    """The first violated condition of a schedule: position of the act, and `why`."""
+    """The first violated condition of a schedule.
+
+    Attributes:
+        act: the index of the act.
+        why: the condition, as text.
+    """
 
     act: int
     why: str
 
 
 def carried_out(acts: Sequence[Act[State]], state: State, after: Callable[[State, Changes], State]) -> State | Flaw:
-    """Return the state after all acts, or the first flaw.
+    """Return the state after all acts, or the first violated condition.
 
     Args:
         acts: the acts, in any order.
-        state: the present.
-        after: returns the state after changes, without changing its argument.
+        state: the state before the first act.
+        after: returns the state after changes; must not change its argument.
     """
     moments: dict[int, list[tuple[int, TimelineEvent[State]]]] = {}
     for number, act in enumerate(acts):
@@ -90,7 +96,7 @@ def carried_out(acts: Sequence[Act[State]], state: State, after: Callable[[State
 
 
 def moment(seconds: float) -> int:
-    """Return the number of the moment; times closer than `FINEST` are one moment."""
+    """Return the time in multiples of `FINEST`; simultaneous events have equal numbers."""
     return round(seconds / FINEST)
 
 
@@ -113,7 +119,7 @@ def _flaw(
 
 
 def _differ(value: Content, other: Content) -> bool:
-    """Return whether two changes differ; two changes of one number always do."""
+    """Return whether two changes differ; two numeric changes always do, since their order may matter."""
     return value != other if isinstance(value, bool) else True
 
 

@@ -1,7 +1,7 @@
-"""Conversion between unified-planning's problems and those of this project.
+"""Conversion between the problems of unified-planning and the problems of this project.
 
-Both directions go through PDDL text: each side tests its reader and writer against the standard. The import of
-unified-planning takes a second, so other modules import this one only on use.
+Both conversions use PDDL text, so that the readers and writers of both projects check each other. The import of
+unified-planning takes a second, so other modules import this module only on use.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 
 def from_unified(problem: UpProblem) -> tuple[PlanningDomain, ProblemText]:
-    """Return a problem of unified-planning as a domain, and its initial state and goal.
+    """Return a domain, and a problem text with initial state and goal, for a problem of unified-planning.
 
-    Names come from its PDDL writer: in lower case, and changed where PDDL reserves a word.
+    Names are in lower case, and differ from the original names where PDDL reserves a word.
 
     Raises:
-        InputError: PDDL cannot express a part of it.
-        UnsupportedConstructError: no engine here supports a part of it.
+        InputError: PDDL cannot express a part of the problem.
+        UnsupportedConstructError: no engine of this project supports a part of the problem.
     """
     if not isinstance(problem, UpProblem):
         raise InputError(f"from_unified takes a Problem of unified-planning, not {type(problem).__name__}")
@@ -45,17 +45,17 @@ def from_unified(problem: UpProblem) -> tuple[PlanningDomain, ProblemText]:
 
 
 def to_unified(domain: PlanningDomain, world: View, goal: str | Expression, metric: Metric | None = None) -> UpProblem:
-    """Return world, goal and domain as a problem of unified-planning, with types, objects and actions.
+    """Return domain, world and goal as a problem of unified-planning, with types, objects and actions.
 
     Args:
-        domain: the planning actions.
-        world: the present; its schema extends the domain's.
-        goal: the condition to reach.
-        metric: the plan metric; by default the least `(total-cost)`, if the domain declares it.
+        domain: the planning domain.
+        world: the initial state; its schema must extend the domain's schema.
+        goal: the condition that must hold at the end.
+        metric: the plan metric; by default the least `(total-cost)` if the domain declares that function.
 
     Raises:
-        InputError: the goal is not a condition, or unified-planning cannot read a part, such as derived or computed
-            predicates and functions that are not numeric.
+        InputError: the goal is not a condition, or unified-planning does not support a part of the problem. Examples
+            are derived predicates, computed predicates and non-numeric functions.
     """
     declared = domain.schema.functions.get(TOTAL_COST.function)
     if metric is None and declared is not None and not declared.arity:

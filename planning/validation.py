@@ -1,4 +1,4 @@
-"""Plan validation: simulate a plan and check that it reaches its goal."""
+"""Plan validation: simulation of a plan, to check that the plan reaches its goal."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """The result of a plan validation.
+    """Result of a plan validation.
 
     Attributes:
-        valid: every step is applicable at its time, and the goal holds at the end.
-        failing_step: index of the first inapplicable step; `None` if only the goal fails.
-        why: the violated condition, in PDDL; empty if valid.
+        valid: whether every step is applicable at its time and the goal holds at the end.
+        failing_step: the index of the first inapplicable step; `None` if all steps are applicable.
+        why: the violated condition, in PDDL; empty if the plan is valid.
     """
 
     valid: bool
@@ -45,11 +45,11 @@ class Validation:
 
 
 def validate(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> Validation:
-    """Simulate `plan` from `world`, which it does not change.
+    """Simulate `plan` from `world` and return the result; `world` stays unchanged.
 
-    A plan with a schedule runs along its time line, see `planning.timeline`. Another plan runs step by step, with
-    durative actions as instantaneous ones. A step with an unknown action or object makes the plan invalid; so does a
-    goal about an object that no longer exists.
+    A plan with a schedule is simulated on a time line, see `planning.timeline`. A plan without one is simulated step by
+    step, and its durative actions are treated as instantaneous ones. A plan is invalid if a step has an unknown action
+    or object, or if the goal contains an object that no longer exists.
     """
     derived = derivation(domain)
     ahead = (_as_scheduled if plan.schedule else _in_turn)(plan, derived, derived.world(world))
@@ -64,7 +64,7 @@ def validate(plan: Plan, domain: PlanningDomain, world: World, goal: Expression)
 
 
 def _in_turn(plan: Plan, derived: Derivation, world: World) -> Overlay | Validation:
-    """Return the world after the steps in order, or the validation with the failing step."""
+    """Return the world after all steps in order, or the validation with the failing step."""
     ahead = Overlay(world)
     for index, step in enumerate(plan.steps):
         seen = derived.complete(ahead) if derived.unsupported else ahead
@@ -75,7 +75,7 @@ def _in_turn(plan: Plan, derived: Derivation, world: World) -> Overlay | Validat
 
 
 def _as_scheduled(plan: Plan, derived: Derivation, world: World) -> Overlay | Validation:
-    """Return the world after the steps at their times, or the validation with the failing step."""
+    """Return the world after all steps at their scheduled times, or the validation with the failing step."""
     acts = []
     for index, (step, timing) in enumerate(zip(plan.steps, plan.schedule, strict=True)):
         try:
@@ -84,7 +84,7 @@ def _as_scheduled(plan: Plan, derived: Derivation, world: World) -> Overlay | Va
             return Validation(valid=False, failing_step=index, why=str(error))
 
     def after(state: Overlay, changes: Changes) -> Overlay:
-        ahead = Overlay(world)  # not on top of `state`: a plan may have many moments
+        ahead = Overlay(world)  # not an overlay on `state`: a plan with many events would stack as many overlays
         ahead.apply(state.delta)
         ahead.apply(_delta(changes, world.schema))
         return ahead
@@ -94,10 +94,10 @@ def _as_scheduled(plan: Plan, derived: Derivation, world: World) -> Overlay | Va
 
 
 def _act(step: PlanStep, timing: Timing, domain: PlanningDomain, world: World) -> Act[Overlay]:
-    """Return the step at its time.
+    """Return the step as an act on the time line.
 
     Raises:
-        InputError: the step names a missing object, or its duration is out of the action's bounds.
+        InputError: the step has a missing object, or the duration is outside the bounds of the action.
     """
     action, bindings = domain.action(step), domain.bindings(step)
     for parameter in action.parameters:
@@ -146,7 +146,10 @@ def _delta(changes: Changes, schema: Vocabulary) -> Delta:
 
 
 def _obstacle(step: PlanStep, domain: PlanningDomain, seen: World, ahead: Overlay) -> str | None:
-    """Take the step, or return why it is not applicable; `seen` is `ahead` with all derived facts."""
+    """Apply the step to `ahead`, or return why the step is not applicable.
+
+    `seen` is the world `ahead` with all derived facts.
+    """
     try:
         if not domain.applicable(step, seen):
             return str(domain.why_not(step, seen).deciding)
