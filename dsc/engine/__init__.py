@@ -1,1 +1,1 @@
-"""Engine: a pure step function from one machine state to the next. External actions are returned as data."""
+"""Engine: a pure step function from one machine state to the next. A step returns external actions as data."""

@@ -1,4 +1,4 @@
-"""Execution of reactions: exit and enter states, bind and unbind plots (SCXML appendix D)."""
+"""Execution of reactions: exits and entries of states, with the plots inside them (SCXML appendix D)."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.expression import Variable
 
 MAX_NESTING = 40
-"""Upper bound of plots inside plots; a deeper chart nests a plot in itself without end."""
+"""Upper bound of the depth of nested plots; a plot that contains itself would nest without end."""
 
 
 class Execution:
-    """Changes running plots according to reactions.
+    """Executor of reactions: changes the running plots.
 
     Attributes:
         chart: provider of plots.
-        performer: executes the actions.
+        performer: executor of the actions.
         finished: whether the outermost plot has reached its final state.
-        outputs: values that it returns then.
+        outputs: values that the outermost plot returns at its end, by name; empty before the end.
     """
 
     __slots__ = ("chart", "finished", "outputs", "performer")
@@ -43,7 +43,18 @@ class Execution:
     def enter_plot(
         self, compiled: CompiledPlot, arguments: Mapping[str, Any], parent: Frame | None = None, host: str = ""
     ) -> Frame:
-        """Enter a plot, as the outermost one or inside a state; raise `InputError` if the arguments do not fit."""
+        """Enter a plot and return its frame.
+
+        Args:
+            compiled: the plot.
+            arguments: values for the plot's parameters, by name.
+            parent: frame of the plot that contains the host state; `None` for the outermost plot.
+            host: name of the host state in `parent`.
+
+        Raises:
+            InputError: the arguments do not fit the parameters.
+            RunawayError: plots are nested deeper than `MAX_NESTING`.
+        """
         performer, initial = self.performer, initial_reaction(compiled)
         path = "" if parent is None else parent.prefix + host
         if parent is not None and parent.depth >= MAX_NESTING:
@@ -58,17 +69,17 @@ class Execution:
         return frame
 
     def leave_plot(self, frame: Frame) -> None:
-        """Exit all states of a plot and of the plots inside."""
+        """Exit all states of a plot and of its inner plots."""
         self._exit(frame, leaving_reaction(frame.configuration).exits)
 
     def take(
         self, reactions: Sequence[tuple[Frame, CompiledReaction]], parts: Sequence[tuple[Frame, ReactionPart]]
     ) -> None:
-        """Exit states, execute actions and enter states for reactions of plots.
+        """Execute the reactions of one microstep: exits first, then actions of transitions, then entries.
 
         Args:
-            reactions: one for each plot.
-            parts: the parts of all, in execution order; the actions of all transitions precede any entry.
+            reactions: the reaction of each plot concerned, with the plot's frame.
+            parts: the parts of all reactions, in execution order.
         """
         if len(reactions) == 1:
             ((frame, reaction),) = reactions
@@ -89,7 +100,7 @@ class Execution:
                 self._enter(frame, entrance, arguments if entrance.node.index == target else NOTHING)
 
     def _act(self, frame: Frame, part: ReactionPart) -> Mapping[str, Any]:
-        """Execute the internal actions of a transition; return the arguments for its target."""
+        """Execute the internal actions of a transition; return the arguments for its target's plot, by name."""
         assert part.edge is not None  # noqa: S101  # only a part with a transition has actions
         source = frame.compiled.nodes[part.edge.source].name
         self.performer.act(frame, source, part.effect)
@@ -102,7 +113,7 @@ class Execution:
     # -- leaving -----------------------------------------------------------------------------------------
 
     def _exit(self, frame: Frame, exits: Iterable[Exit]) -> None:
-        """Exit nodes in this order; a plot inside a node is exited just before the node."""
+        """Exit nodes in the order of `exits`; the plot inside a node is exited just before the node."""
         for one in exits:
             node, name = one.node, one.node.name
             if node.holds_plot:
@@ -115,7 +126,7 @@ class Execution:
                 self.performer.act(frame, name, one.actions)
 
     def _empty(self, frame: Frame, host: str) -> None:
-        """Exit the plots inside a state; a plot without exit actions is not thawed."""
+        """Exit the plots inside the state `host`; a frozen plot without exit actions stays frozen."""
         resting = frame.resting.get(host)
         if resting is not None and not resting.children:
             reaction = leaving_reaction(resting.configuration)
@@ -129,7 +140,7 @@ class Execution:
             inner.take_out()
 
     def _exit_addressed(self, frame: Frame, one: Exit) -> None:
-        """End an activation: cancel its skills and timers, and drop the events kept for it."""
+        """End the activation of an exited node: cancel its skills and timers, and drop its kept events."""
         name = one.node.name
         activation = frame.activations[name]
         if one.cancels:
@@ -166,7 +177,7 @@ class Execution:
             self._complete(frame, completed)
 
     def _bind(self, frame: Frame, name: str, state: object, passed: Mapping[str, Any]) -> None:
-        """Enter the plot of a submachine or dynamic state; one that cannot be bound fires an error."""
+        """Enter the plot of a submachine or dynamic state; fire an error event if no plot can be bound."""
         try:
             if isinstance(state, SubmachineState):
                 if state.arguments:
@@ -203,7 +214,7 @@ class Execution:
     # -- completion --------------------------------------------------------------------------------------
 
     def _complete(self, frame: Frame, index: int) -> None:
-        """Fire `done` for a node with complete content; 0 is the plot itself, which returns its outputs."""
+        """Fire `done` for a node whose content is complete; index 0, the plot itself, also returns its outputs."""
         if index:
             self._done(frame, index, {})
             return

@@ -1,4 +1,4 @@
-"""Frames: running plots during a step, as the mutable counterpart of `FrameState`."""
+"""Frames: running plots during a step, the mutable counterparts of `FrameState`."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from dsc.engine.machine_state import FrameState
 
 
 class Frame:
-    """One running plot; see `FrameState`. Its mappings are replaced, never changed, because the state shares them.
+    """One running plot during a step; see `FrameState`.
+
+    A step replaces the mappings of a frame and never changes them, because the frozen states share these mappings.
 
     Args:
-        was: the plot before the step; the plots inside it stay frozen until they are used.
-        parent: the frame around it.
-        host: the name of the state there that holds it.
+        was: the plot before the step; inner plots stay frozen until the step uses them.
+        parent: the next outer frame; `None` for the outermost plot.
+        host: name of the state of `parent` that contains this plot.
 
     Attributes:
-        children: the plots inside that this step uses, by the name of their host state.
-        resting: the other plots inside, unchanged and frozen.
-        prefix: the beginning of its states' paths.
-        depth: the number of plots around it.
-        gone: whether its host state was exited.
+        children: inner plots that this step uses, by the name of their host state.
+        resting: all other inner plots, unchanged and frozen, by the name of their host state.
+        prefix: common beginning of the paths of this plot's states.
+        depth: number of outer plots; 0 for the outermost plot.
+        gone: whether the host state was exited.
     """
 
     __slots__ = (
@@ -45,19 +47,19 @@ class Frame:
             parent.children[host] = self
 
     def take_out(self) -> None:
-        """Remove this frame after the exit of its host state."""
+        """Remove this frame from its parent after the exit of the host state."""
         self.gone = True
         if self.parent is not None:
             del self.parent.children[self.host]
 
     def forget(self, host: str) -> None:
-        """Drop an idle plot inside; this step executed nothing in it."""
+        """Drop the frozen plot inside the state `host`; the step executed no action of this plot."""
         resting = {**self.resting}
         del resting[host]
         self.resting = resting
 
     def child(self, host: str) -> Frame | None:
-        """Return the plot inside that state, or `None`."""
+        """Return the plot inside the state `host`, thawed for this step; `None` if the state contains no plot."""
         if host in self.resting:
             inside = self.resting[host]
             self.forget(host)
@@ -65,23 +67,23 @@ class Frame:
         return self.children.get(host)
 
     def inner(self) -> list[Frame]:
-        """Return the frames directly inside, in document order."""
+        """Return the frames of the plots directly inside this plot, thawed, in document order."""
         for host in self.resting:
             self.child(host)
         return sorted(self.children.values(), key=lambda frame: self.compiled.index[frame.host])
 
     def frames(self) -> list[Frame]:
-        """Return this frame and all frames inside it, in document order."""
+        """Return this frame and all inner frames, thawed, in document order."""
         return [self, *(frame for child in self.inner() for frame in child.frames())]
 
     def position(self, index: int) -> tuple[int, ...]:
-        """Return a node's position in document order through all plots; nodes of inner plots have longer tuples."""
+        """Return a node's position in document order across all plots; nodes of inner plots have longer tuples."""
         if self.parent is None:
             return (index,)
         return (*self.parent.position(self.parent.compiled.index[self.host]), index)
 
     def that(self, wanted: Callable[[Frame | FrameState], object]) -> list[Frame]:
-        """Return this frame and those inside it that satisfy `wanted`; thaw only these."""
+        """Return this frame and all inner frames that satisfy `wanted`; other inner plots stay frozen."""
         found = [self] if wanted(self) else []
         for child in self.children.values():
             found += child.that(wanted)
@@ -92,7 +94,7 @@ class Frame:
         return found
 
     def frozen(self) -> FrameState:
-        """Return the frame as a value: the original object if nothing has changed."""
+        """Return the frame as an immutable value: the original object if no part has changed."""
         now = (
             self.serial, self.compiled, self.configuration, self.variables, self.activations,
             self._frozen_children() if self.children else self.resting, self.kept,
@@ -100,7 +102,7 @@ class Frame:
         return self.was if all(map(is_, now, self.was)) else FrameState(*now)
 
     def _frozen_children(self) -> Mapping[str, FrameState]:
-        """Return the plots inside, in document order: the original mapping if none has changed."""
+        """Return the inner plots, frozen, in document order: the original mapping if none has changed."""
         children = {**self.resting, **{host: child.frozen() for host, child in self.children.items()}}
         if len(children) > 1:
             children = {host: children[host] for host in sorted(children, key=self.compiled.index.__getitem__)}

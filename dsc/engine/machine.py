@@ -1,4 +1,4 @@
-"""Machine: holds a state and applies the step function to it."""
+"""State machine: stores the state of a running chart and applies the step function to this state."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _new = tuple.__new__
 
 
 def move(state: MachineState, root: FrameState, event: Event, situation: Situation) -> Step | None:
-    """Return a kept step or a step that changes only the configuration; `None` requires a full macrostep."""
+    """Return a cached step, or a step that changes only the configuration; `None` if a full macrostep is required."""
     before = root.configuration
     known: Step | None = before.steps.get(event.name)
     if known is not None and known.event is event and before.bare is state:
@@ -56,14 +56,14 @@ def _answered(question: Question, root: FrameState, event: Event, situation: Sit
 
 
 def start(chart: Chart, plot: str, arguments: Mapping[str, Any], situation: Situation, serials: int = 0) -> Step:
-    """Enter the plot and run to completion.
+    """Enter a plot, run to completion and return this first step.
 
     Args:
         chart: provider of plots.
-        plot: its name.
-        arguments: values for its parameters.
-        situation: the world.
-        serials: the last serial number used before, so that no action id is used twice.
+        plot: name of the plot to start.
+        arguments: values for the plot's parameters, by name.
+        situation: the knowledge that conditions and terms read.
+        serials: the last serial number of an earlier step; larger numbers keep all action ids distinct.
 
     Raises:
         InputError: the plot is unknown, or a parameter is missing or unknown.
@@ -73,9 +73,10 @@ def start(chart: Chart, plot: str, arguments: Mapping[str, Any], situation: Situ
 
 
 def step(chart: Chart, state: MachineState, event: Event | None, situation: Situation) -> Step:
-    """React to one event and run to completion: a pure function of its arguments.
+    """React to one event, run to completion and return the step; the function is pure.
 
-    With `event=None` only transitions without trigger are considered, because the world may have changed.
+    With `event=None`, e.g. after a change of the knowledge, only transitions without trigger are considered. A machine
+    that has not started or has ended handles no event.
 
     Raises:
         RunawayError: the macrostep does not end.
@@ -91,7 +92,7 @@ def step(chart: Chart, state: MachineState, event: Event | None, situation: Situ
 
 @dataclass(slots=True)
 class Machine:
-    """Holds the state of one running chart; `step` does the rest.
+    """State machine of one running chart; `step` computes each new state.
 
     Attributes:
         chart: provider of plots.
@@ -102,19 +103,19 @@ class Machine:
     state: MachineState = field(default_factory=MachineState)
 
     def start(self, plot: str, arguments: Mapping[str, Any], situation: Situation) -> Step:
-        """See `start`; serial numbers continue those of the state."""
+        """Start a plot and store the new state; see `start`. Serial numbers continue those of the old state."""
         done = start(self.chart, plot, arguments, situation, self.state.serials)
         self.state = done.state
         return done
 
     def send(self, event: Event | None, situation: Situation) -> Step:
-        """See `step`."""
+        """React to one event and store the new state; see `step`."""
         done = step(self.chart, self.state, event, situation)
         self.state = done.state
         return done
 
     def leave(self, situation: Situation) -> Step:
-        """Exit all active states before the end of the plot; their exit actions stop the skills (S0.15)."""
+        """Exit all active states before the plot has ended; their exit actions stop the skills (S0.15)."""
         if self.state.root is None:
             return Step(self.state, None, handled=False)
         done = Macrostep(self.chart, situation, self.state).leave()

@@ -1,8 +1,8 @@
-"""Machine state: configurations and data of running plots, an immutable value with an exact JSON form.
+"""Machine state: the configurations and data of all running plots, as an immutable value with an exact JSON form.
 
-All instances of a plot share its configurations and the reactions computed for them. A configuration computes a
-reaction on first use and keeps it (lazy determinisation): from then on a step is a look-up. The number of kept
-reactions is bounded. A dropped reaction is computed again.
+All instances of a plot share its configurations and the reactions computed for them. A configuration computes each
+reaction on first use and caches it (lazy determinisation), so that a later step only looks up the reaction. The number
+of cached reactions is bounded.
 """
 
 from __future__ import annotations
@@ -21,28 +21,31 @@ from knowledge_base.errors import ParseError, UnknownNameError
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 Remembered = tuple[tuple[int, tuple[int, ...]], ...]
-"""Pairs of a history node and the nodes that were active when the node around it was last exited, in order."""
+"""Pairs of a history node and the nodes that were active at the last exit of the history's parent, in order."""
 
 MOST_CONFIGURATIONS = 4096
-"""Upper bound for one plot, enough for four regions of eight states each; a configuration takes a few KiB."""
+"""Upper bound of cached configurations of one plot: those of four regions with eight states each.
+
+A configuration occupies a few KiB.
+"""
 MOST_TRIGGERS = 256
-"""Upper bound for one configuration: event names come from outside and are unlimited."""
+"""Upper bound of triggers with a cached choice in one configuration; events from outside may have any name."""
 
 
 class Configuration:
-    """The active nodes of a plot, with the rest of the state that determines its enabled transitions.
+    """The active nodes of a plot, and all other state that determines which transitions are enabled.
 
-    The modules `reaction_choice`, `reaction` and `machine` store their computed results here.
+    The modules `reaction_choice`, `reaction` and `machine` cache their results in the configuration.
 
     Attributes:
-        active: the active nodes, in document order, without the plot itself.
-        waiting: active nodes whose `at_least` has not passed; their transitions wait.
-        history: the nodes that each history state remembers.
-        choices: trigger -> reaction or next question (see `reaction_choice`).
-        reactions: transitions taken together -> their reaction (see `reaction`).
-        questions: the number of guards that `choices` evaluates.
-        bare: the `MachineState` that holds this configuration and nothing else, once one was reached.
-        steps: event -> the last `Step` from `bare`, for events that only change the configuration.
+        active: indices of the active nodes, in document order, without the plot itself.
+        waiting: active nodes whose `at_least` time has not passed; their transitions are disabled.
+        history: the nodes that each history node remembers.
+        choices: by trigger, the reaction or the first guard to evaluate (see `reaction_choice`).
+        reactions: by the transitions taken together, their reaction (see `reaction`).
+        questions: the number of `Question` objects in `choices`.
+        bare: the shared `MachineState` that contains only this configuration; `None` until a machine reaches it.
+        steps: by event name, the last `Step` from `bare`, for events that only change the configuration.
     """
 
     def __init__(
@@ -59,7 +62,7 @@ class Configuration:
         self.steps: dict[str, Any] = {}
 
     def __eq__(self, other: object) -> bool:
-        """Compare the active nodes, waiting nodes and history; the frames compare the plots."""
+        """Compare the active nodes, waiting nodes and history; `FrameState` compares the plots."""
         return self is other or (isinstance(other, Configuration) and self._key == other._key)
 
     def __hash__(self) -> int:
@@ -74,18 +77,18 @@ class Configuration:
 
     @cached_property
     def members(self) -> frozenset[int]:
-        """The active nodes as a set."""
+        """Indices of the active nodes, as a set."""
         return frozenset(self.active)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the active states; regions have none."""
+        """Names of the active states, in document order; active regions have no name here."""
         nodes = self.compiled.nodes
         return tuple([nodes[index].name for index in self.active if nodes[index].state is not None])
 
     @cached_property
     def form(self) -> Mapping[str, Any]:
-        """The configuration as plain data, read-only."""
+        """The configuration as plain data: names instead of indices. The caller must not change the result."""
         names = [node.name for node in self.compiled.nodes]
         return {
             "active": [names[index] for index in self.active],
@@ -95,31 +98,31 @@ class Configuration:
 
     @cached_property
     def leaves(self) -> tuple[int, ...]:
-        """The active nodes without an active node inside, in document order."""
+        """Indices of the innermost active nodes, in document order."""
         inner = {self.compiled.nodes[index].parent for index in self.active}
         return tuple([index for index in self.active if index not in inner])
 
     @cached_property
     def spontaneous(self) -> bool:
-        """Return whether an active node has a transition without trigger."""
+        """Whether an active node has a transition without trigger."""
         return any(self.compiled.nodes[index].always for index in self.active)
 
     def forget(self) -> None:
-        """Drop all computed reactions; later steps compute them again."""
+        """Drop all cached results; later steps compute the dropped results again."""
         self.choices.clear()
         self.reactions.clear()
         self.steps.clear()
         self.questions = 0
 
     def is_active(self, state: str) -> bool:
-        """Return whether the state of that name is active."""
+        """Return whether the state of that name is active; `False` for an unknown name."""
         return self.compiled.index.get(state) in self.members
 
 
 def configuration_of(
     compiled: CompiledPlot, active: tuple[int, ...], waiting: frozenset[int] = frozenset(), history: Remembered = ()
 ) -> Configuration:
-    """Return the plot's configuration with these contents: the same object while it is kept."""
+    """Return the plot's configuration with these contents; one object is shared while the plot caches it."""
     key = (active, waiting, history)
     found: Configuration | None = compiled.cache.get(key)
     if found is None:
@@ -145,7 +148,7 @@ class _EventForm(_Form):
 class _FrameForm(_Form):
     serial: int
     plot: str
-    form: Any  # the text of a plot that was bound as data; `None` for a plot of the chart
+    form: Any  # the data of a plot that was bound as data; `None` for a plot of the chart
     active: list[str]
     waiting: list[str]
     history: dict[str, list[str]]
@@ -162,16 +165,18 @@ class _MachineForm(_Form):
 
 
 class FrameState(NamedTuple):
-    """One running plot. Steps make many of them: a frozen dataclass takes four times as long as a named tuple.
+    """One running plot between two steps.
+
+    It is a named tuple because steps create many frames: a frozen dataclass takes four times as long to create.
 
     Attributes:
-        serial: number of this instance, never used again in the same run.
+        serial: number of this plot instance, unique in the run.
         compiled: the plot.
-        configuration: its active states.
-        variables: parameters, variables and outputs with their values.
-        activations: serial numbers of the states that receive addressed events, by name.
-        children: plots inside active submachine and dynamic states, by the state's name.
-        kept: events that wait until a state's least time has passed, with its name.
+        configuration: the plot's configuration.
+        variables: values of parameters, variables and outputs, by name.
+        activations: serial numbers of the active states that receive addressed events, by the state's name.
+        children: inner plots, by the name of their submachine or dynamic state.
+        kept: pairs of a state's name and an event that waits until this state's least time has passed.
     """
 
     serial: int
@@ -184,11 +189,11 @@ class FrameState(NamedTuple):
 
     @property
     def active(self) -> Mapping[str, int]:
-        """Serial numbers of the active states by name, in document order; 0 for states without addressed events."""
+        """Serial numbers of all active states by name, in document order; 0 for a state without addressed events."""
         return {name: self.activations.get(name, 0) for name in self.configuration.names}
 
     def frames(self) -> Iterator[FrameState]:
-        """Yield this plot and all plots inside it."""
+        """Yield this plot and all its inner plots."""
         yield self
         for child in self.children.values():
             yield from child.frames()
@@ -207,7 +212,7 @@ class FrameState(NamedTuple):
         }
 
     def kept_form(self) -> list[list[Any]]:
-        """Return the waiting events as plain data."""
+        """Return the kept events as plain data: pairs of a state's name and an event."""
         return [[name, {**event._asdict(), "attributes": dict(event.attributes)}] for name, event in self.kept]
 
 
@@ -215,8 +220,8 @@ class MachineState(NamedTuple):
     """The complete state of a machine between two events.
 
     Attributes:
-        root: the outermost plot; `None` before the start and after the end.
-        serials: the last serial number given out.
+        root: the outermost plot; `None` before the start and after the end of the run.
+        serials: the last assigned serial number.
         finished: whether the outermost plot has reached its final state.
     """
 
@@ -231,12 +236,12 @@ class MachineState(NamedTuple):
 
     @staticmethod
     def from_json(data: Mapping[str, Any], chart: Chart) -> MachineState:
-        """Return the state of such data with the plots of a chart, the inverse of `to_json`.
+        """Return the state that `to_json` wrote as `data`; the chart provides the plots.
 
         Raises:
-            ParseError: the data do not have that form.
+            ParseError: the data do not have the form that `to_json` writes.
             InputError: the data of a bound plot are not a plot.
-            UnknownNameError: the chart lacks one of the plots, or a plot one of the states.
+            UnknownNameError: the chart has no plot of a name in the data, or a plot no longer has a state.
         """
         try:
             form = _MachineForm.model_validate(data)
@@ -247,17 +252,17 @@ class MachineState(NamedTuple):
         return MachineState(None if form.root is None else _frame_of(form.root, chart), form.serials, form.finished)
 
     def configuration(self) -> tuple[str, ...]:
-        """Return the paths of all active states, outermost first."""
+        """Return the paths of all active states, in document order; empty before the start and after the end."""
         if self.root is None or not self.root.children:
             return () if self.root is None else self.root.configuration.names
         return tuple(_paths(self.root, ""))
 
     def has_activation(self, serial: int) -> bool:
-        """Return whether the state that was entered with this serial number is still active."""
+        """Return whether the state with this serial number is still active."""
         return self.root is not None and any(serial in one.activations.values() for one in self.root.frames())
 
     def activations_inside(self, serial: int) -> frozenset[int]:
-        """Return the serial numbers of that activation and of all activations inside it."""
+        """Return `serial` and the serial numbers of all activations inside that state; empty if it is not active."""
         for frame in self.root.frames() if self.root else ():
             for name, own in frame.activations.items():
                 if own == serial:
@@ -266,13 +271,13 @@ class MachineState(NamedTuple):
         return frozenset()
 
     def is_active(self, state: str) -> bool:
-        """Return whether a state of that name or path is active."""
+        """Return whether a state with this name, path or end of a path is active."""
         return any(path == state or path.endswith("/" + state) for path in self.configuration())
 
 
 def at_rest(root: FrameState, serials: int) -> MachineState:
-    """Return the state of a machine that waits for events; equal configurations without other data share one object."""
-    frame_serial = 1  # the outermost plot has the first number
+    """Return a machine's state between two steps; without data besides the configuration, it is a shared object."""
+    frame_serial = 1  # serial number of the outermost plot
     if serials > frame_serial or root.variables or root.children:
         return MachineState(root, serials)
     kept: MachineState | None = root.configuration.bare
@@ -290,7 +295,7 @@ def _paths(frame: FrameState, prefix: str) -> Iterator[str]:
 
 def _frame_of(form: _FrameForm, chart: Chart) -> FrameState:
     compiled = chart.compiled(form.plot) if form.form is None else chart.bind(form.form)
-    index = {node.name: node.index for node in compiled.nodes[1:]}  # regions are stored by their place
+    index = {node.name: node.index for node in compiled.nodes[1:]}  # the data identify a region by its name `#index`
 
     def placed(names: Iterable[str]) -> tuple[int, ...]:
         unknown = next((name for name in names if name not in index), None)

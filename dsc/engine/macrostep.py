@@ -23,11 +23,14 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.expression import Expression
 
 MAX_MICROSTEPS = 1000
-"""Upper bound; a macrostep with more microsteps does not end."""
+"""Upper bound of microsteps in one macrostep; a longer macrostep raises `RunawayError`."""
 
 
 class Macrostep:
-    """Selects transitions until none is enabled; `Execution` takes them, and `Performer` executes their actions."""
+    """A macrostep: selects transitions until none is enabled.
+
+    `Execution` takes the selected transitions, and `Performer` executes their actions.
+    """
 
     __slots__ = ("_broken_guards", "_execution", "_performer", "_root", "_turn")
 
@@ -49,7 +52,7 @@ class Macrostep:
         return self._step(None, handled=True)
 
     def react(self, event: Event | None) -> Step:
-        """Take the event, then run to completion; a state that keeps the event handles it, too."""
+        """Handle the event and run to completion; an event that a waiting state keeps also counts as handled."""
         handled = event is not None and self._take(event)
         if event is not None and event.name == EVERY:
             self._next_period(event)
@@ -57,7 +60,7 @@ class Macrostep:
         return self._step(event, handled=handled)
 
     def leave(self) -> Step:
-        """Exit all active states of all plots."""
+        """Exit all active states of all plots and return this last step."""
         return self._step(None, handled=False, left=True)
 
     def _step(self, event: Event | None, *, handled: bool, left: bool = False) -> Step:
@@ -80,7 +83,7 @@ class Macrostep:
                 self._unhandled(event)
 
     def _rest(self) -> None:
-        """Take transitions without trigger, then internal events, until none is left."""
+        """Take transitions without trigger, then handle internal events, until neither is left."""
         internal = self._performer.internal
         while not self._execution.finished:
             if self._take_in(self._root.that(_is_spontaneous), None, None):
@@ -92,8 +95,11 @@ class Macrostep:
                 self._unhandled(event)
 
     def _unhandled(self, error: Event) -> None:
-        """Record an untaken error event: it ends a DSC run; in SCXML it is an ordinary event (SCXML 3.12, 5.10.1)."""
-        # A chart may fire `error` itself, without a reason.
+        """Record an error event that no transition handles.
+
+        In dialect `dsc` the error ends the run; in SCXML it is an ordinary event (SCXML 3.12, 5.10.1).
+        """
+        # A chart may itself fire an `error` event without the attribute `reason`.
         reason = str(error.attributes.get("reason", "the chart fired 'error' without a reason"))
         if error.name == EXECUTION_ERROR or any(one.compiled.scxml for one in self._root.that(_is_frame(error.frame))):
             self._performer.output.append(Note(error.name, reason))
@@ -103,9 +109,13 @@ class Macrostep:
     # -- one event ---------------------------------------------------------------------------------------
 
     def _take(self, event: Event) -> bool:
-        """Run one microstep if a transition on the event is enabled, or keep the event for a waiting state."""
+        """Run one microstep if the event enables a transition; else keep the event if a waiting state needs it.
+
+        Returns:
+            Whether a transition was taken or the event was kept.
+        """
         self._performer.event = event
-        if event.name not in ERRORS:  # a guard that fails for its own error event would repeat without end
+        if event.name not in ERRORS:  # a guard that fails for the error event it caused would repeat without end
             self._turn += 1
         if event.to is not None:
             return self._take_addressed(event, event.to)
@@ -126,7 +136,7 @@ class Macrostep:
         return goes_outwards(event.name) and self._take_around(frame, event)
 
     def _take_around(self, frame: Frame, event: Event) -> bool:
-        """Offer an event that a plot does not take to its host state, and so on outwards."""
+        """Offer an unhandled event to each host state, innermost first; return whether a host state handled it."""
         while frame.parent is not None:
             host, frame = frame.host, frame.parent
             trigger = Addressed(event.name, frame.compiled.index[host], exact=False, number=None)
@@ -135,7 +145,7 @@ class Macrostep:
         return False
 
     def _find(self, activation: int) -> tuple[Frame, str] | None:
-        """Return the frame and state of this serial number, if they are still active."""
+        """Return the frame and state with this serial number, or `None` if the state is no longer active."""
         for frame in self._root.that(lambda one: activation in one.activations.values()):
             for state, serial in frame.activations.items():
                 if serial == activation:
@@ -143,7 +153,7 @@ class Macrostep:
         return None
 
     def _take_in(self, concerned: list[Frame], trigger: Trigger, event: Event | None) -> bool:
-        """Run one microstep if one of these plots has an enabled transition."""
+        """Run one microstep if a plot in `concerned` has an enabled transition; return whether it handled the event."""
         if len(concerned) == 1:
             return self._take_alone(concerned[0], trigger, event)
         return bool(concerned) and self._take_together(trigger, event)
@@ -165,7 +175,7 @@ class Macrostep:
         return True
 
     def _take_together(self, trigger: Trigger, event: Event | None) -> bool:
-        """Select transitions across several plots: one in an inner plot may preempt one outside (SCXML 3.13)."""
+        """Select transitions across several plots; inner transitions may preempt outer ones (SCXML 3.13)."""
         taken, late = select(self._root, trigger, self._guard)
         kept = [self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event) for one in late]
         if not taken:
@@ -210,14 +220,14 @@ class Macrostep:
     # -- time --------------------------------------------------------------------------------------------
 
     def _keep(self, frame: Frame, states: Iterable[str], event: Event | None) -> bool:
-        """Keep an event that a waiting state would take; drop duplicates, and restart a period."""
+        """Keep an event for waiting states, given by name; return `False` for a periodic event, which is dropped."""
         if event is None or event.name == EVERY:
             return False
         frame.kept = (*frame.kept, *((state, event) for state in states))
         return True
 
     def _least_time_passed(self, frame: Frame, state: str) -> bool:
-        """Allow transitions of the state from now on; offer the kept events to it alone, before new ones."""
+        """Enable the transitions of a state whose least time has passed; first offer the state its kept events."""
         before = frame.configuration
         waiting = before.waiting - {frame.compiled.index[state]}
         frame.configuration = configuration_of(frame.compiled, before.active, waiting, before.history)

@@ -33,20 +33,20 @@ from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.syntax.expression import Constant, Expression, Term, Variable
 
 _EXPONENT_FROM = 1e21
-"""ECMAScript writes larger numbers with an exponent."""
+"""Smallest number that ECMAScript writes with an exponent."""
 SHORTEST_PERIOD = 0.001
-"""Seconds; a shorter period would block all other events."""
+"""Lower bound of a period in seconds; a shorter period would block all other events."""
 
 
 class Performer:
-    """Executes actions and collects the contents of the step.
+    """Executor of actions; collects the results that the step returns.
 
     Attributes:
-        situation: the world as the chart sees it.
-        event: the last event taken; actions read its attributes.
-        serials: the last serial number given out.
-        internal: pending internal events.
-        exited, entered, bound: changes of the current microstep.
+        situation: the knowledge that conditions and terms read.
+        event: the current event, whose attributes the actions read.
+        serials: the last assigned serial number.
+        internal: pending internal events, oldest first.
+        exited, entered, bound: paths of states and bound plots of the current microstep.
     """
 
     __slots__ = (
@@ -70,34 +70,34 @@ class Performer:
         self.bound: list[steps.PlotBound] = []
 
     def end_microstep(self, event: Event | None, taken: tuple[steps.Taken, ...]) -> None:
-        """Close a microstep: the exits, entries and bindings since the last one."""
+        """Record a microstep with all exits, entries and bindings since the previous microstep."""
         bound = tuple(self.bound)
         self.microsteps.append(steps.Microstep(event, taken, tuple(self.exited), tuple(self.entered), bound))
         self.exited, self.entered, self.bound = [], [], []
 
     def fail(self, frame: Frame, reason: str) -> None:
-        """Fire an `error` event in the plot for a failed evaluation."""
+        """Fire an error event in the plot after a failed evaluation; `reason` is the message."""
         name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
         self.internal.append(Event(name, {"reason": reason}, frame=frame.serial))
 
     # -- values ------------------------------------------------------------------------------------------
 
     def bindings(self, frame: Frame) -> Mapping[str, Any]:
-        """Return the frame's variables and the event's attributes."""
+        """Return the values of the frame's variables and of the current event's attributes, by name."""
         if self.event is None or not self.event.attributes:
             return frame.variables
         return {**frame.variables, **self.event.bindings()}
 
     def holds(self, frame: Frame, condition: Expression) -> bool:
-        """Return whether a condition is true in a frame; raise `InputError`."""
+        """Return whether a condition is true in a frame; raise `InputError` if its evaluation fails."""
         return self.situation.holds(condition, self.bindings(frame))
 
     def value(self, frame: Frame, term: TermField) -> Any:
-        """Return the value of a term in a frame; raise `InputError`."""
+        """Return the value of a term in a frame; raise `InputError` if its evaluation fails."""
         return _evaluate(term, self.bindings(frame), self.situation)
 
     def values(self, frame: Frame, terms: Mapping[str, TermField]) -> dict[str, Any]:
-        """Return the values of several terms; raise `InputError`."""
+        """Return the values of named terms in a frame; raise `InputError` if an evaluation fails."""
         return {name: self.value(frame, term) for name, term in terms.items()} if terms else {}
 
     # -- actions -----------------------------------------------------------------------------------------
@@ -110,10 +110,10 @@ class Performer:
         activation: int = 0,
         first: int = 0,
     ) -> None:
-        """Execute a block of actions of a state, numbered from `first` within its activation.
+        """Execute a block of actions of a state; action numbers start at `first` within the activation.
 
-        An action that fails to evaluate fires an error. The other actions still run; in dialect `scxml` the rest of the
-        block is skipped (SCXML 4.9). A branch condition that fails to evaluate is false (SCXML 5.9.1).
+        A failed evaluation fires an error event. The remaining actions are still executed; in dialect `scxml` they are
+        skipped (SCXML 4.9). A branch condition whose evaluation fails counts as false (SCXML 5.9.1).
         """
         for number, action in enumerate(actions, first):
             try:
@@ -137,7 +137,7 @@ class Performer:
     def start_timer(
         self, frame: Frame, node: StateNode, activation: int, event: str, index: int, seconds: TermField
     ) -> None:
-        """Start one timer of a state; a delay that fails to evaluate fires an error."""
+        """Start one timer of a state; a delay whose evaluation fails fires an error event instead."""
         try:
             delay = _delay_of(self.value(frame, seconds), least=SHORTEST_PERIOD if event == EVERY else 0)
         except InputError as error:
@@ -146,7 +146,7 @@ class Performer:
             self.output.append(steps.StartTimer(activation, index, delay, event))
 
     def _output_of(self, frame: Frame, action: ExternalAction, activation: int, number: int) -> steps.Output:
-        """Return an external action with the values of its arguments."""
+        """Return the output for an external action, with evaluated arguments."""
         match action:
             case Trigger():
                 component, skill = action.trigger.split(".")
@@ -213,10 +213,10 @@ class Performer:
 
 
 def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: Situation) -> Mapping[str, Any]:
-    """Return the variables of a new instance: arguments, defaults and initial values.
+    """Return the variables of a new plot instance by name, from arguments, defaults and initial values.
 
     Raises:
-        InputError: a parameter is missing or out of its range, or an argument is not a parameter.
+        InputError: a parameter is missing or out of its range, or an argument names no parameter.
     """
     if not (arguments or plot.parameters or plot.variables or plot.outputs):
         return NOTHING
@@ -238,10 +238,10 @@ def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: S
 
 
 def _evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation) -> Any:
-    """Return the value of a term; a variable may hold a value of any type, such as a plot.
+    """Return the value of a term; the value of a variable may have any type, e.g. a plot as data.
 
     Raises:
-        InputError: a variable is not bound, or the term is not a number where one is needed.
+        InputError: a variable is not bound, or an operand of arithmetic is not a number.
     """
     if isinstance(term, Constant):
         return term.value
@@ -255,7 +255,7 @@ def _evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation) -> 
 
 
 def _delay_of(seconds: Any, least: float = 0) -> float:
-    """Return the seconds of a timer; raise `InputError` if the value is not a duration or is below `least`."""
+    """Return a timer's delay in seconds; raise `InputError` for a value that is not a duration of at least `least`."""
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not least <= seconds < math.inf:
         bound = f" of at least {least:g}" if least else ""
         raise InputError(f"a timer needs a number of seconds{bound}; found {seconds!r}")
@@ -263,7 +263,7 @@ def _delay_of(seconds: Any, least: float = 0) -> float:
 
 
 def _shown(value: Any) -> str:
-    """Return a value as ECMAScript prints it."""
+    """Return the text that ECMAScript prints for a value."""
     if value is None:
         return "undefined"
     if isinstance(value, bool):

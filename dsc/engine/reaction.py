@@ -1,8 +1,8 @@
-"""Reactions, computed once for each configuration and set of transitions (lazy determinisation).
+"""Reactions: computed on first use for each configuration and set of transitions, then cached (lazy determinisation).
 
-A reaction has the exits, actions, entries and next configuration after a set of transitions of one plot. A submachine
-or dynamic state is one node here; the plot inside it has separate reactions. SCXML 1.0, appendix D: microstep,
-computeExitSet, exitStates, enterStates.
+A reaction consists of the exits, actions, entries and next configuration for a set of transitions of one plot. A
+submachine or dynamic state is one node of this plot; its inner plot has separate reactions. SCXML 1.0, appendix D:
+microstep, computeExitSet, exitStates, enterStates.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from dsc.model.states import FinalState, HistoryState, State
 _AnyAction = TypeVar("_AnyAction", bound=ExternalAction | Internal)
 Action = ExternalAction | Internal
 MOST_REPORTS = 64
-"""Upper bound of host paths with a kept report of a reaction."""
+"""Upper bound of the host paths for which a reaction caches its report."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +31,9 @@ class Exit:
     """A node to exit, with its exit actions.
 
     Attributes:
-        cancels: whether it started skills or timers that the exit cancels.
+        node: the node to exit.
+        actions: the exit actions of the node.
+        cancels: whether the node may have started skills or timers, which the exit cancels.
     """
 
     node: StateNode
@@ -40,7 +42,7 @@ class Exit:
 
     @property
     def quiet(self) -> bool:
-        """Whether the exit has no actions."""
+        """Whether the exit has no exit actions and no activation to end."""
         return not self.actions and not self.node.addressed
 
 
@@ -49,10 +51,11 @@ class StateEntry:
     """A node to enter, with its entry actions.
 
     Attributes:
-        actions: its entry actions.
-        after: the effect of a history's default that leads to it, as a separate block (appendix D).
-        completes: indices of the nodes that it completes; 0 for the plot itself.
-        emits: the outcome of a final state.
+        node: the node to enter.
+        actions: the entry actions of the node.
+        after: effect of the history default that leads to the node, executed as a separate block (appendix D).
+        completes: indices of the nodes whose content this entry completes; 0 for the plot itself.
+        emits: action that fires the outcome event of a final state; `None` without outcome.
     """
 
     node: StateNode
@@ -63,17 +66,20 @@ class StateEntry:
 
     @property
     def quiet(self) -> bool:
-        """Whether the entry has no actions or further effects."""
+        """Whether the entry has no actions, completes no node and starts no activation."""
         acts = self.actions or self.after or self.emits
         return not acts and not self.completes and not self.node.addressed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReactionPart:
-    """One transition's internal actions and entries, in order.
+    """Internal actions and entries of one transition.
 
     Attributes:
-        acts: whether it has actions, or arguments to pass.
+        edge: the transition; `None` for the initial entry of a plot.
+        effect: the internal actions, in order.
+        entrances: the nodes to enter, in order.
+        acts: whether the transition has internal actions or passes arguments to its target.
     """
 
     edge: TransitionEdge | None
@@ -83,7 +89,7 @@ class ReactionPart:
 
     @property
     def quiet(self) -> bool:
-        """Whether the part only enters nodes."""
+        """Whether the part only enters nodes, without any action."""
         return not self.acts and all(entrance.quiet for entrance in self.entrances)
 
 
@@ -92,14 +98,14 @@ class CompiledReaction:
     """The effect of one microstep on one plot.
 
     Attributes:
-        parts: one for each transition, in the order in which they are taken.
+        parts: a part for each transition, in order of execution.
         exits: all exits, in order.
-        following: the configuration after it.
+        following: the configuration after the microstep.
         keeps: names of states that keep the event until their least time has passed.
-        taken, exited, entered: its report for the outermost plot.
-        silent: whether it only exits states.
-        still: whether it only changes the configuration.
-        reports: transitions taken, for plots inside, by the path of their host state.
+        taken, exited, entered: the reaction's report if the plot is the outermost one: transitions and state names.
+        silent: whether the reaction only exits states, without any action.
+        still: whether the reaction only changes the configuration and enables no transition without trigger.
+        reports: cached reports of the taken transitions for inner plots, by the path of the host state.
     """
 
     parts: tuple[ReactionPart, ...]
@@ -114,7 +120,7 @@ class CompiledReaction:
     reports: dict[str, tuple[Taken, ...]] = field(default_factory=dict)
 
     def taken_in(self, compiled: CompiledPlot, prefix: str) -> tuple[Taken, ...]:
-        """Return the report of the transitions in a plot whose states' paths begin with the prefix."""
+        """Return the report of the taken transitions; `prefix` is the beginning of the paths of the plot's states."""
         found = self.reports.get(prefix)
         if found is None:
             if len(self.reports) >= MOST_REPORTS:
@@ -124,7 +130,7 @@ class CompiledReaction:
 
 
 def report(edge: TransitionEdge, compiled: CompiledPlot, prefix: str = "") -> Taken:
-    """Return the report of a taken transition."""
+    """Return the report of one taken transition; `prefix` is the beginning of the paths of the plot's states."""
     nodes = compiled.nodes
     target = prefix + nodes[edge.targets[0]].name if edge.targets else None
     return Taken(prefix + nodes[edge.source].name, edge.trigger, target, edge.rule, compiled.plot.name, edge.place)
@@ -133,7 +139,7 @@ def report(edge: TransitionEdge, compiled: CompiledPlot, prefix: str = "") -> Ta
 def reaction_of(
     configuration: Configuration, edges: tuple[TransitionEdge, ...], keeps: tuple[str, ...] = ()
 ) -> CompiledReaction:
-    """Return the reaction of a configuration when these transitions are taken."""
+    """Return the reaction that takes `edges` in a configuration; the states in `keeps` keep the event."""
     found: CompiledReaction | None = configuration.reactions.get((edges, keeps))
     if found is None:
         found = configuration.reactions[edges, keeps] = _Work(configuration).taking(edges, keeps)
@@ -141,7 +147,7 @@ def reaction_of(
 
 
 def initial_reaction(compiled: CompiledPlot) -> CompiledReaction:
-    """Return the reaction that enters a plot by default."""
+    """Return the reaction that enters a plot in its initial state."""
     found: CompiledReaction | None = compiled.cache.get(None)
     if found is None:
         found = _Work(configuration_of(compiled, ())).entering()
@@ -150,7 +156,7 @@ def initial_reaction(compiled: CompiledPlot) -> CompiledReaction:
 
 
 def leaving_reaction(configuration: Configuration) -> CompiledReaction:
-    """Return the reaction that exits all states of a plot, as interrupted: its host was exited or the run ends."""
+    """Return the reaction that interrupts a plot: it exits all states with their actions for interruption."""
     found: CompiledReaction | None = configuration.reactions.get(None)
     if found is None:
         found = configuration.reactions[None] = _Work(configuration).leaving()
@@ -158,7 +164,7 @@ def leaving_reaction(configuration: Configuration) -> CompiledReaction:
 
 
 class _Work:
-    """Working copy of a configuration that changes during a microstep."""
+    """Working copy of a configuration, changed while a reaction is computed."""
 
     def __init__(self, configuration: Configuration) -> None:
         self.configuration = configuration
@@ -211,7 +217,7 @@ class _Work:
         )  # fmt: skip
 
     def _exits(self, left: set[int], own: set[int]) -> tuple[Exit, ...]:
-        """Order exits inner before outer, later before earlier; nodes outside `own` are interrupted."""
+        """Return the exits, inner nodes first and later nodes before earlier nodes; interrupt nodes outside `own`."""
         ordered = [self.compiled.nodes[index] for index in sorted(left, reverse=True)]
         for node in ordered:
             self._remember(node)
@@ -225,7 +231,7 @@ class _Work:
         return tuple(exits)
 
     def _remember(self, node: StateNode) -> None:
-        """Record the active nodes inside a node before its exit, for its histories (SCXML 3.10)."""
+        """Record the active nodes inside a node for the node's histories, before its exit (SCXML 3.10)."""
         for history in node.histories:
             state = self.compiled.nodes[history].state
             if isinstance(state, HistoryState) and state.history == "deep":
@@ -253,7 +259,7 @@ class _Work:
         return tuple(entrances)
 
     def _settled(self, actions: tuple[_AnyAction, ...]) -> tuple[_AnyAction, ...]:
-        """Replace each `in-state` question in the actions by its present answer."""
+        """Return the actions with each `in-state` replaced by its current truth value."""
         return tuple(map(self._settled_action, actions)) if self.compiled.scxml else actions
 
     def _settled_action(self, action: _AnyAction) -> _AnyAction:
@@ -265,10 +271,10 @@ class _Work:
             update = {"block": self._settled(action.block)}
         else:
             return action
-        return action.model_copy(update=update)  # type: ignore[return-value]  # of the same class
+        return action.model_copy(update=update)  # type: ignore[return-value]  # the copy has the class of `action`
 
     def _completed(self, node: StateNode) -> Iterator[int]:
-        """Yield the nodes whose content is complete after this entry, if a transition or a parent depends on it."""
+        """Yield indices of nodes whose content this entry completes, if a transition or a parent depends on this."""
         nodes, scxml = self.compiled.nodes, self.compiled.scxml
         return (one for one in self._around_complete(node) if not one or scxml or DONE in nodes[one].edges)
 
@@ -290,7 +296,7 @@ class _Work:
             ends = region.transparent
 
     def _is_finished(self, region: int) -> bool:
-        """Return whether a final state is active in the region; a transparent region delegates to its only state.
+        """Return whether a region has an active final state; for a transparent region its only state decides.
 
         SCXML appendix D: isInFinalState.
         """

@@ -1,4 +1,4 @@
-"""Choice of the reaction to a trigger, computed once for each combination of guard results."""
+"""Choice of the reaction to a trigger: computed on first use for each combination of guard results, then cached."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from dsc.engine.transition_selection import Trigger, edges_of, select
 from knowledge_base.language.syntax.expression import TRUE, Expression
 
 MOST_QUESTIONS = 1024
-"""Upper bound for one configuration: n independent guards have 2**n outcomes."""
+"""Upper bound of `Question` objects for one configuration: n independent guards have 2**n outcomes."""
 
 
 @dataclass(slots=True, eq=False)
 class Question:
-    """A guard to evaluate next; each result leads to another question or to a reaction.
+    """A guard to evaluate next; each result leads to another `Question` or to a reaction.
 
     Attributes:
         edge: the guarded transition.
-        condition: its guard, with `in-state` questions already answered.
+        configuration: the configuration in which the guard is evaluated.
+        trigger: the trigger of the transitions to choose from.
     """
 
     configuration: Configuration
@@ -34,7 +35,7 @@ class Question:
     _branches: dict[bool, Choice] = field(default_factory=dict)
 
     def follow(self, answer: bool) -> Choice:  # noqa: FBT001  # the guard's truth value
-        """Return the reaction or the next question after this result."""
+        """Return the reaction, or the next guard to evaluate, after this result of the guard."""
         found = self._branches.get(answer)
         if found is None:
             answers = {**self.answers, self.edge: answer}
@@ -49,7 +50,7 @@ _UNKNOWN = object()
 
 
 def choice_of(plot: Frame | FrameState, trigger: Trigger) -> Choice | None:
-    """Return the reaction to a trigger or the first question; `None` if no active state has a transition on it."""
+    """Return the reaction or first guard for a trigger; `None` if no active state has a transition for the trigger."""
     configuration = plot.configuration
     found = configuration.choices.get(trigger, _UNKNOWN)
     if found is _UNKNOWN:
@@ -61,11 +62,11 @@ def choice_of(plot: Frame | FrameState, trigger: Trigger) -> Choice | None:
 
 
 def settled(guard: Expression, configuration: Configuration) -> Expression:
-    """Return a guard of the configuration's plot with its `in-state` questions answered."""
+    """Return a guard of the configuration's plot with each `in-state` replaced by its truth value."""
     return settle(guard, configuration.is_active) if configuration.compiled.scxml else guard
 
 
-class _Open(Exception):  # noqa: N818  # control flow: the search stops at a question
+class _Open(Exception):  # noqa: N818  # control flow: the search stops at a guard without a result
     def __init__(self, question: Question) -> None:
         super().__init__()
         self.question = question

@@ -1,6 +1,7 @@
-"""Situation and chart: the engine's only interfaces to knowledge and plots; conditions that the engine answers itself.
+"""Situation and chart, the engine's only interfaces to knowledge and plots; conditions on active states.
 
-`(in-state NAME)` tests whether a state of the same plot is active, SCXML's `In()` (5.9.1). Dialect `scxml` only.
+The engine itself evaluates `(in-state NAME)`: whether a state of the condition's plot is active. This is `In()` of
+SCXML (5.9.1), and exists only in dialect `scxml`.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from knowledge_base.language.syntax.expression import (
 )
 
 IN_STATE = "in-state"
-"""The predicate's name."""
+"""Name of the predicate that tests whether a state is active."""
 FALSE = Or(())
 Bindings = Mapping[str, Any]
 """Values of chart variables, parameters and `event.attribute`s by name."""
@@ -37,12 +38,12 @@ Bindings = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The judgement of one candidate, with its reason.
+    """Result for one candidate of a dynamic state, with the reason.
 
     Attributes:
-        plot: the candidate.
-        fits: whether its condition held.
-        reason: the leaf of its condition that decided, as text.
+        plot: name of the candidate.
+        fits: whether the candidate's condition is true.
+        reason: the part of the condition that determines the result, as text.
         explanation: the whole condition as a tree with truth values, as plain data.
     """
 
@@ -57,10 +58,10 @@ class Decision:
     """The decision record of one entry into a dynamic state (S0.4): the chosen plot and the reasons.
 
     Attributes:
-        chosen: the plot to be bound; `None` if none fits.
-        arguments: values for its parameters.
-        satisfied: the state's goal holds already; nothing is bound and the state is done.
-        verdicts: one for each candidate, in the order of preference.
+        chosen: name of the plot to bind; `None` if no candidate fits.
+        arguments: values for the parameters of the chosen plot.
+        satisfied: whether the state's goal is already true; then no plot is bound and the state is done.
+        verdicts: a verdict for each candidate, in the order of preference.
         version: version of the knowledge at the decision.
     """
 
@@ -72,10 +73,10 @@ class Decision:
 
 
 class Situation(Protocol):
-    """The knowledge at one version plus the changes of this macrostep.
+    """The knowledge at one version, with the changes of the current macrostep.
 
-    Deterministic: equal calls in an equal order give equal answers. Each macrostep gets a new one. Every method raises
-    `InputError` for an unknown or unbound name.
+    A situation is deterministic: equal calls in an equal order return equal results. Each macrostep uses a new
+    situation. Every method raises `InputError` for an unknown or unbound name.
     """
 
     def holds(self, expression: Expression, bindings: Bindings) -> bool:
@@ -87,23 +88,23 @@ class Situation(Protocol):
         ...
 
     def tell(self, effect: Effect, bindings: Bindings) -> Delta:
-        """Return the change of the effect in this world; later calls see it, the caller commits it."""
+        """Apply an effect and return its change: later calls read the change, and the caller commits it."""
         ...
 
     def choose(self, state: DynamicState, holder: str, bindings: Bindings) -> Decision:
-        """Choose the content of a dynamic state of the plot named `holder`."""
+        """Return the decision on the content of a dynamic state; `holder` is the name of the state's plot."""
         ...
 
 
 class Chart(Protocol):
-    """Provider of plots: by name, or bound as a value."""
+    """Provider of compiled plots, by name or from a plot given as data."""
 
     def compiled(self, name: str) -> CompiledPlot:
-        """Return the plot of that name; raise `UnknownNameError`."""
+        """Return the compiled plot of that name; raise `UnknownNameError` if there is none."""
         ...
 
     def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
-        """Compile a plot given as data, e.g. one made from a plan; raise `InputError`."""
+        """Compile a plot given as data, e.g. one made from a plan; raise `InputError` for data that are not a plot."""
         ...
 
 
@@ -116,7 +117,7 @@ def asked_states(e: Expression) -> list[str]:
 
 
 def settle(e: Expression, active: Callable[[str], bool]) -> Expression:
-    """Replace every `in-state` in the condition by its truth value; the knowledge base evaluates the rest."""
+    """Return the condition with each `in-state` replaced by its truth value; the rest stays to be evaluated."""
     match e:
         case Atom(_, args) if _asks(e):
             return TRUE if isinstance(args[0], Constant) and active(str(args[0].value)) else FALSE

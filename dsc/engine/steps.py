@@ -1,4 +1,4 @@
-"""Steps and their outputs: values only, so that tests, trace and replay read one record."""
+"""Steps and their outputs: immutable values; tests, trace and replay read the same record."""
 
 from __future__ import annotations
 
@@ -15,7 +15,16 @@ from knowledge_base.facts import Delta
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Start a skill for an activation; `action_id` identifies this execution permanently."""
+    """Start a skill for an activation of a state.
+
+    Attributes:
+        action_id: permanent identifier of this execution of the skill.
+        activation: serial number of the state's activation.
+        component, skill: names of the component and of its skill.
+        arguments: values for the skill's parameters, by name.
+        names: event of the skill -> the name of this event in the chart.
+        within: seconds after which the skill is cancelled; `None` means no limit.
+    """
 
     action_id: str
     activation: int
@@ -28,14 +37,14 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class Cancel:
-    """Stop the running skills and the timers of a state that was exited."""
+    """Stop the running skills and the timers of an exited state; `activation` is its serial number."""
 
     activation: int
 
 
 @dataclass(frozen=True, slots=True)
 class SetParameter:
-    """Set a component's parameter."""
+    """Set a parameter of a component to a value."""
 
     component: str
     parameter: str
@@ -44,7 +53,7 @@ class SetParameter:
 
 @dataclass(frozen=True, slots=True)
 class SwitchMode:
-    """Put a component into a mode."""
+    """Switch a component to a mode."""
 
     component: str
     mode: str
@@ -52,7 +61,7 @@ class SwitchMode:
 
 @dataclass(frozen=True, slots=True)
 class SendMessage:
-    """Send a component a one-way message."""
+    """Send a one-way message to a port of a component."""
 
     component: str
     port: str
@@ -61,9 +70,9 @@ class SendMessage:
 
 @dataclass(frozen=True, slots=True)
 class StartTimer:
-    """Send the activation an event after `seconds`, for its timeout or period number `index`.
+    """Send an event to an activation after `seconds`; `index` is the position among the state's timers of this event.
 
-    The event is dropped if the state was exited before.
+    The event is dropped if the state is exited earlier.
     """
 
     activation: int
@@ -74,7 +83,7 @@ class StartTimer:
 
 @dataclass(frozen=True, slots=True)
 class SendLater:
-    """Send an event from outside after `seconds`; it is dropped if its plot has ended before (SCXML 6.2)."""
+    """Send an event to its plot instance after `seconds`; drop the event if this plot ends earlier (SCXML 6.2)."""
 
     event: Event
     seconds: float
@@ -83,7 +92,7 @@ class SendLater:
 
 @dataclass(frozen=True, slots=True)
 class Revoke:
-    """Drop the pending events of that id for the plot instance `frame` (SCXML 6.3)."""
+    """Drop the pending delayed events with this id in the plot instance with serial number `frame` (SCXML 6.3)."""
 
     frame: int
     id: str
@@ -91,26 +100,26 @@ class Revoke:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """An entry for the trace: a log (SCXML 4.7), or an error event that an SCXML chart did not take."""
+    """An entry for the trace: a log (SCXML 4.7), or an error event that an SCXML chart did not handle."""
 
     label: str
     text: str
 
 
 Output = Start | Cancel | SetParameter | SwitchMode | SendMessage | StartTimer | SendLater | Revoke | Note
-"""The machine's output, in order."""
+"""One output of the machine: an external action, a timer, a delayed event or an entry for the trace."""
 
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """A transition that was taken.
+    """Report of a taken transition.
 
     Attributes:
-        source, target: paths of its states.
+        source, target: paths of the transition's states; `target` is `None` if no state was entered.
         trigger: the event, `after` or `always`.
-        rule: label of the contingency rule it comes from.
-        plot: name of the plot that has it.
-        place: its place in its source state, e.g. `("on", "grasped", 0)`.
+        rule: label of the contingency rule whose expansion made the transition; `None` for any other transition.
+        plot: name of the plot that contains the transition.
+        place: keys of the transition in its source state, e.g. `("on", "grasped", 0)`.
     """
 
     source: str
@@ -122,7 +131,7 @@ class Taken:
 
 
 class PlotBound(NamedTuple):
-    """A running plot that became a state's content; `state` is the state's path, empty for the outermost plot."""
+    """A plot that became the content of a state; `state` is the state's path, empty for the outermost plot."""
 
     state: str
     plot: ActionPlot
@@ -132,7 +141,7 @@ NO_CHANGE = Delta()
 
 
 class Microstep(NamedTuple):
-    """Transitions taken together. States are named by their path from the root, e.g. `clear/execute/step_2`."""
+    """Transitions taken together. A path from the root identifies each state, e.g. `clear/execute/step_2`."""
 
     event: Event | None
     taken: tuple[Taken, ...]
@@ -143,27 +152,27 @@ class Microstep(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DecisionMade:
-    """A decision record with the path of its dynamic state."""
+    """A decision record with the path of its dynamic state in `state`."""
 
     state: str
     decision: Decision
 
 
 class Step(NamedTuple):
-    """One macrostep: run to completion of one event.
+    """One macrostep: the reaction to one event, run to completion.
 
     Attributes:
-        state: the machine's next state.
-        event: the event; `None` for the start.
-        handled: whether a transition took the event itself.
+        state: state of the machine after the macrostep.
+        event: the handled event; `None` for the start or for a change of the knowledge.
+        handled: whether a transition was taken on the event, or a waiting state keeps the event.
         microsteps: the microsteps, in order.
-        decisions: the decisions of dynamic states.
-        knowledge: the changes of the chart to the knowledge base.
+        decisions: decisions on the content of dynamic states, in order.
+        knowledge: the chart's changes of the knowledge base, not yet committed.
         output: external actions and timers, in order.
-        emitted: outcome events of the outermost plot.
-        errors: failed evaluations of actions or guards without a transition on `error`. In dialect `scxml` they are
-            notes in `output`, and the plot continues.
-        outputs: values that the outermost plot returns, if this step ends it.
+        emitted: outcome events of the outermost plot, in order.
+        errors: messages of failed actions or guards for which no transition on `error` exists. In dialect `scxml` these
+            messages are notes in `output`, and the plot continues.
+        outputs: values that the outermost plot returns; empty unless this step ends the plot.
     """
 
     state: MachineState
@@ -179,15 +188,15 @@ class Step(NamedTuple):
 
     @property
     def moved(self) -> bool:
-        """Whether the step changed or sent anything."""
+        """Whether the step has at least one microstep."""
         return bool(self.microsteps)
 
     def entered(self, state: str) -> bool:
-        """Return whether a state of that name or path was entered."""
+        """Return whether the step entered a state with this name, path or end of a path."""
         return any(_is(path, state) for micro in self.microsteps for path in micro.entered)
 
     def exited(self, state: str) -> bool:
-        """Return whether a state of that name or path was exited."""
+        """Return whether the step exited a state with this name, path or end of a path."""
         return any(_is(path, state) for micro in self.microsteps for path in micro.exited)
 
 

@@ -1,4 +1,4 @@
-"""Tables of a plot: nodes in document order, edges by event. Compiled once, shared by all instances."""
+"""Tables of a plot: nodes in document order, edges by event. All instances of a plot share its compiled tables."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.language.syntax.expression import Expression
 
 
-@dataclass(slots=True, eq=False)  # never changed; a frozen one takes five times as long to create
+@dataclass(slots=True, eq=False)  # never changed; a frozen dataclass takes five times as long to create
 class TransitionEdge:
-    """A transition between nodes, by their indices; without targets no state is exited or entered.
+    """A transition between nodes, which are given by index; without targets no state is exited or entered.
 
     Attributes:
-        source, targets: the nodes that it leads from and to.
-        trigger, guard, effect, rule: as in the model.
+        source, targets: indices of the source node and of the target nodes.
+        trigger, guard, effect, rule: see `dsc.model.transitions.Transition`.
         internal: whether a composite source stays active if all targets are inside it (SCXML 3.5).
-        place: its place in its source, e.g. `("on", "grasped", 0)`.
-        passed: arguments for the plot inside the target.
-        cleared: history nodes that forget.
+        place: keys of the transition in its source state, e.g. `("on", "grasped", 0)`.
+        passed: arguments for the plot inside the target, by name.
+        cleared: indices of the history nodes whose memory the transition clears.
     """
 
     source: int
@@ -44,7 +44,7 @@ class TransitionEdge:
 
 @dataclass(frozen=True, slots=True)
 class Default:
-    """The default target of a history that remembers nothing, with its effect."""
+    """Default target and effect of a history node, used before the first exit from the history's scope."""
 
     target: int
     effect: tuple[Internal, ...]
@@ -52,14 +52,14 @@ class Default:
 
 @dataclass(frozen=True, slots=True)
 class TimedEdge:
-    """A transition triggered by time."""
+    """A transition that a timer triggers after `seconds`."""
 
     seconds: TermField
     edge: TransitionEdge
 
 
 def _nothing(_node: StateNode) -> None:
-    """Build no tables: the node has no transitions."""
+    """Build no tables; used for nodes without transitions."""
 
 
 _TABLES = frozenset({"edges", "timeouts", "cycles", "always"})
@@ -67,33 +67,33 @@ _TABLES = frozenset({"edges", "timeouts", "cycles", "always"})
 
 @dataclass(slots=True, eq=False)
 class StateNode:
-    """A state, a region or (index 0) the plot itself.
+    """Node of a compiled plot: a state, a region or, at index 0, the plot itself.
 
     The tables of its transitions are built on first use. A run may reach only the beginning of a long plot, as of one
-    made from a plan.
+    x
 
     Attributes:
-        index: position in document order.
-        name: the state's name; of a region, its place, `#index`.
-        around: indices of the nodes around it, innermost first, the plot last.
-        last: index of the last node inside it; its own if there is none.
+        index: position of the node in document order.
+        name: name of the state; `#index` for a region.
+        around: indices of the outer nodes, innermost first, with the plot last.
+        last: index of the last node inside this node; `index` if there is none.
         children: indices of the nodes directly inside.
-        initial: the child entered by default; -1 if there is none or all are entered.
-        state: the model value; `None` for the plot and for regions.
-        entry, exit, broken: actions at entry, at exit, and at an exit by a transition of another state.
-        edges: event name -> transitions in order.
-        timeouts, cycles: transitions after a time, and each time it has passed again.
-        at_least: the least time before its transitions are enabled.
-        lay_out: builds these tables.
+        initial: index of the node entered by default; -1 without children, or if all children are entered.
+        state: the state in the model; `None` for the plot and for regions.
+        entry, exit, broken: actions on entry, on exit by its own transition, and on exit by any other transition.
+        edges: transitions in order, by event name.
+        timeouts, cycles: transitions that a single timer triggers, and those that a periodic timer triggers.
+        at_least: least time in seconds after entry before the transitions are enabled; `None` without such a time.
+        lay_out: function that builds the four tables of transitions.
         always: transitions without trigger.
-        histories: indices of the history nodes that remember its content.
-        transparent: a region that stands for its only state (dialect `scxml`), not a scope for transitions.
-        parent: index of the node around it; -1 for the plot.
-        final: whether it is a final state.
-        orthogonal: whether all its children are active together.
-        holds_plot: whether its content is another plot.
-        timed: whether its entry starts a timer.
-        addressed: whether events are sent to one of its activations, so that they need numbers.
+        histories: indices of the history nodes that remember the active nodes inside this node.
+        transparent: whether the node is a region that stands for its only state (dialect `scxml`), without a scope.
+        parent: index of the next outer node; -1 for the plot.
+        final: whether the node is a final state.
+        orthogonal: whether all children are active together.
+        holds_plot: whether the node is a submachine or dynamic state, which contains another plot.
+        timed: whether the entry starts a timer.
+        addressed: whether events are sent to single activations of the node, which therefore need serial numbers.
     """
 
     index: int
@@ -123,7 +123,7 @@ class StateNode:
     addressed: bool = False
 
     def __post_init__(self) -> None:
-        # Each step reads these, so they are computed once.
+        # Each step reads these attributes, so the node computes them once.
         self.parent = self.around[0] if self.around else -1
         kind = type(self.state)
         self.final = kind is states.FinalState
@@ -131,7 +131,7 @@ class StateNode:
         self.holds_plot = kind is states.SubmachineState or kind is states.DynamicState
 
     def settle(self) -> None:
-        """Derive `timed` and `addressed` from the transitions and actions."""
+        """Compute `timed` and `addressed` from the transitions and actions."""
         state = self.state if isinstance(self.state, states.State) else None
         self.timed = state is not None and (bool(state.after or state.every) or self.at_least is not None)
         actions = (*self.entry, *self.exit, *self.broken)
@@ -142,7 +142,7 @@ class StateNode:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> object:
-            """Build a missing table on first access; later accesses find the attribute."""
+            """Build the tables of transitions on first access; later accesses find the attribute."""
             if name not in _TABLES:
                 raise AttributeError(name)
             self.edges, self.timeouts, self.cycles, self.always = {}, (), (), ()
@@ -152,16 +152,16 @@ class StateNode:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CompiledPlot:
-    """A plot with its tables.
+    """Compiled plot: the model with its tables.
 
     Attributes:
-        plot: the model.
-        nodes: all nodes in document order; a node comes after the one around it.
-        index: state name -> node index.
-        form: the plot as data if it was bound as a value, else `None`.
-        defaults: history node -> its default.
-        scxml: whether the plot is in dialect `scxml`: events match by prefix and keep SCXML's names.
-        cache: the kept configurations and the initial reaction (see `machine_state`).
+        plot: the plot's model.
+        nodes: all nodes in document order; each node follows its parent.
+        index: node indices by state name.
+        form: the data of a plot that was bound as data; `None` for any other plot.
+        defaults: default of each history, by node index.
+        scxml: whether the plot is in dialect `scxml`, where events match by prefix and have the names of SCXML.
+        cache: cached configurations and the initial reaction (see `machine_state`).
     """
 
     plot: ActionPlot
@@ -176,7 +176,7 @@ class CompiledPlot:
         return f"CompiledPlot({self.plot.name})"
 
     def __eq__(self, other: object) -> bool:
-        """Compare the plots and their forms."""
+        """Compare the models and the data of bound plots."""
         if self is other:
             return True
         return isinstance(other, CompiledPlot) and self.form == other.form and self.plot == other.plot
@@ -185,21 +185,21 @@ class CompiledPlot:
         return hash(self.plot.name)
 
     def way(self, around: int, index: int) -> list[int]:
-        """Return the nodes from an ancestor, exclusive, down to a node, inclusive."""
+        """Return the indices on the path from the ancestor `around`, exclusive, to the node `index`, inclusive."""
         ancestors = self.nodes[index].around
         return [*reversed(ancestors[: ancestors.index(around)]), index]
 
     def inside(self, index: int, around: int) -> bool:
-        """Return whether a node is inside another, which it follows in document order."""
+        """Return whether the node `index` is inside the node `around`."""
         return around < index <= self.nodes[around].last
 
 
 def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> CompiledPlot:
-    """Lay out the plot's states as nodes and its transitions as edges.
+    """Return the tables of a plot; `form` is the plot's data if it was bound as data.
 
     Raises:
-        UnknownNameError: a transition or a scope names a missing state.
-        SchemaError: targets cannot be active together, or a history leads to a state outside its own scope.
+        UnknownNameError: a transition or the initial state of a scope refers to a missing state.
+        SchemaError: targets of a transition cannot be active together, or a history's default is outside its scope.
     """
     layout = _Layout(plot)
     for node in layout.nodes:
@@ -208,7 +208,7 @@ def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> Com
 
 
 class _Layout:
-    """Builds the nodes of a plot, then the edges between them."""
+    """Builder of the nodes of a plot and of the edges between them."""
 
     def __init__(self, plot: ActionPlot) -> None:
         self._scxml = plot.dialect == "scxml"
@@ -233,7 +233,7 @@ class _Layout:
     def _add_regions(self, node: StateNode, state: states.OrthogonalState) -> None:
         for name, region in state.regions.items():
             inner = self._append(f"#{len(self.nodes)}", node, None)
-            # SCXML has no region elements: a region that is named after its only state stands for this state.
+            # SCXML has no element for regions: a region with the name of its only state stands for this state.
             inner.transparent = self._scxml and [*region.states] == [name]
             self._add_states(inner, region)
         for name, history in state.connectors.items():
@@ -260,7 +260,7 @@ class _Layout:
         return found
 
     def defaults(self) -> dict[int, Default]:
-        """Return the default target and effect of each history, by node."""
+        """Return the default target and effect of each history, by node index."""
         histories = [(node, node.state) for node in self.nodes if isinstance(node.state, states.HistoryState)]
         return {node.index: self._default(node, history) for node, history in histories}
 
@@ -271,7 +271,7 @@ class _Layout:
         return Default(target, history.do)
 
     def prepare(self, node: StateNode) -> None:
-        """Build the edges now if they may contain errors; else build them on first use."""
+        """Build the edges of a node immediately if they may contain errors; else schedule them for first use."""
         if isinstance(node.state, states.State | Connector):
             node.lay_out = self._lay_out
             if isinstance(node.state, Connector) or not self._is_plain(node.state):
@@ -279,18 +279,18 @@ class _Layout:
         node.settle()
 
     def _is_plain(self, state: states.State) -> bool:
-        """Return whether each transition has at most one target, and this target exists."""
+        """Return whether the transitions of a state need no check: at most one target, which exists, and no `clear`."""
         for one in chain(chain.from_iterable(state.on.values()), state.after, state.every, state.always):
             if one.also or one.clear or (one.target is not None and one.target not in self.index):
                 return False
         return True
 
     def _lay_out(self, node: StateNode) -> None:
-        """Build the transitions of one state in all tables of its node."""
+        """Build all tables of transitions of one node."""
         state = node.state
         if not isinstance(state, states.State | Connector):
             return
-        # Transitions and tables have the same order. A search by place would be slow in large plots.
+        # `placed_transitions` yields in the order of the tables. A search by place would be slow in large plots.
         edges = (self._edge(node, place, trigger, one) for place, trigger, one in state.placed_transitions())
         if isinstance(state, states.State):
             node.edges = {event: tuple(islice(edges, len(many))) for event, many in state.on.items()}
@@ -313,7 +313,7 @@ class _Layout:
         )  # fmt: skip
 
     def _together(self, targets: Sequence[int]) -> bool:
-        """Return whether all targets can be active together: any two are in different regions (SCXML 3.11)."""
+        """Return whether all targets can be active together, because each pair is in different regions (SCXML 3.11)."""
         ways = [[*reversed(self.nodes[target].around), target] for target in targets]
         for first, second in combinations(ways, 2):
             split = sum(1 for one, other in zip(first, second, strict=False) if one == other)
@@ -330,7 +330,7 @@ class _Layout:
         return found
 
     def _cleared(self, source: StateNode, transition: Transition) -> Iterator[int]:
-        """Yield the histories that a transition clears: those of the state, and with `*` those of all states inside."""
+        """Yield the indices of histories that a transition clears; `*` includes those of all inner states."""
         for name in transition.clear:
             node = self.nodes[self._target(source, name.removesuffix("*"))]
             regions = [self.nodes[child] for child in node.children] if node.orthogonal else []

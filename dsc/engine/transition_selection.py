@@ -1,7 +1,7 @@
-"""Selection of transitions, with their exit and entry sets: inner before outer, across nested plots.
+"""Selection of transitions with their exit and entry sets, across nested plots; inner transitions have priority.
 
 SCXML 1.0, section 3.13 and appendix D (selectTransitions, removeConflictingTransitions, computeExitSet,
-computeEntrySet). Nested plots form one tree; events have scopes (S0.6, S2.5).
+computeEntrySet). Nested plots form one tree, and each event has a scope in this tree (S0.6, S2.5).
 """
 
 from __future__ import annotations
@@ -16,13 +16,20 @@ from dsc.events import AFTER, EVERY
 from dsc.model.actions import Internal
 
 Guard = Callable[[Frame, TransitionEdge], bool]
-"""Returns whether an edge's guard holds in its frame."""
+"""Function that returns whether the guard of an edge is true in a frame."""
 Remembered = Mapping[int, tuple[int, ...]]
-"""History node -> the nodes that were active when the node around it was last exited."""
+"""Nodes that were active at the last exit of a history's parent, by history node."""
 
 
 class Addressed(NamedTuple):
-    """A trigger for one state: an event that only this state may take, or also the states around it."""
+    """A trigger for one state.
+
+    Attributes:
+        event: name of the event.
+        node: index of the addressed state.
+        exact: whether only transitions of this state are considered, and not those of outer states.
+        number: position of the timer among the state's timers of this event; `None` for any other event.
+    """
 
     event: str
     node: int
@@ -31,20 +38,22 @@ class Addressed(NamedTuple):
 
 
 Trigger = str | Addressed | None
-"""The trigger of a plot's transitions: an event for all its states, one for a state, or `None` for a change of the
-world.
+"""Trigger of a plot's transitions.
+
+A string is an event for all states, and `Addressed` is an event for one state. `None` selects transitions without
+trigger.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Enabled:
-    """A selected transition of a running plot."""
+    """An enabled transition of a running plot."""
 
     frame: Frame
     edge: TransitionEdge
 
     def left(self) -> set[tuple[Frame, int]]:
-        """Return the exit set: active states inside the domain, and all plots inside those."""
+        """Return the exit set: the active nodes inside the transition's domain, and those of the plots inside them."""
         compiled, configuration = self.frame.compiled, self.frame.configuration
         indices = left_by(compiled, self.edge, configuration.active, dict(configuration.history))
         found = {(self.frame, index) for index in indices}
@@ -54,7 +63,7 @@ class Enabled:
         return found
 
     def is_inside(self, other: Enabled) -> bool:
-        """Return whether the source is inside the other's source, maybe in a plot inside it."""
+        """Return whether this transition's source is inside the source of `other`, also across nested plots."""
         for frame, index in _outwards(self.frame, self.edge.source):
             if frame is other.frame:
                 within = frame.compiled.inside(index, other.edge.source)
@@ -62,19 +71,19 @@ class Enabled:
         return False
 
     def preempts(self, other: Enabled) -> bool:
-        """Return whether it is inside the other, and both exit the same state."""
+        """Return whether this transition is inside `other` and the two exit sets intersect."""
         return self.is_inside(other) and bool(self.left() & other.left())
 
     def has_to_wait(self) -> bool:
-        """Return whether its source waits for its least time."""
+        """Return whether the transition leads to a target but its source's least time has not passed."""
         return self.edge.source in self.frame.configuration.waiting and bool(self.edge.targets)
 
 
 def select(root: Frame, trigger: Trigger, guard: Guard) -> tuple[list[Enabled], list[Enabled]]:
-    """Select the transitions that a trigger enables in a frame and all frames inside it.
+    """Select the transitions that a trigger enables in a frame and all its inner frames.
 
     Returns:
-        The transitions to take, free of conflicts; and those whose states wait for their least time.
+        A pair of lists: the transitions to take, without conflicts, and those whose source's least time has not passed.
     """
     found = (_first_enabled(frame, leaf, trigger, guard) for frame, leaf in _leaves(root))
     enabled = dict.fromkeys(one for one in found if one is not None)
@@ -84,7 +93,7 @@ def select(root: Frame, trigger: Trigger, guard: Guard) -> tuple[list[Enabled], 
 
 
 def _leaves(frame: Frame) -> Iterator[tuple[Frame, int]]:
-    """Yield all active states without an active state inside, through all plots, in document order."""
+    """Yield frame and index of each innermost active node of all plots, in document order."""
     for index in frame.configuration.leaves:
         inner = frame.child(frame.compiled.nodes[index].name)
         if inner is None:
@@ -103,7 +112,7 @@ def _first_enabled(frame: Frame, leaf: int, trigger: Trigger, guard: Guard) -> E
 
 
 def _outwards(frame: Frame, index: int) -> Iterator[tuple[Frame, int]]:
-    """Yield the node, then the host state of its plot, and so on to the outermost plot."""
+    """Yield frame and index of a node, then of each host state around its plot, innermost first."""
     yield frame, index
     while frame.parent is not None:
         index, frame = frame.parent.compiled.index[frame.host], frame.parent
@@ -125,7 +134,7 @@ def _without_conflicts(enabled: list[Enabled]) -> list[Enabled]:
 
 
 def edges_of(compiled: CompiledPlot, index: int, trigger: Trigger) -> tuple[TransitionEdge, ...]:
-    """Return the transitions of a node that have the trigger, in order."""
+    """Return the transitions of a node for a trigger, in order; empty if there are none."""
     node = compiled.nodes[index]
     if trigger is None:
         return node.always
@@ -147,7 +156,10 @@ def _addressed_edges(compiled: CompiledPlot, index: int, trigger: Addressed) -> 
 
 
 def matches(descriptors: str, event: str) -> bool:
-    """Return whether one of the descriptors is the event's name or a prefix of its tokens (SCXML 3.12.1)."""
+    """Return whether an event matches one of the descriptors, which blanks separate (SCXML 3.12.1).
+
+    A descriptor matches the event with its name and every event whose leading tokens equal the descriptor.
+    """
     for descriptor in descriptors.split():
         prefix = descriptor.removesuffix(".*").removesuffix(".")
         if prefix in {"*", event} or event.startswith(prefix + "."):
@@ -159,7 +171,7 @@ def matches(descriptors: str, event: str) -> bool:
 
 
 def left_by(compiled: CompiledPlot, edge: TransitionEdge, active: Iterable[int], remembered: Remembered) -> set[int]:
-    """Return the active nodes of the edge's own plot that it exits."""
+    """Return the exit set of an edge in its plot: indices of the active nodes; empty for an edge without target."""
     if not edge.targets:
         return set()
     around = domain(compiled, edge, remembered)
@@ -167,7 +179,7 @@ def left_by(compiled: CompiledPlot, edge: TransitionEdge, active: Iterable[int],
 
 
 def domain(compiled: CompiledPlot, edge: TransitionEdge, remembered: Remembered) -> int:
-    """Return the index of the innermost composite (or plot) around source and targets.
+    """Return the index of a transition's domain: the innermost composite state or plot around source and targets.
 
     SCXML appendix D: getTransitionDomain, findLCCA. The source of an internal transition is its own domain.
     """
@@ -186,13 +198,13 @@ def _is_scope(node: StateNode) -> bool:
 
 
 class EntrySet:
-    """The nodes to enter to reach targets.
+    """Entry set of a transition: the nodes to enter.
 
     SCXML appendix D: computeEntrySet, addDescendantStatesToEnter, addAncestorStatesToEnter.
 
     Attributes:
-        nodes: indices; document order is the order of entry.
-        after: internal actions that follow the entry of a node: the effect of a history's default.
+        nodes: indices of the nodes; they are entered in document order.
+        after: effects of history defaults, executed after the entry of the node with that index.
     """
 
     def __init__(self, compiled: CompiledPlot, remembered: Remembered) -> None:
@@ -202,17 +214,17 @@ class EntrySet:
         self.after: dict[int, tuple[Internal, ...]] = {}
 
     def reach(self, around: int, targets: Iterable[int]) -> None:
-        """Add all nodes to enter inside `around` to reach all targets."""
+        """Add every node inside `around` that a transition to `targets` enters."""
         self._add_ways(around, self.effective(targets))
-        for index in sorted(self.nodes):  # the content of a default already includes its regions
+        for index in sorted(self.nodes):  # `_add_content` has already added the regions of default content
             self._add_regions(index)
 
     def effective(self, targets: Iterable[int]) -> list[int]:
-        """Replace each history by the nodes it remembers, or by its default (getEffectiveTargetStates)."""
+        """Return the targets; remembered or default nodes replace each history (getEffectiveTargetStates)."""
         return [real for target in targets for real in self._resolved(target)]
 
     def _resolved(self, target: int) -> Iterable[int]:
-        """Return the nodes that a target leads to; a history's default may name further histories."""
+        """Return the nodes that replace a target; the default of a history may contain further histories."""
         default = self._compiled.defaults.get(target)
         if default is None:
             return (target,)
@@ -222,7 +234,7 @@ class EntrySet:
         return self._resolved(default.target)
 
     def _add_ways(self, around: int, targets: Sequence[int]) -> set[int]:
-        """Add the ways to the targets, then their default content; return the nodes on the ways."""
+        """Add the paths from `around` to the targets, then the targets' default content; return the paths' nodes."""
         ways = {index for target in targets for index in self._compiled.way(around, target)}
         self.nodes |= ways
         for target in targets:
@@ -230,14 +242,14 @@ class EntrySet:
         return ways
 
     def _add_content(self, index: int) -> None:
-        """Add the default content of a target, unless another target is inside it."""
+        """Add the default content of a node, unless one of its children is already added."""
         node = self._compiled.nodes[index]
         if node.initial >= 0 and not any(child in self.nodes for child in node.children):
             for inner in self._add_ways(index, self.effective((node.initial,))):
                 self._add_regions(inner)
 
     def _add_regions(self, index: int) -> None:
-        """Add the regions of an orthogonal state that no target has reached."""
+        """Add the missing regions of an orthogonal state, with their default content."""
         node = self._compiled.nodes[index]
         for child in node.children if node.orthogonal else ():
             if child not in self.nodes:
