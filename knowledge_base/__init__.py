@@ -1,4 +1,4 @@
-"""The world model: typed things, facts and numbers in a graph, asked in one language."""
+"""The world model: typed objects, facts and numbers in a graph, with one language for queries and changes."""
 
 from knowledge_base._lazy import lazy_exports
 

@@ -1,4 +1,4 @@
-"""Public names of a package that load their module when they are first used (PEP 562)."""
+"""Public names of a package; each name loads its module at its first use (PEP 562)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from typing import Any
 
 
 def lazy_exports(package: str, init: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """`__getattr__`, `__dir__` and `__all__` of a package whose stub `__init__.pyi` imports its public names (SPEC 1).
+    """Return `__getattr__`, `__dir__` and `__all__` of a package.
+
+    The stub `__init__.pyi` of the package imports its public names (SPEC 1).
 
     Args:
         package: the package's `__name__`.
-        init: its `__file__`; the stub is in the same folder.
+        init: the package's `__file__`; the stub is in the same folder.
     """
     stub = ast.parse(Path(init).with_suffix(".pyi").read_text("utf-8"))
     imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]

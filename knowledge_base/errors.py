@@ -1,6 +1,6 @@
-"""Errors about input: each has the place, the word found and the nearest valid word.
+"""Errors about input: each contains the place, the wrong word and the nearest valid word.
 
-All rooms share one family, so that a command turns each of them into one line and exit status 2.
+All packages use this family of errors, so that a command reports each error on one line with exit status 2.
 """
 
 from __future__ import annotations
@@ -14,28 +14,34 @@ from functools import lru_cache
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Place in a text; lines and columns count from 1, `None` is unknown."""
+    """Place in a text; lines and columns count from 1, and `None` is unknown."""
 
     source: str | None = None
     line: int | None = None
     column: int | None = None
 
     def __str__(self) -> str:
-        """`file:line:column` without the unknown parts, as compilers and editors write it."""
+        """Return `file:line:column` without the unknown parts, as compilers and editors write it."""
         parts = [self.source or "<text>", *(str(n) for n in (self.line, self.column) if n is not None)]
         return printable(":".join(parts))
 
 
 MAX_MESSAGE = 400
-"""Characters of a message; quoted input may be much longer."""
+"""Maximum length of a message in characters; quoted input may be much longer."""
 MAX_NAME = 100
-"""Characters of a name for which the nearest valid one is searched; a comparison is quadratic in them."""
+"""Maximum length in characters of a name whose nearest valid name is searched.
+
+The cost of a comparison is quadratic in this length.
+"""
 MAX_COMPARED = 50
-"""Names that are compared with a misspelt one; of more, those that share most pairs of letters."""
+"""Maximum number of valid names to compare with a misspelt name.
+
+If more names are valid, those that share the most pairs of letters are compared.
+"""
 
 
 def nearest(name: str, valid: Iterable[str]) -> str | None:
-    """Return the valid name closest to `name`, or `None` when nothing is close."""
+    """Return the valid name closest to `name`, or `None` when no valid name is close."""
     if len(name) > MAX_NAME:
         return None
     folded = name.casefold()
@@ -49,35 +55,41 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
 
 
 def printable(text: str) -> str:
-    r"""The text on one line: line breaks, control characters and half characters as escapes such as `\\n`."""
+    r"""Return the text on one line.
+
+    Line breaks, control characters and surrogates become escapes such as `\\n`.
+    """
     return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def shortened(text: str, longest: int = MAX_MESSAGE) -> str:
-    """The text, without its middle if it is longer than that."""
+    """Return the text, without its middle if it has more than `longest` characters."""
     half = longest // 2
     return text if len(text) <= longest else f"{text[:half]} … {text[-half:]}"
 
 
 MAX_MEMBERS = 3
-"""Exceptions of a group in its description; also the most groups inside each other."""
-_name_of = type.__dict__["__name__"].__get__  # a metaclass may say something else, or fail
+"""Maximum number of exceptions in the description of a group; also the maximum depth of nested groups."""
+_name_of = type.__dict__["__name__"].__get__  # a metaclass may return another name, or fail
 _members_of = BaseExceptionGroup.__dict__["exceptions"].__get__
 
 
 def type_name(value: object) -> str:
-    """Return the name of the value's type on one line, without a call of the value or its metaclass."""
+    """Return the name of the value's type on one line, without calling code of the value or its metaclass."""
     return printable(shortened(str.__str__(_name_of(type(value))), MAX_NAME))
 
 
 def described(error: BaseException, *, named: bool = True) -> str:
-    """Return the exception on one line of at most `MAX_MESSAGE` characters; a group with its first exceptions.
+    """Return the exception on one line of at most `MAX_MESSAGE` characters.
 
-    User code defines an exception's type, metaclass and text, and any of them may fail. This function does not.
+    A group includes its first exceptions.
+
+    User code defines the type, metaclass and text of an exception, and each of them may fail. This function never
+    raises.
 
     Args:
         error: the exception.
-        named: whether the name of its type precedes its text.
+        named: whether the name of the exception's type precedes its text.
     """
     try:
         return shortened(_described(error, MAX_MEMBERS, named=named))
@@ -87,7 +99,7 @@ def described(error: BaseException, *, named: bool = True) -> str:
 
 def _described(error: BaseException, depth: int, *, named: bool) -> str:
     text = text_of(error, str)
-    if issubclass(type(error), BaseExceptionGroup) and depth:  # `isinstance` would ask the exception for its class
+    if issubclass(type(error), BaseExceptionGroup) and depth:  # `isinstance` would call `__class__` of the error
         members = [_described(one, depth - 1, named=True) for one in _members_of(error)[:MAX_MEMBERS]]
         text = f"{text}: {'; '.join(members)}"
     said = [type_name(error)] if named or not text else []
@@ -95,7 +107,7 @@ def _described(error: BaseException, depth: int, *, named: bool) -> str:
 
 
 def text_of(value: object, write: Callable[[object], str]) -> str:
-    """Return the value by `str` or `repr` on one line, bounded; a replacement if that fails."""
+    """Return the value by `str` or `repr` on one line of bounded length, or a replacement text if `write` raises."""
     try:
         text = shortened(str.__str__(write(value)))
         return shortened(printable(" ".join(text.split()) if write is str else text))
@@ -103,19 +115,19 @@ def text_of(value: object, write: Callable[[object], str]) -> str:
         return f"(a text that cannot be made: {type_name(problem)})"
 
 
-@lru_cache(maxsize=4096)  # the many errors of one text have the same valid names
+@lru_cache(maxsize=4096)  # the errors of one text share the same valid names
 def _pairs(name: str) -> frozenset[str]:
     return frozenset(name[at : at + 2] for at in range(len(name)))
 
 
 class InputError(Exception):
-    """A mistake in the input; nothing was changed.
+    """A mistake in the input; the operation had no effect.
 
     Attributes:
-        message: the mistake, one sentence without a full stop.
-        place: its place in the text.
-        found: the wrong word as written, if there is one.
-        valid: the valid names, if there is a list of them.
+        message: the mistake, in one sentence without a full stop.
+        place: the place of the mistake in the text.
+        found: the wrong word as written, if any.
+        valid: the valid names, if they can be listed.
     """
 
     def __init__(
@@ -129,22 +141,22 @@ class InputError(Exception):
         self.message = printable(shortened(message))
         super().__init__(self.message)
         self.place = place
-        self.found = None if found is None else str(found)  # a program may pass any object
+        self.found = None if found is None else str(found)  # a caller may pass any object
         self.valid = tuple(sorted(set(valid)))
 
     @property
     def nearest(self) -> str | None:
-        """The valid name closest to what was found."""
+        """The valid name closest to `found`, or `None`."""
         return nearest(self.found, self.valid) if self.found is not None else None
 
     def located(self, place: Place) -> InputError:
-        """Return the same error; one without a place gets this one from a reader that knows the file."""
+        """Return this error; if it has no place, set the place, which its reader of the file knows."""
         if self.place is None:
             self.place = place
         return self
 
     def __str__(self) -> str:
-        """One line: place, message, and the nearest valid name or the short list of them."""
+        """Return one line: place, message, and the nearest valid name or a short list of the valid names."""
         text = f"{self.place}: {self.message}" if self.place else self.message
         meant = self.nearest
         if meant is not None:
@@ -161,11 +173,11 @@ class ParseError(InputError):
 
 
 class UnsupportedConstructError(ParseError):
-    """A known part of PDDL, or of a relative of it, that no planner here supports.
+    """A construct of PDDL or of a related language that no planner here supports.
 
     Attributes:
-        construct: its keyword, e.g. `:process`.
-        engines: the family of planning engines that could.
+        construct: keyword of the construct, e.g. `:process`.
+        engines: the family of planning engines that supports the construct.
     """
 
     def __init__(self, construct: str, meaning: str, engines: str, *, place: Place | None) -> None:
@@ -183,23 +195,23 @@ class SchemaError(InputError):
 
 
 class ConflictError(Exception):
-    """A transaction does not fit the present world or thread; nothing was changed."""
+    """A transaction contradicts the present version or the state of this thread; nothing was changed."""
 
 
 class StoreError(InputError):
-    """A store's file cannot be opened, read or written; acknowledged changes are untouched."""
+    """A store's file cannot be opened, read or written; committed changes are not affected."""
 
 
 class DamagedStoreError(StoreError):
-    """A store's file differs from the written data; the message names the table and the row."""
+    """The content of a store's file differs from the written data; the message contains the table and the row."""
 
 
 class OutOfBoundsError(InputError):
-    """A question, or an effect, reached its bounds or was cancelled; nothing was changed.
+    """A query or an effect exceeded its bounds or was cancelled; nothing was changed.
 
     Attributes:
-        work: number of facts and things that it examined.
-        seconds: its duration.
+        work: number of facts and objects that the evaluation examined.
+        seconds: duration of the evaluation in seconds.
     """
 
     def __init__(self, message: str, *, work: int, seconds: float) -> None:
@@ -210,13 +222,13 @@ class OutOfBoundsError(InputError):
 
 
 class SchemaMismatchError(SchemaError):
-    """A store or world is read with a schema that does not extend its own.
+    """A store or world is read with a schema that does not extend its own schema.
 
     Attributes:
         differences: missing and different declarations, one sentence each.
 
     Args:
-        said: their summary.
+        said: summary of the differences.
     """
 
     def __init__(
@@ -228,8 +240,8 @@ class SchemaMismatchError(SchemaError):
 
 
 class HistoryError(InputError):
-    """A version or time that is no longer kept, or in the future."""
+    """A version or time is no longer kept, or is in the future."""
 
 
 class ConditionCancelledError(Exception):
-    """A coroutine waits for a condition that is no longer installed and will not fire again."""
+    """A coroutine waits for a condition that is cancelled and will not fire again."""

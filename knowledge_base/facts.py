@@ -11,19 +11,19 @@ from knowledge_base.spelling import value_text
 
 Value = str | int | float | bool
 VALUE_TYPES = frozenset({str, int, float, bool})
-"""Types of a fact's argument and of a bound variable: an object's name, a number, a truth value."""
+"""Types of a fact's argument and of a bound variable: the name of an object, a number, a truth value."""
 
 Geometry = tuple[float, ...]
-"""A position, a pose, a matrix: finite numbers with a meaning by the function's name; `()` is unknown."""
+"""A position, a pose or a matrix as finite numbers; the function's name determines their meaning. `()` is unknown."""
 Content = Value | Geometry
 """Value of a function: the symbolic or geometric content of an arc (S4.3)."""
 
 GEOMETRY = "geometry"
 MOST_NUMBERS = 16
-"""Most numbers of a geometry: a 4x4 matrix."""
+"""Maximum number of numbers in a geometry: a 4x4 matrix."""
 
 UNSET: Mapping[str, Content] = {"number": 0, "text": "", "boolean": False, GEOMETRY: ()}
-"""The types of content (PDDL 3.1's typed results), each with the value of a function until it is set."""
+"""The types of a function's value (PDDL 3.1's typed results), each with the value before the first assignment."""
 
 _SAID = {
     "number": "a number",
@@ -41,7 +41,7 @@ class Fact:
     args: tuple[Value, ...] = ()
 
     def __str__(self) -> str:
-        """In the language: `(on cup3 table1)`."""
+        """Return the fact in the language: `(on cup3 table1)`."""
         return "(" + " ".join([self.predicate, *map(value_text, self.args)]) + ")"
 
 
@@ -54,17 +54,18 @@ def fact(predicate: str, *args: Value) -> Fact:
 class Delta:
     """A change of the world model as a value: applied as a whole or not at all.
 
-    Replacements come before removals, and those before additions, as in PDDL effects: a fact in both stays true.
+    Replacements are applied before removals, and removals before additions, as in PDDL effects. A fact that is both
+    removed and added stays true.
 
     Attributes:
-        nodes: new things, name -> type; a known thing with its type has no effect.
+        nodes: new objects, name to type; a known object with its type has no effect.
         removed: facts that become false; a false fact has no effect.
         added: facts that become true.
-        values: new values of functions, by function and arguments.
-        removed_nodes: things to remove with all facts and values about them. They come first, so that a thing that is
-            in `nodes` too becomes a new one. An unknown thing has no effect.
-        replaced: facts that become true, while facts that differ only in the last argument become false:
-            `fact("at", "cup1", "shelf")` ends each other place of the cup. Effective changes have none.
+        values: new values of functions; the key contains the function and its arguments.
+        removed_nodes: objects to remove, with all their facts and values. They are removed first: an object that is
+            also in `nodes` becomes a new object. An unknown object has no effect.
+        replaced: facts that become true, while facts that differ only in the last argument become false.
+            `fact("at", "cup1", "shelf")` ends each other place of the cup. Always empty in an effective change.
     """
 
     nodes: Mapping[str, str] = field(default_factory=dict)
@@ -75,18 +76,18 @@ class Delta:
     replaced: tuple[Fact, ...] = ()
 
     def __bool__(self) -> bool:
-        """Whether it is not empty."""
+        """Return whether the change contains anything."""
         return bool(self.nodes or self.removed or self.added or self.values or self.removed_nodes or self.replaced)
 
     def __len__(self) -> int:
-        """Number of its things, facts and values."""
+        """Return the number of objects, facts and values in the change."""
         facts = len(self.removed) + len(self.added) + len(self.replaced)
         return len(self.nodes) + facts + len(self.values) + len(self.removed_nodes)
 
     def then(self, later: Delta) -> Delta:
         """Return this change followed by `later`, as one change.
 
-        The removal of a thing in `later` also removes the replacements that name it.
+        If `later` removes an object, the result omits the replacements of this change that contain that object.
         """
         undone, gone = set(later.removed), set(later.removed_nodes)
         anew = {(r.predicate, r.args[:-1]) for r in later.replaced}
@@ -109,13 +110,13 @@ class Delta:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """The effect of one committed transaction, without the facts that were so before.
+    """The effect of one committed transaction, without the facts that were true or false already.
 
     Attributes:
-        version: the knowledge base's version after it; versions count up by one.
+        version: the version of the knowledge base after the change; consecutive versions differ by one.
         author: the author, e.g. a component's name.
         delta: the effective change.
-        time: its time, in seconds of the knowledge base's clock; it never runs backwards. Not compared.
+        time: time of the commit, in seconds of the knowledge base's clock; it never decreases. Equality ignores it.
     """
 
     version: int
@@ -125,17 +126,17 @@ class Change:
 
 
 def require_content(content: object, result: str, what: object, place: Place | None = None) -> None:
-    """Raise an error unless `content` may be the value of a function with this result.
+    """Raise an error unless `content` is a valid value of a function with the type `result`.
 
     Args:
         content: the value.
         result: the type of the function's result, one of `UNSET`.
         what: the function with its arguments, for messages.
-        place: the place of the content in a text.
+        place: the place of the value in a text.
 
     Raises:
-        SchemaError: it is of another type.
-        InputError: a number that is not finite, or a text that no file can hold.
+        SchemaError: `content` has another type.
+        InputError: a number is not finite, or a text cannot be written to a file.
     """
     if not _is(content, result):
         raise SchemaError(f"{what} is {_SAID[result]}, not {content!r}", place=place)
@@ -148,7 +149,7 @@ def require_content(content: object, result: str, what: object, place: Place | N
 
 
 def require_writable(text: str, what: object, place: Place | None = None) -> None:
-    """Raise `InputError` for a text with half characters (surrogates), which UTF-8 cannot encode."""
+    """Raise `InputError` if the text contains surrogates (half characters), which UTF-8 cannot encode."""
     if text.isascii():
         return
     try:
@@ -158,7 +159,7 @@ def require_writable(text: str, what: object, place: Place | None = None) -> Non
 
 
 def require_finite(number: float, what: object, place: Place | None = None) -> None:
-    """Raise `InputError` for an infinity, a NaN, and an integer that no file can hold."""
+    """Raise `InputError` for an infinity, a NaN, or an integer that is too large for a file."""
     try:
         if math.isfinite(number):
             return

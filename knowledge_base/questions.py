@@ -1,4 +1,4 @@
-"""Questions: parsed and checked once by their text, and prepared ones that take other values each time."""
+"""Queries: each text is parsed and checked only the first time; prepared queries receive new values at each call."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Binding = dict[str, Value]
 _MOST_KEPT = 4096
 _parsed = lru_cache(maxsize=1024)(parse_condition)
 _Key = tuple[str | int, ...]
-"""A text, or the identity of an expression, and the names of the parameters."""
+"""A text, or the identity of an expression; then the names of the parameters."""
 _K = TypeVar("_K")
 _T = TypeVar("_T")
 
@@ -36,9 +36,10 @@ def _keep(kept: dict[_K, _T], key: _K, made: _T) -> None:
 
 
 class Questions:
-    """Parses texts and checks them against one schema and the known things.
+    """Parser and checker of query texts for one schema and the known objects.
 
-    A question that passed is not checked again. After the removal of a thing that it names, no fact about it is true.
+    A query that passed the check is not checked again, not even after the removal of an object that it mentions. No
+    fact about a removed object is true.
     """
 
     def __init__(self) -> None:
@@ -50,11 +51,13 @@ class Questions:
     def given(
         self, text: str | Expression, params: Mapping[str, Value] | None, world: World, free: Free
     ) -> Mapping[str, Value]:
-        """Return the parameters by the names of the question's variables; fitted once for each set of names.
+        """Return the parameters under the names of the query's variables.
+
+        The names are matched only the first time for each set of names.
 
         Raises:
-            UnknownNameError: the question has no such variable.
-            InputError: as for `condition` or `query`; or the parameters are not a mapping to values.
+            UnknownNameError: a parameter is not a variable of the query.
+            InputError: as for `condition` or `query`; or `params` is not a mapping to values.
         """
         if params is None:
             return {}
@@ -67,7 +70,7 @@ class Questions:
             require_condition(text)
             e = _parsed(text) if isinstance(text, str) else text
             known = [name if name in free_variables(e) else name.lower() for name in params]
-            self._checked(e, dict.fromkeys(known, ""), world, free)  # mistakes of the text come first
+            self._checked(e, dict.fromkeys(known, ""), world, free)  # first report errors of the text
             names = fitted_names(e, params)
             found = e, None if names == tuple(params) else names
             _keep(self._given, key, found)
@@ -75,7 +78,7 @@ class Questions:
         return params if other is None else dict(zip(other, params.values(), strict=True))
 
     def ask(self, text: str | Expression, params: Mapping[str, Value], world: World) -> bool:
-        """Whether the condition is true of `world`; errors as for `condition`."""
+        """Return whether the condition is true in `world`; errors as for `condition`."""
         key = text if isinstance(text, str) else id(text)  # the evaluation checks the parameters
         found = self._asked.get(key)
         if found is None:
@@ -84,7 +87,7 @@ class Questions:
         return found.holds(world, params)
 
     def answers(self, text: str | Expression, params: Mapping[str, Value], world: World) -> list[Binding]:
-        """Return the values that make the query true of `world`; errors as for `query`."""
+        """Return the bindings that make the query true in `world`; errors as for `query`."""
         key = (text if isinstance(text, str) else id(text), *params)
         found = self._queried.get(key)
         if found is None:
@@ -93,7 +96,7 @@ class Questions:
         return found.answers(world, params)
 
     def rows(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Iterator[Binding]:
-        """Return the answers one by one; errors as for `query`."""
+        """Return an iterator over the answers; errors as for `query`."""
         return rows(self.query(text, params, world), world, params)
 
     def condition(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
@@ -102,12 +105,12 @@ class Questions:
         Raises:
             ParseError: the text is not a condition.
             UnknownNameError: an undeclared predicate, function, type, variable or object.
-            SchemaError: a wrong number of arguments or a type that can never fit.
+            SchemaError: a wrong number of arguments, or a type that no object can match.
         """
         return self._checked(text, params, world, "error")
 
     def query(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
-        """Return the query for the free variables that are not in `params`.
+        """Return the query for the free variables that `params` does not contain.
 
         Raises:
             InputError: as for `condition`, or a variable occurs only under `not` or in a comparison.
@@ -128,12 +131,12 @@ class Questions:
 
 
 class Prepared:
-    """A question with parameters, made by `View.prepare`.
+    """A query with parameters; `View.prepare` creates it.
 
     Args:
-        text: the question.
-        parameters: the variables that get a value each time, in this order.
-        state: the world; it stays the same object while it changes.
+        text: the query.
+        parameters: the variables that receive a value at each call, in this order.
+        state: the world; its changes do not replace this object.
         lock: lock of the world.
         questions: parses and checks the text.
 
@@ -166,24 +169,24 @@ class Prepared:
         self._query = queried(e, state.schema, given)
 
     def ask(self, *values: Value) -> bool:
-        """Whether the question is true for these values of its parameters.
+        """Return whether the query is true for these values of its parameters.
 
         Raises:
-            UnknownNameError: it has other free variables.
-            InputError, SchemaError: too few or too many values, or something else than a value.
+            UnknownNameError: the query has other free variables.
+            InputError, SchemaError: too few or too many values, or an object that is not a value.
         """
         given = self._given(values)
         with self._lock:
             return self._holds(self._state, given)
 
     def query(self, *values: Value) -> list[Binding]:
-        """Return the values of its other free variables as `View.query` does; errors for the values as for `ask`."""
+        """Return the bindings of the other free variables as `View.query` does; value errors as for `ask`."""
         given = self._given(values)
         with self._lock:
             return self._query.answers(self._state, given)
 
     def _given(self, values: tuple[Value, ...]) -> dict[str, Value]:
-        """Return the values by the names of the parameters, checked."""
+        """Return the checked values by the names of the parameters."""
         if len(self._names) != len(values):
             names = ", ".join(f"?{name}" for name in self._names) or "none"
             raise InputError(f"the question takes the values of its parameters ({names}), not {len(values)} values")
@@ -196,7 +199,7 @@ class Prepared:
 
 
 class _Things(Mapping[str, str]):
-    """The things of a world with their types, each found when it is needed."""
+    """The objects of a world with their types; each type is read only when it is needed."""
 
     def __init__(self, world: World) -> None:
         self._world = world

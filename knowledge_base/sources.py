@@ -1,7 +1,7 @@
-"""Data sources: sensor streams and transforms by reference, of which only the latest value is known (S4.9).
+"""Data sources: sensor streams and transforms by reference, with only the latest value (S4.9).
 
-A fluent that is bound to a source has the latest value of the source. Questions and installed conditions see it
-immediately, at the present version; versions, changes and journals do not have it.
+A fluent that is bound to a source has the latest value of the source. Queries and installed conditions see the value
+immediately, in the present version. Versions, changes and journals do not contain it.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from knowledge_base.world.state import WorldState
 
 
 class DataSource:
-    """Feeds one fluent, from any thread; made by `KnowledgeBase.bind_source`.
+    """Source of one fluent's values, usable from any thread; `KnowledgeBase.bind_source` creates it.
 
-    As a context manager it is closed at the end of the block.
+    A `with` block closes the source at its end.
 
     Attributes:
         fluent: the function with its arguments.
@@ -38,16 +38,16 @@ class DataSource:
 
     @property
     def latest(self) -> Content | None:
-        """Its latest value; `None` before the first update."""
+        """The latest value; `None` before the first update."""
         return self._latest
 
     @property
     def closed(self) -> bool:
-        """Whether it is closed: by itself, with its thing, or with the knowledge base."""
+        """Whether the source is closed: by `close`, by the removal of its object, or with the knowledge base."""
         return self._closed
 
     def update(self, content: Content) -> None:
-        """Set the value of the fluent, after the end of an open transaction.
+        """Set the value of the fluent; wait first for the end of an open transaction.
 
         Raises:
             SchemaError: the value does not have the type of the function's result.
@@ -57,7 +57,10 @@ class DataSource:
         self._owner.feed(self, content)
 
     def close(self) -> None:
-        """Stop feeding: the fluent has the value that was set; closing it again has no effect."""
+        """Close the source; the fluent then has the value that a change has set.
+
+        A second call has no effect.
+        """
         self._owner.close(self)
 
     def __repr__(self) -> str:
@@ -74,16 +77,16 @@ class DataSource:
     # --- called by its owner, under the lock
 
     def take(self, content: Content) -> None:
-        """Keep the latest value."""
+        """Store the latest value."""
         self._latest = content
 
     def end(self) -> None:
-        """Mark it as closed."""
+        """Mark the source as closed."""
         self._closed = True
 
 
 class Sources:
-    """All open sources of a knowledge base, in the order in which they were bound."""
+    """All open sources of a knowledge base, in the order of their binding."""
 
     def __init__(
         self,
@@ -97,7 +100,7 @@ class Sources:
         self._open: dict[Fact, DataSource] = {}
 
     def bind(self, fluent: Fact, reference: str) -> DataSource:
-        """Make a source for a fluent without one; see `KnowledgeBase.bind_source`."""
+        """Create a source for a fluent without a source; see `KnowledgeBase.bind_source`."""
         if not isinstance(reference, str) or not reference:
             raise InputError(f"a source's reference is text that says where values come from, not {reference!r}")
         with self._lock:
@@ -115,7 +118,7 @@ class Sources:
             return list(self._open.values())
 
     def feed(self, source: DataSource, content: Content) -> None:
-        """Set a value; see `DataSource.update`."""
+        """Set the value of the source's fluent; see `DataSource.update`."""
         fluent = source.fluent
         require_content(content, self._state.schema.result(fluent.predicate), fluent)
         with self._lock:
@@ -129,7 +132,7 @@ class Sources:
         self._notifier.deliver()
 
     def close(self, source: DataSource) -> None:
-        """See `DataSource.close`."""
+        """Close the source; see `DataSource.close`."""
         with self._lock:
             if source.closed:
                 return
@@ -139,7 +142,7 @@ class Sources:
         self._notifier.deliver()
 
     def close_about(self, things: Iterable[str]) -> None:
-        """Close the sources about removed things; the commit that removes them notifies the conditions."""
+        """Close the sources of removed objects; the commit that removes the objects notifies the conditions."""
         gone = set(things)
         for source in [s for s in self._open.values() if not gone.isdisjoint(s.fluent.args)]:
             self._drop(source)
@@ -152,7 +155,7 @@ class Sources:
             graph.unfeed(source.fluent, self._state.values.get(source.fluent))
 
     def _show(self, fluent: Fact, reference: str, content: Content) -> None:
-        if (graph := self._graph()) is not None:  # no reader has used it before
+        if (graph := self._graph()) is not None:  # otherwise no reader has requested the graph
             graph.feed(fluent, reference, content)
 
     def _tell(self, fluent: Fact, before: Content) -> None:

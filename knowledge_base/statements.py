@@ -1,7 +1,8 @@
-"""Statements: facts, values and things as text, each a change (`Delta`).
+"""Statements: facts, values and objects as text, each a change (`Delta`).
 
-A statement is an effect of the language (`(on cup1 table)`, `(not (on cup1 table))`, `(increase (failures cup1) 1)`),
-a number as problems write it (`(= (weight cup1) 0.2)`), or a thing with its type, told like a fact (`(cup cup1)`).
+A statement is an effect of the language (`(on cup1 table)`, `(not (on cup1 table))`, `(increase (failures cup1) 1)`), a
+number in the notation of problems (`(= (weight cup1) 0.2)`), or an object with its type, written like a fact
+(`(cup cup1)`).
 """
 
 from __future__ import annotations
@@ -22,21 +23,22 @@ from knowledge_base.world.overlay import Overlay
 
 
 def told(statements: Iterable[str], world: World, source: str | None = None, bounds: Bounds | None = None) -> Delta:
-    """Return the change that makes all the statements true, one after the other.
+    """Return the change that makes all the statements true, in the order of the statements.
 
-    Things may be used in front of the statement that names their type.
+    A statement may mention an object before the statement that declares its type.
 
     Args:
         statements: the texts, one statement each.
-        world: the world that they change.
-        source: their name in messages; their number follows it.
-        bounds: work, seconds and cancellation for all of them together.
+        world: the world before the change.
+        source: name of the texts in error messages; the number of the statement follows the name.
+        bounds: work, seconds and cancellation for all statements together.
 
     Raises:
-        OutOfBoundsError: they exceed the bounds.
+        OutOfBoundsError: the evaluation exceeds the bounds.
         ParseError: a text is not a statement.
-        UnknownNameError: an undeclared type, predicate or function, or a thing that is neither known nor named.
-        SchemaError: a wrong number of arguments or a wrong type, or a thing of another type.
+        UnknownNameError: an undeclared type, predicate or function, or an object that is neither known nor declared
+            here.
+        SchemaError: a wrong number of arguments or a wrong type, or a known object has another type.
     """
     effects = [_effect(text, _called(source, number)) for number, text in enumerate(statements, 1)]
     view, meter = Overlay(world), Meter(bounds)
@@ -55,10 +57,12 @@ def told(statements: Iterable[str], world: World, source: str | None = None, bou
 
 
 def retracted(statements: Iterable[str], world: World, source: str | None = None) -> Delta:
-    """Return the change that retracts the facts; for a thing with its type, the thing and everything about it.
+    """Return the change that makes the facts false.
+
+    For an object with its type, the change removes the object with all its facts and values.
 
     Raises:
-        InputError: as for `told`; also a fact that is not true, which must be a mistake.
+        InputError: as for `told`; also for a fact that is false already.
     """
     view = Overlay(world)
     known = _known(view)
@@ -74,7 +78,7 @@ def _called(source: str | None, number: int) -> str | None:
 
 
 def _effect(text: str, source: str | None) -> Effect:
-    """Return the statement as an effect; `=` assigns a number."""
+    """Return the statement as an effect; `=` becomes an assignment of a number."""
     groups = read(text, source)
     if len(groups) != 1 or not isinstance(groups[0], Group) or groups[0].head() != "=":
         return parse_effect(text, source)
@@ -85,7 +89,7 @@ def _effect(text: str, source: str | None) -> Effect:
 
 
 def _thing(effect: Effect, world: World) -> Mapping[str, str] | None:
-    """Return the thing that the statement names with its type, if it does."""
+    """Return the object with its type if the statement declares an object, else `None`."""
     if not isinstance(effect, Add) or not world.schema.is_type(effect.atom.predicate, len(effect.atom.args)):
         return None
     (arg,) = effect.atom.args

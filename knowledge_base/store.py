@@ -1,4 +1,4 @@
-"""Knowledge base: one consistent world model for questions, changes and listeners (S4.2, S4.3)."""
+"""Knowledge base: one consistent world model for queries, changes and listeners (S4.2, S4.3)."""
 
 from __future__ import annotations
 
@@ -34,22 +34,24 @@ from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 Now = Callable[[], float]
-"""Tells the time in seconds."""
+"""A function that returns the present time in seconds."""
 
 
 class KnowledgeBase(View):
     """A world model that several threads may query and change.
 
-    One lock orders questions and changes by arrival (`world.read_write_lock`). A question sees one version and its
-    answer is a finished list. A change is made as a whole or, with an error, not at all. Listeners are called when the
-    lock is released.
+    One lock admits queries and changes in the order of their arrival (`world.read_write_lock`). A query reads one
+    version and returns a complete list. A change is applied as a whole, or raises an error and has no effect. Listeners
+    are called after the lock is released.
 
-    The constructor makes one in memory, which keeps its last changes; `open` makes one in a file.
+    The constructor creates a knowledge base in memory, which keeps only its latest changes; `open` creates or opens one
+    in a file.
 
     Args:
-        schema: the declarations.
-        clock: gives the time of changes, in seconds.
-        history: its past, which keeps its changes and replaces the schema; by default the last changes in memory.
+        schema: the declared types, constants, predicates and functions.
+        clock: returns the time of a change, in seconds.
+        history: the earlier versions; stores every change, and its schema replaces `schema`. The default keeps the
+            latest changes in memory.
     """
 
     def __init__(self, schema: Schema, clock: Now = wall.time, history: History | None = None) -> None:
@@ -76,23 +78,25 @@ class KnowledgeBase(View):
         read_only: bool = False,
         new: bool = False,
     ) -> KnowledgeBase:
-        """Open a knowledge base in memory or in a file; close it, or use it in a `with` block.
+        """Open a knowledge base in memory or in a file.
+
+        The caller must close the knowledge base, or use it in a `with` block.
 
         Args:
-            schema: the declarations; `None` takes those of the file. An extension of those of the file (more
-                declarations, none changed) is recorded.
-            path: the store's file, made when it is missing; `None` is in memory.
-            durability: the event that a commit survives: "process" the death of this process (default with a path),
-                "power" also a power cut, "memory" none (no path).
-            clock: gives the time of changes, in seconds.
-            read_only: read a store that another process may be writing; `refresh` follows it.
-            new: the file must be a new one.
+            schema: the declarations; `None` uses the schema of the file. A schema that only adds declarations to the
+                schema of the file replaces it.
+            path: the store's file, which is created if it is missing; `None` keeps the knowledge base in memory.
+            durability: the failure that a commit survives. "process" is the end of this process (default with a path);
+                "power" also includes a power cut; "memory" is none (only without a path).
+            clock: returns the time of a change, in seconds.
+            read_only: open a store that another process may write; `refresh` applies the changes of that process.
+            new: require that the file does not exist yet.
 
         Raises:
-            StoreError: the file cannot be read or written, is not a store, or has another writer; a foreign file has
-                the name of a sidecar file. All files stay unchanged.
-            SchemaMismatchError: the file was written with a schema that this one does not extend.
-            InputError: there is no schema, or path and durability contradict each other.
+            StoreError: the file cannot be read or written, is not a store, or has another writer. The error is also raised
+                for a foreign file with the name of a sidecar file. All files stay unchanged.
+            SchemaMismatchError: `schema` does not extend the schema of the file.
+            InputError: no schema is available, or the arguments contradict each other.
         """
         if not (schema is None or isinstance(schema, Schema)):
             raise InputError(f"a schema is a Schema, not {shown(schema)}; Schema.parse reads its text")
@@ -124,12 +128,14 @@ class KnowledgeBase(View):
         *,
         source: str | None = None,
     ) -> KnowledgeBase:
-        """Read the output of `to_json`, a text or a file (a `Path`), into memory at the same version.
+        """Read the output of `to_json` into memory and keep its version number.
+
+        `text_or_path` is the JSON text, or a `Path` of its file. `source` is the name of the text in error messages.
 
         `source` names a text in messages.
 
         Raises:
-            InputError: as `exchange.read_json`.
+            InputError: as for `exchange.read_json`.
         """
         state, version = read_json(text_or_path, schema, source)
         return cls(state.schema, clock, MemoryHistory(Version(state, version, clock())))
@@ -141,10 +147,12 @@ class KnowledgeBase(View):
         self.close()
 
     def close(self) -> None:
-        """Close the file, if there is one, which has all commits already; further changes are refused.
+        """Close the knowledge base and its file; every later change raises `StoreError`.
 
-        Conditions are cancelled with their timers and waiting coroutines, watches end, and sources are closed. Closing
-        it again has no effect.
+        The file contains all commits already.
+
+        All conditions are cancelled, with their timers and waiting coroutines. All watches end, and all sources are
+        closed. A second call has no effect.
         """
         with self._lock:
             self._closed = True
@@ -159,13 +167,13 @@ class KnowledgeBase(View):
             self._history.close()
 
     def refresh(self) -> int:
-        """Apply the new commits of the writer to a store that is opened `read_only` (S4.10); return the version.
+        """Apply the writer's new commits to a store that is opened `read_only` (S4.10); return the new version.
 
-        Subscribers, watches and installed conditions receive the changes in order, as if they were made here.
+        Subscribers, watches and installed conditions receive the changes in order, as for changes of this process.
 
         Raises:
-            ConflictError: this one is not opened `read_only`, or this thread is inside a transaction.
-            HistoryError: the writer has compacted some of these changes; open the store again.
+            ConflictError: the store is not opened `read_only`, or this thread has an open transaction.
+            HistoryError: the writer has compacted some of the new commits; open the store again.
             StoreError: the file cannot be read, or the writer has extended the schema; open the store again.
         """
         with self._lock.changing():
@@ -180,19 +188,20 @@ class KnowledgeBase(View):
     def transaction(
         self, author: str, *, expect: int | None = None, key: str | None = None, along: Writer | None = None
     ) -> Iterator[Transaction]:
-        """Make several changes as one: committed when the block ends, dropped when it raises.
+        """Commit the changes of a `with` block together at its end; discard them if the block raises.
 
-        Questions of other threads continue meanwhile; their changes wait for the end of the block. A block with a `key`
-        that was committed before runs, but changes nothing: its transaction has the first `change` from the beginning.
+        Queries of other threads continue during the block; changes of other threads wait for its end. If a change with
+        the same `key` was committed before, the block runs without effect. `Transaction.change` is then that earlier
+        change from the beginning.
 
         Args:
             author: the author of the change.
-            expect: the version that the world must have at the beginning.
-            key: an idempotency key: a name of this change that recognises a repetition, also after a restart.
-            along: writes more rows into the store's file in the same SQLite transaction.
+            expect: the version that the knowledge base must have at the beginning.
+            key: an idempotency key: a name that identifies a repetition of this change, also after a restart.
+            along: writes more rows into the store's file, in the SQLite transaction of this change.
 
         Raises:
-            ConflictError: the version is not the expected one, or this thread is inside another transaction.
+            ConflictError: the version is not the expected one, or this thread has another open transaction.
             StoreError: the file cannot be written, or the knowledge base is closed; nothing was changed.
         """
         _require_names(author, key)
@@ -225,13 +234,14 @@ class KnowledgeBase(View):
     ) -> Change:
         """Commit `delta` as a whole; return its effective change.
 
-        Arguments as for `transaction`; for a `key` that was committed before, return that change and change nothing.
+        `transaction` describes the other arguments. If a change with the same `key` was committed before, return
+        that change and change nothing.
 
         Raises:
-            UnknownNameError: an undeclared type, predicate or function, or an unknown thing.
+            UnknownNameError: an undeclared type, predicate or function, or an unknown object.
             SchemaError: a wrong number of arguments or a wrong type.
             InputError: a number that is not finite.
-            ConflictError: the version is not the expected one, or this thread is inside a transaction.
+            ConflictError: the version is not the expected one, or this thread has an open transaction.
             StoreError: the file cannot be written, or the knowledge base is closed; nothing was changed.
         """
         require_delta(delta)
@@ -247,28 +257,30 @@ class KnowledgeBase(View):
         return change
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
-        """Write the commits inside a block to the file as one transaction, together with the block's own rows.
+        """Return a context manager that writes all commits of its block to the file in one transaction.
 
-        Each commit is a separate version and is announced immediately; it lasts only after the block. Changes of other
-        threads, and their questions about the past, wait until then.
+        The transaction includes the rows that the block itself writes.
+
+        Each commit is a separate version and is announced immediately, but is durable only after the end of the block.
+        Until then, changes of other threads wait, and so do their queries of past versions.
 
         Returns:
-            A context manager with the connection; its user neither commits nor rolls back. Its entry or exit raises
-            the errors.
+            A context manager whose value is the SQLite connection; the block must neither commit nor roll back. The
+            errors below are raised on entry to or exit from the block.
 
         Raises:
-            StoreError: there is no file, or it cannot be written. The memory is then ahead of the file: every further
-                change is refused, and the file, opened again, has the state before the block.
-            ConflictError: this thread is inside a transaction, or the store is opened `read_only`.
+            StoreError: no file exists, or the file cannot be written. In the second case the memory is ahead of the
+                file, and every later change raises this error. The reopened file has the state before the block.
+            ConflictError: this thread has an open transaction, or the store is opened `read_only`.
         """
         return GroupCommit(self._lock, self._require_free, self._history)
 
     def subscribe(self, listener: Listener) -> Callable[[], None]:
-        """Call `listener` with every committed change from now on; the function returned ends that.
+        """Call `listener` with every later committed change; return a function that ends the subscription.
 
-        Changes come in commit order; a commit without effect is not announced. A listener may query and change the
-        knowledge base. If listeners raise, the committing call raises an `ExceptionGroup` after all calls; the change
-        stays.
+        The listener receives changes in commit order; a commit without effect is not announced. A listener may query
+        and change the knowledge base. If listeners raise, the committing call raises an `ExceptionGroup` after it has
+        called all listeners; the change stays committed.
         """
         return self._notifier.subscribe(listener)
 
@@ -283,25 +295,26 @@ class KnowledgeBase(View):
         hysteresis: float | None = None,
         clock: TimerClock | None = None,
     ) -> Condition:
-        """Keep a condition evaluated at every version from now on, and fire when it becomes true (S2.4).
+        """Evaluate a condition at every later version, and fire when it becomes true (S2.4).
 
-        The cost of an update depends on its change, see `conditions.join`. A condition that is true already does not
-        fire; its hold time begins.
+        The cost of an update depends on the size of the change, see `conditions.join`. If the condition is true
+        already, it does not fire, but its hold time begins.
 
         Args:
-            text: a condition; it is true if there are values for its free variables, which then are its witness.
-            params: variables with a given value.
-            fire: `edge`, when it becomes true; `each`, also at every change of the set of its witnesses while
-                it is true.
-            hold_s: time in seconds for which it must stay true before it fires.
-            once: its first firing cancels it.
-            hysteresis: margin by which its comparisons must fail before it is false: `(> (level) 9)` becomes true
-                above 9, and false when `(> (level) (- 9 hysteresis))` is false.
+            text: a condition. It is true if values for its free variables exist that make it true; these values are its
+                witness.
+            params: variables of the condition with a fixed value.
+            fire: `edge` fires when the condition becomes true; `each` also fires at every change of the set of its
+                witnesses while the condition is true.
+            hold_s: time in seconds for which the condition must stay true before it fires.
+            once: whether the first firing cancels the condition.
+            hysteresis: margin by which the comparisons must fail before the condition is false. `(> (level) 9)` becomes
+                true above 9, and false when `(> (level) (- 9 hysteresis))` is false.
             clock: measures `hold_s`.
 
         Raises:
-            InputError: as for `query`; a negative or not finite time, a time without a clock, a hysteresis
-                without a comparison; another word for `fire`.
+            InputError: as for `query`; a hold time that is negative, not finite or without a clock; a hysteresis
+                without a comparison; a value of `fire` other than `edge` and `each`.
             StoreError: the knowledge base is closed.
         """
         firing = terms(fire, hold_s=hold_s, once=once, clock=clock)
@@ -316,17 +329,18 @@ class KnowledgeBase(View):
     def watch(
         self, pattern: str | Expression | None = None, params: Mapping[str, Value] | None = None, *, limit: int = 1000
     ) -> Watch:
-        """Watch the commits from now on that touch `pattern`, as an asynchronous iterator.
+        """Return an asynchronous iterator over the later commits that match `pattern`.
 
-        If `limit` changes wait for the reader and another one comes, all are dropped; the next item is a `Missed`.
+        If a change arrives while `limit` changes wait for the reader, all of them are discarded; the next item is a
+        `Missed`.
 
         Args:
             pattern: a predicate, function or type with arguments, e.g. `(on ?o table)`; `None` for all changes.
-            params: variables of the pattern with a given value.
-            limit: number of changes that may wait, at least 1.
+            params: variables of the pattern with a fixed value.
+            limit: number of changes that may wait for the reader, at least 1.
 
         Raises:
-            InputError: the pattern is not a pattern, or has an undeclared name.
+            InputError: `pattern` is not a pattern, or contains an undeclared name.
             StoreError: the knowledge base is closed.
         """
         with self._lock:
@@ -337,22 +351,23 @@ class KnowledgeBase(View):
             return made
 
     def bind_source(self, function: str, *args: Value, reference: str) -> DataSource:
-        """Let a source feed a function: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.
+        """Bind a function to a source: `kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")`.
 
-        Questions, snapshots and installed conditions see its latest value; versions, changes, watches, past worlds and
-        JSON do not. Before the first update and after closing, the function has the value that was set. It cannot be
-        set meanwhile. The removal of a thing closes the sources about it.
+        Queries, snapshots and installed conditions use the latest value of the source. Versions, changes, watches, past
+        worlds and JSON do not contain this value. Before the first update and after closing, the function has the value
+        that a change has set. While the source is open, no change can set the function. The removal of an object closes
+        the sources of its functions.
 
         Args:
-            function: its name.
-            args: its arguments.
-            reference: the origin of the values, in the provider's words.
+            function: name of the function.
+            args: arguments of the function.
+            reference: the origin of the values, in the notation of the provider.
 
         Raises:
-            UnknownNameError: an undeclared function, or an unknown thing.
-            SchemaError: a wrong number of arguments, a wrong type, or there is a source for it already.
+            UnknownNameError: an undeclared function, or an unknown object.
+            SchemaError: a wrong number of arguments, a wrong type, or the function has an open source already.
             InputError: the reference is empty.
-            ConflictError: this thread is inside a transaction or a question.
+            ConflictError: this thread has an open transaction or is evaluating a query.
             StoreError: the knowledge base is closed.
         """
         with self._lock.changing():
@@ -360,20 +375,20 @@ class KnowledgeBase(View):
             return self._sources.bind(Fact(function, args), reference)
 
     def sources(self) -> list[DataSource]:
-        """Return the open sources in the order in which they were bound."""
+        """Return the open sources in the order of their binding."""
         return self._sources.listed()
 
     def at(self, *, version: int | None = None, time: float | None = None) -> View:
-        """Return a view of a past world.
+        """Return a view of a past version.
 
         Args:
-            version: number of changes before.
-            time: time in seconds of the clock; changes at that very time count.
+            version: number of the version, i.e. of the changes before it.
+            time: time in seconds of the clock; the view includes changes at exactly this time.
 
         Raises:
-            HistoryError: it is no longer kept (`compact`; memory keeps the last 10,000 changed things, facts and
-                numbers), or it is in the future.
-            InputError: not exactly one of the two is given, or it is neither a version nor a time.
+            HistoryError: the version is in the future or no longer kept. `compact` removes versions; memory keeps the
+                latest 10,000 changed objects, facts and numbers.
+            InputError: not exactly one of `version` and `time` is given, or the value is not valid.
         """
         if (version is None) == (time is None):
             raise InputError("at(...) takes a version or a time")
@@ -387,15 +402,15 @@ class KnowledgeBase(View):
 
     @property
     def oldest(self) -> int:
-        """The first version that is still kept, for `at` and `changes`."""
+        """The oldest version that is still kept, for `at` and `changes`."""
         return self._history.oldest()
 
     def changes(self, since: int = 0, until: int | None = None) -> list[Change]:
-        """Return the changes after version `since` up to version `until` (default: all).
+        """Return the changes after version `since` up to and including version `until` (default: the newest).
 
         Raises:
-            HistoryError: some of them are no longer kept, or are in the future.
-            InputError: one of the two is not a version, or `until` is before `since`.
+            HistoryError: some of these changes are no longer kept, or are in the future.
+            InputError: `since` or `until` is not a version, or `until` is before `since`.
         """
         with self._lock.alone():
             self._require_reached(since)
@@ -407,15 +422,18 @@ class KnowledgeBase(View):
 
     @property
     def digest(self) -> bytes:
-        """Digest of the newest version in the store's file, which covers all versions before it; empty in memory."""
+        """Digest of the newest version in the store's file.
+
+        The digest covers all versions before it; in memory it is empty.
+        """
         return self._history.digest
 
     def compact(self, keep_since: int | None = None) -> None:
-        """Forget the versions before `keep_since` (default: the present one); idempotency keys stay.
+        """Discard the versions before `keep_since` (default: the present version); idempotency keys stay.
 
         Raises:
-            HistoryError: that version is no longer kept, or in the future.
-            InputError: it is not a version.
+            HistoryError: version `keep_since` is no longer kept, or is in the future.
+            InputError: `keep_since` is not a version.
             StoreError: the file cannot be written, or the knowledge base is closed.
         """
         with self._lock.changing():
@@ -425,14 +443,17 @@ class KnowledgeBase(View):
             self._history.compact(version, self._present)
 
     def _first(self, key: str | None, expect: int | None) -> Change | None:
-        """Return the change that was committed under `key`; a new one must meet the expected version."""
+        """Return the change that was committed under `key`, or `None` for a new change.
+
+        Raise `ConflictError` if a new change does not meet the version `expect`.
+        """
         first = None if key is None else self._history.first(key)
         if first is None and expect is not None and expect != self._version:
             raise ConflictError(f"version {expect} is expected, but the world is at version {self._version}")
         return first
 
     def _commit(self, effective: Delta, author: str, key: str | None, along: Writer | None) -> Change:
-        self._require_open()  # the block of a transaction may have closed it
+        self._require_open()  # the block of a transaction may have closed the knowledge base
         self._time = max(self._time, self._clock())
         change = Change(self._version + bool(effective), author, effective, self._time)
         self._history.append(change, key, self._state, along)
@@ -441,7 +462,7 @@ class KnowledgeBase(View):
         return change
 
     def _take_in(self, change: Change) -> None:
-        """Make a change that the history keeps, and queue the notifications."""
+        """Apply a change that the history has stored, and queue the notifications."""
         effective = change.delta
         departures = self._installed.departures(effective) if effective.removed_nodes else []
         if effective.removed_nodes:

@@ -1,4 +1,4 @@
-"""Several changes as one: in a block of the world, and in a transaction of the file."""
+"""Transactions: several changes in one version, and several commits in one transaction of the file."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from knowledge_base.world.read_write_lock import ReadWriteLock
 
 
 class Transaction:
-    """The changes of one `with kb.transaction(...)` block; each mistake raises its error immediately.
+    """The changes of one `with kb.transaction(...)` block; each invalid change raises its error immediately.
 
-    Its own questions see its changes; no other reader does before the commit.
+    Queries of the transaction see its changes; no other reader sees them before the commit.
 
     Attributes:
-        change: the committed change; `None` before the end of the block. If the block's key was committed before, it
-            is that change from the beginning, and the block has no effect.
+        change: the committed change; `None` before the end of the block. If the key of the block was committed before,
+            this attribute is that earlier change from the beginning, and the block has no effect.
     """
 
     def __init__(self, view: Overlay, questions: Questions, first: Change | None = None) -> None:
@@ -41,19 +41,19 @@ class Transaction:
         return self._view.delta
 
     def add_node(self, name: str, type_name: str) -> None:
-        """Add a thing of that type.
+        """Add an object of the type `type_name`.
 
         Raises:
-            UnknownNameError: there is no such type.
-            SchemaError: there is a thing of that name and another type.
+            UnknownNameError: the type is not declared.
+            SchemaError: an object with this name has another type.
         """
         self.apply(Delta(nodes={name: type_name}))
 
     def remove_node(self, name: str) -> None:
-        """Remove the thing, and all facts and values about it.
+        """Remove the object, with all its facts and values.
 
         Raises:
-            UnknownNameError: there is no such thing.
+            UnknownNameError: the object is unknown.
         """
         if self._view.type_of(name) is None and not self._repeated:
             raise UnknownNameError(f"there is no object '{name}'", found=name, valid=self._view.objects("object"))
@@ -63,7 +63,7 @@ class Transaction:
         """Make the fact true.
 
         Raises:
-            UnknownNameError: an undeclared predicate, or an unknown thing.
+            UnknownNameError: an undeclared predicate, or an unknown object.
             SchemaError: a wrong number of arguments, a wrong type, or a second fact of a functional predicate.
         """
         self.apply(Delta(added=(Fact(predicate, args),)))
@@ -73,9 +73,10 @@ class Transaction:
         self.apply(Delta(removed=(Fact(predicate, args),)))
 
     def replace(self, predicate: str, *args: Value) -> None:
-        """Make the fact true, each with another last argument false: `tx.replace("at", "cup1", "shelf")`.
+        """Make the fact true, and each fact with another last argument false: `tx.replace("at", "cup1", "shelf")`.
 
-        Errors as for `tell`. The predicate needs an argument; one with a single argument must be functional.
+        Errors as for `tell`. The predicate must have an argument; a predicate with a single argument must be
+        functional.
         """
         self.apply(Delta(replaced=(Fact(predicate, args),)))
 
@@ -84,57 +85,57 @@ class Transaction:
 
         Raises:
             UnknownNameError: an undeclared function, or an unknown thing.
-            SchemaError: a wrong number of arguments, a wrong type of one of them or of the content.
-            InputError: there is no content, or a number in it is not finite.
+            SchemaError: a wrong number of arguments, or a wrong type of an argument or of the content.
+            InputError: the content is missing, or a number in it is not finite.
         """
         if not args_and_content:
             raise InputError(f"set('{function}', ...) ends with the content to set")
         *args, content = args_and_content
-        # The check of types refuses a geometry among the arguments.
+        # The type check rejects a geometry among the arguments.
         self.apply(Delta(values={Fact(function, tuple(cast("list[Value]", args))): content}))
 
     def apply(self, delta: Delta) -> None:
-        """Apply `delta` as a whole or, with an error, not at all.
+        """Apply `delta` as a whole, or raise an error without effect.
 
         Raises:
-            InputError: as for the single verbs.
-            ConflictError: the transaction is over.
+            InputError: as for the methods for single changes.
+            ConflictError: the block of the transaction has ended.
         """
         if self._closed:
             raise ConflictError("the transaction is over; changes are made inside its 'with' block")
         require_delta(delta)
-        if not self._repeated:  # the change may not fit the present world
+        if not self._repeated:  # a repeated change may contradict the present world
             self._view.apply(delta)
 
     def query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> list[dict[str, Value]]:
-        """As `KnowledgeBase.query`, with the changes so far."""
+        """Return the answers as `KnowledgeBase.query` does, with the changes so far."""
         params = self._questions.given(text, params, self._view, "answers")
         return self._questions.answers(text, params, self._view)
 
     def ask(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> bool:
-        """As `KnowledgeBase.ask`, with the changes so far."""
+        """Return whether the condition is true, as `KnowledgeBase.ask` does, with the changes so far."""
         params = self._questions.given(text, params, self._view, "error")
         return self._questions.ask(text, params, self._view)
 
     def close(self) -> None:
-        """Refuse further changes; called at the end of the block."""
+        """Refuse further changes; the knowledge base calls this method at the end of the block."""
         self._closed = True
 
 
 class GroupCommit:
-    """The changes of a block and its own rows as one transaction of the file; see `KnowledgeBase.together`.
+    """Several commits, and rows of the caller, in one transaction of the file; see `KnowledgeBase.together`.
 
-    One thread at a time may use it, repeatedly. After an interrupt before the first line of `__exit__`, `__del__` rolls
-    the block back.
+    Only one thread at a time may use a `GroupCommit`; it may be used repeatedly. If an exception interrupts `__exit__`
+    before its first line, `__del__` rolls the block back.
 
     Args:
         lock: lock of the world.
-        require_free: raises an error if this thread may not begin now.
+        require_free: raises an error if this thread may not begin a transaction.
         history: writes the file.
     """
 
     def __init__(self, lock: ReadWriteLock, require_free: Callable[[], None], history: History) -> None:
-        self._group: AbstractContextManager[sqlite3.Connection] | None = None  # inside
+        self._group: AbstractContextManager[sqlite3.Connection] | None = None  # `None` outside the block
         self._lock = lock
         self._require_free = require_free
         self._history = history
@@ -158,7 +159,7 @@ class GroupCommit:
         try:
             try:
                 group.__exit__(kind, error, at)
-            except BaseException as failed:  # perhaps before its first line
+            except BaseException as failed:  # the exception may come before the first line of `__exit__`
                 group.__exit__(type(failed), failed, None)
                 raise
         finally:

@@ -1,4 +1,4 @@
-"""View: all questions about a world, present or past."""
+"""View: all queries of a world, present or past."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 _TOGETHER = 100
-"""Answers that a stream finds each time it takes the lock."""
+"""Number of answers that a stream computes during one acquisition of the lock."""
 
 
 class View:
-    """Questions about a world, from several threads; each answer is a finished list about one version.
+    """Queries of a world from several threads; each result is a complete list for one version.
 
-    It is itself a `World` (`schema`, `holds`, `match`, `value`, `objects`, `type_of`).
+    A view is itself a `World` (`schema`, `holds`, `match`, `value`, `objects`, `type_of`).
     """
 
     def __init__(self, state: WorldState, version: int) -> None:
@@ -46,15 +46,15 @@ class View:
 
     @property
     def version(self) -> int:
-        """Number of changes committed before."""
+        """Number of the version, i.e. of the changes committed before it."""
         return self._version
 
     @property
     def graph(self) -> Graph:
-        """The world as a graph, read-only; see `world.graph` for its form.
+        """The world as a read-only graph; `world.graph` describes its nodes and arcs.
 
-        The first access makes it. That of a `KnowledgeBase` follows every commit from then on; other threads must not
-        commit while it is being walked.
+        The first access builds the graph. In a `KnowledgeBase`, every later commit updates the graph; other threads
+        must not commit while a caller iterates over it.
         """
         with self._lock:
             if self._graph is None:
@@ -68,20 +68,20 @@ class View:
         limit: int | None = None,
         bounds: Bounds | None = None,
     ) -> list[Binding]:
-        """Return the values of the free variables that make the text true, each choice once.
+        """Return the bindings of the free variables that make the condition true, each binding once.
 
         Args:
             text: a condition such as `(and (on ?o ?table) (cup ?o))`.
-            params: variables that have a value already; they are not part of the answers.
-            limit: most answers; the search ends with the last of them.
-            bounds: work, seconds and cancellation that end the search with an error.
+            params: variables with a fixed value; the answers do not contain them.
+            limit: maximum number of answers; the search ends after this number.
+            bounds: limits of work and seconds, and a cancellation; each of them ends the search with an error.
 
         Raises:
-            OutOfBoundsError: the search exceeds its bounds, or was cancelled.
+            OutOfBoundsError: the search exceeds its bounds, or is cancelled.
             ParseError: the text is not a condition.
-            UnknownNameError: an undeclared predicate, function or type, an unknown thing, or a parameter that the text
-                does not have.
-            SchemaError: a wrong number of arguments or a type that can never fit.
+            UnknownNameError: an undeclared predicate, function or type, an unknown object, or a parameter that is not a
+                variable of the text.
+            SchemaError: a wrong number of arguments, or a type that no object can match.
             InputError: a variable occurs only under `not` or in a comparison.
         """
         if bounds is None is limit:
@@ -93,13 +93,13 @@ class View:
     def stream(
         self, text: str | Expression, params: Mapping[str, Value] | None = None, *, bounds: Bounds | None = None
     ) -> Iterator[Binding]:
-        """Return the answers of `query` in the same order, each when it is found.
+        """Return an iterator over the answers of `query` in the same order; each answer is available when it is found.
 
-        Other threads may query and change the knowledge between two answers. An error about candidates that cannot be
-        computed comes after all answers.
+        Other threads may query and change the knowledge base between two answers. An error about candidates without a
+        computable value is raised after all answers.
 
         Raises:
-            ConflictError: a change was committed before the last answer; `at` gives a world that stays unchanged.
+            ConflictError: a change was committed before the last answer; use `at` to query a fixed version.
             InputError: as for `query`.
         """
         meter = Meter(bounds)
@@ -131,7 +131,10 @@ class View:
     def ask(
         self, text: str | Expression, params: Mapping[str, Value] | None = None, bounds: Bounds | None = None
     ) -> bool:
-        """Whether the text is true; errors as for `query`, and a free variable without a value is one."""
+        """Return whether the condition is true.
+
+        Errors as for `query`; a free variable without a value is also an error.
+        """
         if bounds is None:
             with self._lock:
                 given = self._questions.given(text, params, self._state, "error")
@@ -142,9 +145,10 @@ class View:
             return self._questions.ask(text, given, BoundedWorld(self._state, meter))
 
     def prepare(self, text: str | Expression, *parameters: str) -> Prepared:
-        """Prepare a question for repeated use: `kb.prepare("(on ?x ?place)", "place").query("table")`.
+        """Prepare a query for repeated use: `kb.prepare("(on ?x ?place)", "place").query("table")`.
 
-        The text is parsed and checked now; the question takes values alone, in the order of the parameters' names.
+        The text is parsed and checked now. Each call of the prepared query passes only the values, in the order of
+        `parameters`.
 
         Raises:
             ParseError, UnknownNameError, SchemaError, InputError: as for `query`.
@@ -154,7 +158,7 @@ class View:
     def explain(
         self, text: str | Expression, params: Mapping[str, Value] | None = None, *, bounds: Bounds | None = None
     ) -> Explanation:
-        """Why the text is true or false; errors as for `ask`."""
+        """Return the explanation why the condition is true or false; errors as for `ask`."""
         meter = Meter(bounds)
         with self._lock, meter.over(text):
             params = self._questions.given(text, params, self._state, "error")
@@ -162,98 +166,103 @@ class View:
             return explain(self._questions.condition(text, params, self._state), world, params)
 
     def explain_query(self, text: str | Expression, params: Mapping[str, Value] | None = None) -> QueryPlan:
-        """The look-ups of the query in the order in which they would run now; errors as for `query`."""
+        """Return the look-ups of the query in their present order of execution; errors as for `query`."""
         with self._lock:
             params = self._questions.given(text, params, self._state, "answers")
             return plan_query(self._questions.query(text, params, self._state), self._state, params)
 
     def overlay(self) -> Overlay:
-        """Return a world of pending changes on top of this one, which stays unchanged."""
+        """Return a world with pending changes on top of this world, which stays unchanged."""
         return Overlay(self)
 
     def snapshot(self) -> WorldState:
-        """The world as it is now, latest values of sources included, as a copy that nothing changes."""
+        """Return an independent copy of the present world, with the latest values of the sources."""
         with self._lock:
             return self._state.copy(fed=True)
 
     def to_json(self) -> str:
-        """All of it as JSON, schema and version included; `KnowledgeBase.from_json` reads it back."""
+        """Return the world with its schema and version as JSON, which `KnowledgeBase.from_json` reads."""
         with self._lock:
             return to_json(self._state, self._version)
 
     def to_pddl(
         self, domain: str, name: str = "world", goal: str | Expression | None = None, metric: Metric | None = None
     ) -> str:
-        """All of it as a PDDL problem for the domain of that name, which is not written.
+        """Return the world as a PDDL problem for the domain of that name; the domain itself is not written.
 
         Args:
             domain: name of the domain.
             name: name of the problem.
-            goal: condition to reach, if any.
-            metric: quantity that the best plan minimises or maximises, if any.
+            goal: condition to reach; `None` is a goal that is always true.
+            metric: quantity that a plan minimises or maximises, if any.
 
         Raises:
-            InputError: as for `ask`, for the goal; and a name or number that PDDL cannot spell.
+            InputError: the goal is invalid, as for `ask`; or PDDL cannot spell a name or number.
         """
         with self._lock:
             wanted = TRUE if goal is None else self._questions.condition(goal, {}, self._state)
             return problem_to_text(self._state, name, domain, wanted, metric)
 
     def nodes(self) -> dict[str, str]:
-        """All things with their types, in order of insertion."""
+        """Return all objects with their types, in order of insertion."""
         with self._lock:
             return dict(self._state.nodes)
 
     def facts(self) -> list[Fact]:
-        """All facts, predicate by predicate, in order of insertion."""
+        """Return all facts, grouped by predicate, in order of insertion."""
         with self._lock:
             return list(self._state.facts)
 
     def values(self) -> dict[Fact, Content]:
-        """Values that functions were set to."""
+        """Return the values that changes have set, by function and arguments."""
         with self._lock:
             return dict(self._state.values)
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
-        """Whether the fact is true."""
+        """Return whether the fact is true."""
         with self._lock:
             return self._state.holds(predicate, args)
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> list[tuple[Value, ...]]:
-        """The arguments of all facts that agree with `pattern`; `None` is open; in order of insertion."""
+        """Return the arguments of all facts that match `pattern`, in order of insertion.
+
+        `None` in `pattern` matches every argument.
+        """
         with self._lock:
             return list(self._state.match(predicate, pattern))
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
-        """At most how many facts agree with `pattern`, without looking through them."""
+        """Return an upper bound of the number of facts that match `pattern`, without reading them."""
         with self._lock:
             return self._state.estimate(predicate, pattern)
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """Value of the function; until it is set 0, `""`, `False` or `()`, by its type.
+        """Return the value of the function.
+
+        Before the first assignment, the value is 0, `""`, `False` or `()`, depending on its type.
 
         Raises:
-            UnknownNameError: there is no such function.
+            UnknownNameError: the function is not declared.
         """
         with self._lock:
             return self._state.value(function, args)
 
     def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
-        """Reference of the source that feeds the function, if there is one."""
+        """Return the reference of the source that is bound to the function, or `None`."""
         with self._lock:
             return self._state.reference(function, args)
 
     def objects(self, type_name: str) -> list[str]:
-        """The things of that type or a subtype, in order of insertion.
+        """Return the objects of that type and its subtypes, in order of insertion.
 
         Raises:
-            UnknownNameError: there is no such type.
+            UnknownNameError: the type is not declared.
         """
         with self._lock:
             return self._state.objects(type_name)
 
     def type_of(self, name: str) -> str | None:
-        """The thing's type; `None` if there is no such thing."""
+        """Return the type of the object; `None` if the object is unknown."""
         with self._lock:
             return self._state.type_of(name)
 
