@@ -1,4 +1,4 @@
-"""The executive: a domain, plots, components, knowledge and a planner, wired and ready to run."""
+"""The executive: a robot program made of a domain, plots, components, knowledge and a planner."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from planning.problem.construction import check_goal
 from planning.soundness import require_parts, require_sound
 
 Prepare = Callable[[Sequencer], None]
-"""A callback before a run starts, e.g. to post events or to keep a reference to the sequencer."""
+"""Callback that is called before a run starts, e.g. to post events or to keep a reference to the sequencer."""
 _BUDGET = Budget()
 
 
@@ -50,27 +50,27 @@ class Executive:
     """A robot program, ready to run.
 
     Args:
-        domain: the planning domain, or its PDDL file. Components may add fragments; the knowledge base's schema
-            declares the merged domain.
-        plots: the plots; those with `implements` execute planning actions. Executives may share a `Library` and its
-            caches. The plot `achieve` is added if the library has none.
-        components: the components with the skills.
-        knowledge: the world model, whose schema plots may query; by default an empty one of the domain's schema.
-        planner: finds plans. The default is pyperplan in simulated time, so that a run is repeatable. In real time it
-            is a race of the engines that suit a problem.
-        parallel: execute independent steps of a plan concurrently.
-        foresight: simulates plans before they are executed.
-        store: a file for knowledge and runs, so that a run can be resumed after a crash. It is created if missing, and
-            provides the knowledge.
-        durability: with a store, "process" survives the death of the process, "power" also a power cut.
+        domain: the planning domain, or its PDDL file. Components may add fragments. The schema of the knowledge base
+            must declare the merged domain.
+        plots: the plots; plots with `implements` execute planning actions. Several executives may share one `Library`
+            and its caches. The plot `achieve` is added if the library lacks it.
+        components: the components, with their skills.
+        knowledge: the knowledge base, whose schema the plots may use; by default an empty one with the domain's schema.
+        planner: the planner. The default in simulated time is pyperplan, so that a run is repeatable. The default in
+            real time is a race of the engines that suit a problem.
+        parallel: whether independent steps of a plan are executed concurrently.
+        foresight: simulates each plan before its execution.
+        store: a file for the knowledge base and the runs, so that a run can be resumed after a crash. A missing file is
+            created. With a store, the argument `knowledge` must be omitted.
+        durability: with a store, "process" survives a crash of the process, and "power" also a power failure.
 
     Raises:
-        PlotError: a plot does not pass the validator; the error has all findings.
-        InputError: a domain file is wrong, two fragments contradict each other, or two plots have one name. A
-            component's parameter has no value, or a relation between parameters does not hold. Both knowledge
-            and a store are given.
+        PlotError: a plot does not pass the validator; the error contains all findings.
+        InputError: a domain file contains an error, two fragments contradict each other, or two plots have equal
+            names. A component's parameter lacks a value, or a relation between parameters is violated. Both
+            `knowledge` and `store` are given.
         SchemaMismatchError: the schema of `knowledge` lacks declarations of the domain.
-        StoreError: the store cannot be opened, or another process writes it.
+        StoreError: the store cannot be opened, or another process has opened it for writing.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class Executive:
         require_sound(self.library, self.domain, schema, skills, declared)
         if knowledge is not None:
             self.knowledge = knowledge
-        else:  # last, since an opened knowledge base must be closed
+        else:  # last, since the caller must close an opened knowledge base
             kept = None if store is None else durability
             self.knowledge = KnowledgeBase.open(self.domain.schema, self._store, kept)
 
@@ -126,23 +126,23 @@ class Executive:
         components: Iterable[Component] = (),
         **how: Any,
     ) -> Self:
-        """Return a robot program made of bundles, the bundles that these need, and further plots and components.
+        """Return an executive for bundles, the bundles that they need, and further plots and components.
 
         Args:
-            bundles: each a `Bundle`, or the name of an installed one.
-            plots: plots that the bundles lack.
-            components: components that the bundles lack.
-            how: the other arguments of an `Executive`, by name (`knowledge`, `planner`, `store`, ...).
+            bundles: each a `Bundle`, or the name of an installed bundle.
+            plots: further plots.
+            components: further components.
+            how: the keyword arguments of `Executive` (`knowledge`, `planner`, `store`, ...).
 
         Raises:
             UnknownNameError: a bundle is missing.
-            InputError: two bundles contradict each other; and as for an `Executive`.
+            InputError: two bundles contradict each other, or `Executive` raises the error.
         """
         found = gathered(bundles)
         return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
 
     def listen(self, listener: Listener) -> None:
-        """Call `listener` with every record of every run from now on."""
+        """Call `listener` with every later record of every run."""
         self._listeners.append(listener)
 
     def run(
@@ -155,16 +155,16 @@ class Executive:
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
     ) -> RunEnd:
-        """Run a plot to its end.
+        """Run a plot to its end, and return how the run ended.
 
         Args:
             plot: the plot's name.
-            arguments: values for its parameters.
-            simulated: time jumps from event to event; otherwise it is real time.
-            open_ended: events may still come from outside (an operator, a user interface) when the run is idle.
-                Otherwise an idle run ends and reports that.
-            prepare: see `Prepare`.
-            header: plain data to keep with the run in the store.
+            arguments: values of the plot's parameters.
+            simulated: whether the run uses simulated time, which jumps from event to event, instead of real time.
+            open_ended: whether an idle run waits for events from outside, e.g. from an operator. Otherwise an idle run
+                ends and reports the deadlock.
+            prepare: called before the run starts, see `Prepare`.
+            header: plain data that the store keeps with the run.
 
         Raises:
             InputError: the plot is unknown, or a parameter is missing or unknown.
@@ -182,9 +182,9 @@ class Executive:
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
     ) -> RunEnd:
-        """Run a plot inside an existing asyncio loop, e.g. with remote components.
+        """Run a plot inside an existing asyncio loop, e.g. with remote components, and return how the run ended.
 
-        The loop determines the time: real, or simulated by `run_simulated`. For the arguments see `run`.
+        The loop determines whether time is real, or simulated by `run_simulated`. For the arguments see `run`.
         """
         clock = LoopClock()
         store = self._run_store({**(header or {}), "simulated": clock.simulated, "open_ended": open_ended})
@@ -194,24 +194,26 @@ class Executive:
         return await _to_its_end(sequencer.run(plot, arguments), planning, clock)
 
     def resume(self, *, prepare: Prepare | None = None) -> RunEnd:
-        """Resume the store's unfinished run where it was interrupted, and run it to its end.
+        """Resume the unfinished run of the store at its last macrostep, and run it to its end.
 
-        Listeners get its records from the beginning. `prepare` is called again. Scheduled input that is still pending
-        is kept and need not be posted again.
+        Listeners receive the records of the run from the beginning. `prepare` is called again. Scheduled events that
+        are still pending are kept and need not be posted again.
 
         Raises:
-            StoreError: there is no store or no unfinished run in it, or it cannot be read or written.
-            ChangedError: plots or domain differ from those at the run's start; the error lists the differences.
+            StoreError: there is no store or no unfinished run, or the store cannot be read or written.
+            ChangedError: plots or domain differ from their versions at the start of the run; the message lists the
+                differences.
         """
         store, kept = self._taken_up()
         going_on = self._go_on(store, kept, prepare)
         return run_simulated(going_on, kept.time) if kept.run.header["simulated"] else run_real(going_on)
 
     async def go_on(self, *, prepare: Prepare | None = None) -> RunEnd:
-        """Resume the unfinished run inside an existing asyncio loop with the run's kind of time; see `resume`.
+        """Resume the unfinished run inside an existing asyncio loop, see `resume`.
 
         Raises:
-            InputError: the run began in real time and this loop's is simulated, or the other way round.
+            InputError: the run uses simulated time and the loop real time, or the run uses real time and the loop
+                simulated time.
         """
         store, kept = self._taken_up()
         simulated = LoopClock().simulated
@@ -230,22 +232,21 @@ class Executive:
         open_ended: bool = False,
         prepare: Prepare | None = None,
     ) -> RunEnd:
-        """Plan for a goal, execute the plan, and plan again when the world changes against it.
+        """Plan for a goal, execute the plan, and replan if a change of the world breaks the plan.
 
-        The end is `finished` when the attempt ends, and states whether the goal was `reached`. If not, it `emitted`
-        `no_plan` or `gave_up`, with the reason.
+        The returned end is `finished`, and contains whether the goal was `reached`. If the goal was not reached, the
+        end contains the event `no_plan` or `gave_up`, with the reason.
 
         Args:
-            goal: a condition.
+            goal: the condition to reach.
             seconds: real time for each search.
-            replans: number of plans after the first one.
-            simulated: as for `run`.
-            open_ended: as for `run`.
-            prepare: as for `run`.
+            replans: the maximum number of plans after the first plan.
+            simulated: see `run`.
+            open_ended: see `run`.
+            prepare: see `run`.
 
         Raises:
-            InputError: the goal is not a condition, or names something undeclared or unknown; or a limit is out of
-                range.
+            InputError: the goal is not a condition or contains an undeclared name, or a limit is out of range.
         """
         check_goal(parse_condition(goal), self.knowledge)
         budget = _budget(seconds, replans)
@@ -295,7 +296,7 @@ class Executive:
         return RunStore(self.knowledge, self._store, header, self.domain.statements())
 
     def close(self) -> None:
-        """Close the store, and end the processes of the default planners."""
+        """Close the store, and terminate the processes of the default planners."""
         if self._store is not None:
             self.knowledge.close()
         for planner in self._own_planners.values():
@@ -310,7 +311,7 @@ class Executive:
         return self._own_planners[clock.simulated]
 
     def __enter__(self) -> Self:
-        """Return the executive; `close` runs at the end of the block."""
+        """Return the executive; the end of the `with` block calls `close`."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -328,7 +329,7 @@ async def _to_its_end(running: Coroutine[Any, Any, RunEnd], planning: PlanningCo
 
 @cache
 def achieve_plot() -> ActionPlot:
-    """Return the plot for goals without a designed candidate, cached, since plots are immutable."""
+    """Return the plot that plans for any goal; cached, because plots are immutable."""
     resource = files("planning") / "plots" / "achieve.yaml"
     return parse_plot(resource.read_text(encoding="utf-8"), str(resource))
 
@@ -343,28 +344,28 @@ def _budget(seconds: float, replans: int) -> Budget:
 
 
 _YOUNG = 10_000
-"""Allocations between collections of the youngest generation, as a minimum.
+"""The least number of allocations between two collections of the youngest generation.
 
-The interpreter's default of 700 suits programs with few allocations. One new plan makes twice this number of objects,
-most of them short-lived.
+The interpreter's default of 700 suits programs with few allocations. One new plan allocates 20,000 objects, most of
+them short-lived.
 """
 
 _lock = threading.Lock()
 _thresholds: list[tuple[int, int, int]] = []
-"""The collector's thresholds before each run in progress."""
+"""The thresholds of the garbage collector before each run in progress."""
 
 
 @contextmanager
 def settled() -> Iterator[None]:
-    """Freeze the existing objects until the end of this run, and of others at the same time.
+    """Exclude the existing objects from garbage collection until the end of all runs in progress.
 
-    A collection of all objects takes a tenth of a second. New objects are collected less often too.
+    A collection of all objects takes a tenth of a second. New objects are also collected less often.
     """
     with _lock:
         gc.freeze()
         before = gc.get_threshold()
         _thresholds.append(before)
-        if before[0]:  # else it is switched off
+        if before[0]:  # 0 means that collection is disabled
             gc.set_threshold(max(before[0], _YOUNG), *before[1:])
     try:
         yield

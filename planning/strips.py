@@ -124,20 +124,21 @@ class GroundAction:
 class Problem:
     """The input of an engine, made by `planning.problem.construction.build_problem`.
 
-    domain: the name of the planning domain.
-    objects: the type of each object, by the object's name.
-    init: the relevant facts that hold initially.
-    goal: the facts that must hold at the end; empty if the goal already holds.
-    actions: the ground actions that can contribute to the goal.
-    unreachable: goal facts, as text, that are unreachable even without deletes. If it is not empty, the problem is
-        proven unsolvable without an engine.
-    unsliced: constructs `whole`; `None` if no object was removed.
-    numbers: the initial values of the relevant numeric fluents.
-    bounds: numeric conditions that must hold at the end.
-    notes: requests that no engine supports, e.g. a metric; text for users.
-    one_at_a_time: whether the problem treats durative actions as instantaneous ones. Then a missing plan is not a
-        proof of unsolvability.
-    timed: the problem with durations, for a temporal engine, if `one_at_a_time` is true; otherwise `None`.
+    Attributes:
+        domain: the name of the planning domain.
+        objects: the type of each object, by the object's name.
+        init: the relevant facts that hold initially.
+        goal: the facts that must hold at the end; empty if the goal already holds.
+        actions: the ground actions that can contribute to the goal.
+        unreachable: goal facts, as text, that are unreachable even without deletes. If it is not empty, the problem is
+            proven unsolvable without an engine.
+        unsliced: constructs `whole`; `None` if no object was removed.
+        numbers: the initial values of the relevant numeric fluents.
+        bounds: numeric conditions that must hold at the end.
+        notes: requests that no engine supports, e.g. a metric; text for users.
+        one_at_a_time: whether the problem treats durative actions as instantaneous ones. Then a missing plan is not
+            a proof of unsolvability.
+        timed: the problem with durations, for a temporal engine, if `one_at_a_time` is true; otherwise `None`.
     """
 
     domain: str
@@ -182,8 +183,7 @@ class Problem:
         """The planning duration in simulated time, computed from the size of the problem and never from a clock.
 
         The duration is 0.1 s for construction, 1 ms for each ground action and 20 ms for each goal fact. The embedded
-        engine
-        needs time of this order of magnitude.
+        engine needs time of this order of magnitude.
         """
         return round(0.1 + 0.001 * len(self.actions) + 0.02 * len(self.goal), 3)
 

@@ -1,7 +1,7 @@
-"""Monitor installs the causal links of a plan's remaining steps as conditions in the knowledge base.
+"""Monitor of the causal links of a plan's remaining steps, installed as conditions in the knowledge base (S4.2).
 
-A change that touches no condition costs nothing. The monitor validates changes by the running step or a rule when the
-next step begins, and changes by other authors immediately (S4.2).
+A change that affects no installed condition causes no computation. The monitor validates changes by the running step or
+a rule when the next step begins. It validates changes by other authors immediately.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from planning.validation import validate
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """The remaining steps no longer lead to the goal.
+    """News that the remaining steps no longer lead to the goal.
 
     Attributes:
-        why: the condition that does not hold when its step comes, in PDDL.
-        needed: the condition on the present that is broken, as text; empty if it has no single one.
-        user: number of the first step that needs it; one more than the plan has for the goal.
-        author: of the change.
-        version: the knowledge base's version since when.
+        why: the condition that does not hold when its step begins, in PDDL.
+        needed: the broken condition on the present world, as text; empty if no single condition is broken.
+        user: the number of the first step that needs the condition; the number of steps plus one for the goal.
+        author: the author of the change.
+        version: the version of the knowledge base from which the condition is broken.
     """
 
     why: str
@@ -46,14 +46,14 @@ class Broken:
 
 @dataclass(frozen=True, slots=True)
 class Shorter:
-    """Fewer steps than the remaining ones lead to the goal."""
+    """News that fewer steps than the remaining ones lead to the goal."""
 
     steps: tuple[PlanStep, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class GoalReached:
-    """The goal holds before the last step."""
+    """News that the goal holds before the last step."""
 
     author: str
 
@@ -62,7 +62,7 @@ News = Broken | Shorter | GoalReached
 
 
 def news_form(news: News) -> dict[str, Any]:
-    """Plain data."""
+    """Return the news as plain data."""
     match news:
         case Broken():
             return {"broken": asdict(news)}
@@ -73,7 +73,7 @@ def news_form(news: News) -> dict[str, Any]:
 
 
 def news_from(form: Mapping[str, Any]) -> News:
-    """The inverse of `news_form`."""
+    """Return the news that `news_form` wrote as `form`."""
     ((kind, said),) = form.items()
     if kind == "broken":
         return Broken(**said)
@@ -81,13 +81,13 @@ def news_from(form: Mapping[str, Any]) -> News:
 
 
 class Monitor:
-    """Watches the causal links of one plan until it is closed.
+    """Observer of the causal links of one plan, until `close`.
 
     Args:
-        progress: of the plan; the caller that begins a step there calls `look` then.
-        domain, knowledge: as everywhere.
-        is_own: whether a change by this author is the running step's own doing.
-        hear: receives the news of a change during its commit.
+        progress: the progress of the plan. The caller that begins a step there must then call `look`.
+        domain, knowledge: the planning domain and the knowledge base.
+        is_own: returns whether a change by this author is an effect of the running step.
+        hear: receives the news of a change, during the commit of the change.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class Monitor:
         self._goal = self._install(progress.goal, self._goal_fired)
 
     def look(self, author: str) -> None:
-        """Validate the plan as a whole after a change by `author`."""
+        """Validate all remaining steps after a change by `author`, and report news if there are any."""
         self.update()
         progress, world = self._progress, self._knowledge
         if is_true(progress.goal, world):
@@ -130,7 +130,7 @@ class Monitor:
                 self._hear(Shorter(end))
 
     def close(self) -> None:
-        """Remove all conditions."""
+        """Cancel all installed conditions."""
         self._whole()
         for condition in (*self._links.values(), *self._to_come.values(), self._goal):
             if condition is not None:
@@ -138,7 +138,7 @@ class Monitor:
         self._links, self._to_come, self._goal = {}, {}, None
 
     def update(self) -> None:
-        """Install the conditions needed now, and the effects of later steps, which another author may cause first."""
+        """Install the conditions that the plan needs now, and effects of later steps that another author may cause."""
         progress = self._progress
         needed, later = progress.needed(), progress.needed_later()
         self._whole()
@@ -167,13 +167,13 @@ class Monitor:
     def _install(self, e: Expression, fired: Callable[[Expression, Firing], None]) -> Condition | None:
         try:
             condition = self._knowledge.install(e)
-        except InputError:  # it names a missing object, and so stays false
+        except InputError:  # the condition contains a missing object, so it stays false
             return None
         condition.subscribe(lambda firing: fired(e, firing), falls=True)
         return condition
 
     def _foreign(self, firing: Firing) -> str | None:
-        """The author of the change, unless that is the running step."""
+        """Return the author of the change; `None` if the change is an effect of the running step."""
         (change,) = self._knowledge.changes(since=firing.version - 1, until=firing.version)
         return None if self._is_own(change.author) else change.author
 
@@ -196,9 +196,9 @@ class Monitor:
         later = e in (progress.needed() or {}) and e in (progress.needed_later() or {})
         if later and self._is_broken:  # one change may break many links
             return
-        world = self._knowledge.snapshot()  # its reads need no lock
+        world = self._knowledge.snapshot()  # reads of a snapshot need no lock
         if later:
-            # The effects of the running step do not matter; a later step that can be the next one will be.
+            # Effects of the running step do not matter: the plan is shortened if a later step can be the next one.
             if shortest_end(progress.coming(), self._domain, world, progress.goal) is None:
                 self._hear(self._broken(author, firing.version, e))
         elif not progress.stands(world):  # the change breaks the running step
@@ -222,6 +222,6 @@ class Monitor:
 
 
 def _brought(step: PlanStep, domain: PlanningDomain) -> list[Expression]:
-    """The facts that a step adds in every world."""
+    """Return the facts that a step adds in every world."""
     expected = conjuncts(expectation(domain.action(step).effect, domain.bindings(step)))
     return [part for part in expected if isinstance(part, Atom)]

@@ -1,4 +1,4 @@
-"""PlanRecords writes the records `plan.*` of a trace; `why_broken` puts one into a sentence."""
+"""Records `plan.*` of a trace, and the explanation of a record `plan.broken` as a sentence."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from planning.plan import PlanFound, PlanStep
 
 _CUT_SHORT = {"reproducible": False}
-"""A mark for answers that a limit of real time influenced: the same seed may give another run."""
+"""A mark for outcomes that a limit of real time influenced; a repetition with equal seed may have another outcome."""
 
 
 class PlanRecords:
-    """Writes the life of plans into a trace."""
+    """Writer of the records `plan.*`, which describe each plan from its search to its end."""
 
     def __init__(self, trace: Trace) -> None:
         self._trace = trace
@@ -32,7 +32,7 @@ class PlanRecords:
         self._trace.record("plan.asked", goal=goal, version=version)
 
     def found(self, answer: PlanFound, name: str) -> None:
-        """Record a plan, and the engines that failed in the same race."""
+        """Record a new plan, and the engines that failed in the same race."""
         more: dict[str, Any] = {} if answer.reproducible else dict(_CUT_SHORT)
         if answer.failures:
             more["failures"] = [{"engine": one.engine, "message": one.message} for one in answer.failures]
@@ -40,12 +40,13 @@ class PlanRecords:
         self._trace.record("plan.found", plot=name, steps=steps, engine=answer.engine, **more)
 
     def ordered(self, name: str, order: PartialOrder) -> None:
-        """Record the steps and the causal links of a plan that is about to run.
+        """Record the steps and the causal links of a plan before its execution.
 
-        A link has a provider, a fact and a user; steps count from 1. Provider 0 is the present world, and the user
-        after the last step is the goal. Links from 0 to the goal are omitted, since a goal may have many parts.
+        A link consists of a provider, a fact and a user. Steps are numbered from 1. Provider 0 is the present world,
+        and the user after the last step is the goal. Links from the present to the goal are omitted, since a goal may
+        have many parts.
         """
-        if not self._trace.heard:  # the texts of all links take a while
+        if not self._trace.heard:  # without a listener, skip the slow conversion of links to text
             self._trace.record("plan.ordered")
             return
         goal = len(order.steps) + 1
@@ -59,11 +60,11 @@ class PlanRecords:
         )
 
     def none(self, kind: str, reason: str) -> None:
-        """Record a search without a plan."""
+        """Record that a search ended without a plan."""
         self._trace.record("plan.none", kind=kind, reason=reason, **(_CUT_SHORT if kind == "timed_out" else {}))
 
     def broken(self, progress: PlanProgress, news: Broken) -> None:
-        """Record that the remaining steps no longer lead to the goal, with the broken link and the author."""
+        """Record that the remaining steps no longer lead to the goal, with the broken link and its author."""
         user = str(progress.steps[news.user - 1]) if news.user <= len(progress.steps) else "the goal"
         self._trace.record(
             "plan.broken",
@@ -75,20 +76,20 @@ class PlanRecords:
         )
 
     def replaced(self, old: str, new: str, kept: int) -> None:
-        """Record that a new plan replaces a running one, whose last `kept` steps it keeps."""
+        """Record that a new plan replaces a running plan and keeps the last `kept` steps of that plan."""
         self._trace.record("plan.replaced", plot=new, after=old, kept=kept)
 
     def resumed(self, old: str, new: str, step: PlanStep, why: str, instead_of: str | None) -> None:
-        """Record that a plan resumes at a step, with another candidate than `instead_of` if one fits."""
+        """Record that a plan resumes at a step; another candidate replaces `instead_of` if that is given."""
         other = {} if instead_of is None else {"instead_of": instead_of}
         self._trace.record("plan.resumed", plot=new, after=old, step=str(step), why=why, **other)
 
     def skipped(self, name: str, steps: Iterable[PlanStep], why: str) -> None:
-        """Record skipped steps, which the goal does not need."""
+        """Record that the plan omits steps that the goal does not need."""
         self._trace.record("plan.skipped", plot=name, steps=[str(step) for step in steps], why=why)
 
     def gave_up(self, name: str, reason: str) -> None:
-        """Record that the goal is abandoned."""
+        """Record that the robot abandons the goal of the plan."""
         self._trace.record("plan.gave_up", plot=name, reason=reason)
 
     def excluded(self, step: PlanStep, seconds: float, why: str) -> None:
@@ -96,11 +97,11 @@ class PlanRecords:
         self._trace.record("plan.excluded", step=str(step), seconds=seconds, why=why)
 
     def readmitted(self, steps: Iterable[PlanStep]) -> None:
-        """Record that new plans may use excluded steps again, since none exists without them."""
+        """Record that new plans may contain excluded steps again, since there is no plan without these steps."""
         self._trace.record("plan.readmitted", steps=sorted(str(step) for step in steps))
 
     def rejected(self, step: PlanStep | None, reason: str, engine: str) -> None:
-        """Record that the simulation predicts the failure of a plan, at a step."""
+        """Record that the simulation predicts the failure of a plan at a step, or at the goal if `step` is `None`."""
         self._trace.record("plan.rejected", step=None if step is None else str(step), reason=reason, engine=engine)
 
 
@@ -108,12 +109,12 @@ _texts: IdentityCache[Expression, str] = IdentityCache()
 
 
 def _text(fact: Expression) -> str:
-    """Kept by identity: successive plans share most of their steps, and these their conditions."""
+    """Return the condition as text, cached by identity because successive plans share most of their conditions."""
     return _texts.find(fact, None) or _texts.keep(fact, None, to_text(fact))
 
 
 def why_broken(broken: Mapping[str, Any]) -> str:
-    """Explain the record `plan.broken` in a sentence, from its data."""
+    """Return the data of a record `plan.broken` as a sentence."""
     link, author = broken["link"], broken["author"]
     if not link["fact"]:
         return f"the plan no longer leads to the goal: {broken['reason']} (version {broken['version']}, {author})"

@@ -1,7 +1,7 @@
-"""PlanRun is a plan in execution, from its plot to its end; PlanRuns keeps them by name.
+"""Plan runs: the state of each plan from its plot to its end, and the escalation after failures (S1.4, S4.2).
 
-Attempt chooses the escalation step for a failed plan, after the rules of a plot and before `gave_up` (S1.4, S4.2). The
-same failure in the same situation never gets the same answer twice. Each answer and their number are bounded.
+After the rules of the plot have failed, `Attempt` chooses the next escalation step. An equal failure in an equal
+situation never has the same answer twice. The number of times that each answer is tried is bounded.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     from planning.problem.derived import Settled
 
 MOST_UNMONITORED = 64
-"""The number of unmonitored plans that are kept. A new plan may replace one; the chart abandons others silently."""
+"""The maximum number of unmonitored plans that are kept. The chart may abandon a plan without a message."""
 _PLAIN = ("name", "holder", "seconds", "replans", "replaces", "searching_since")
 
 
 MOST_RESUMED = 3
-"""The number of times that one attempt resumes at the same step without a new plan."""
+"""The maximum number of times that an attempt resumes at one step without a new plan."""
 
 
 class EscalationStep(Enum):
@@ -49,12 +49,12 @@ class EscalationStep(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A step that failed.
+    """Failure of a step in a situation.
 
     Attributes:
-        step: the step.
-        why: the outcome, or the condition that did not hold.
-        situation: digest of the world then; see `situation`.
+        step: the failed step.
+        why: the outcome event, or the condition that did not hold.
+        situation: a digest of the world at the time of the failure; see `planning.execution.repair.situation`.
     """
 
     step: PlanStep
@@ -64,12 +64,12 @@ class Failure:
 
 @dataclass(slots=True)
 class Attempt:
-    """The answers given so far on the way to one goal, over all plans for it.
+    """History of failures and answers for one goal, over all plans for that goal.
 
     Attributes:
-        replans: the number of plans that replaced a failed one.
-        failures: the number of times that each failure occurred in the same situation.
-        resumed: the number of times that a plan resumed at a step.
+        replans: the number of plans that replaced a failed plan.
+        failures: the number of occurrences of each failure.
+        resumed: the number of times that a plan resumed at each step.
     """
 
     replans: int = 0
@@ -77,14 +77,14 @@ class Attempt:
     resumed: Counter[PlanStep] = field(default_factory=Counter)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return the attempt as plain data."""
         failures = [[one.step.to_json(), one.why, one.situation, often] for one, often in self.failures.items()]
         resumed = [[step.to_json(), often] for step, often in self.resumed.items()]
         return {"replans": self.replans, "failures": failures, "resumed": resumed}
 
     @classmethod
     def from_json(cls, form: Mapping[str, Any]) -> Attempt:
-        """The inverse of `to_json`."""
+        """Return the attempt that `to_json` wrote as `form`."""
         failures = {
             Failure(PlanStep.from_json(step), why, where): often for step, why, where, often in form["failures"]
         }
@@ -92,12 +92,12 @@ class Attempt:
         return cls(form["replans"], Counter(failures), Counter(resumed))
 
     def failed(self, failure: Failure, *, stands: bool, others: bool) -> EscalationStep:
-        """Count a failure and return the answer to it.
+        """Count a failure, and return the next escalation step for it.
 
         Args:
-            failure: the failed step and its reason.
-            stands: whether the plan still leads to the goal, the step included.
-            others: whether another candidate implements the step.
+            failure: the failed step, the reason and the situation.
+            stands: whether the plan, with the failed step, still leads to the goal.
+            others: whether another candidate implements the failed step.
         """
         self.failures[failure] += 1
         if stands and self.resumed[failure.step] < MOST_RESUMED:
@@ -112,7 +112,7 @@ class Attempt:
         return answers[tried] if tried < len(answers) else EscalationStep.GIVE_UP
 
     def interrupted(self, step: PlanStep | None) -> EscalationStep:
-        """Return the answer for a plan that its monitor stopped; `step` is the one at which it could resume."""
+        """Return the escalation step for a plan that its monitor stopped; the plan could resume at `step`, if any."""
         return (
             EscalationStep.RESUME if step is not None and self.resumed[step] < MOST_RESUMED else EscalationStep.REPLAN
         )
@@ -122,24 +122,26 @@ class PlanState(Enum):
     """The states of a `PlanRun`."""
 
     BOUND = "bound"
-    """It has a plot; monitoring has not begun."""
+    """The plan has a plot, and monitoring has not begun."""
     MONITORED = "monitored"
-    """Its monitor watches the causal links of its remaining steps."""
+    """The monitor watches the causal links of the remaining steps."""
     BROKEN = "broken"
     """The monitor reported that the remaining steps no longer lead to the goal."""
     STOPPED = "stopped"
-    """Monitoring ended it before its steps did."""
+    """Monitoring ended the plan before its last step."""
 
 
 @dataclass(frozen=True, slots=True)
 class Successor:
-    """The steps that replace a plan; after its active step, if they begin with that one.
+    """The steps that replace a plan, immediately or after its running step.
+
+    The running step continues if the successor begins with an equal step.
 
     Attributes:
-        steps: the steps.
-        name: of their plot; `None` if they are steps of the same plan.
-        kept: the number of steps of the same plan that they end with.
-        found: the search's answer that they are from, unless a restart lost it.
+        steps: the steps of the successor.
+        name: the name of the successor's plot; `None` if the steps belong to the same plan.
+        kept: the number of last steps of the replaced plan with which the successor ends.
+        found: the result of the search that found the steps; `None` if a restart lost the result.
     """
 
     steps: tuple[PlanStep, ...]
@@ -148,51 +150,51 @@ class Successor:
     found: Found | None = field(default=None, compare=False)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return the successor as plain data, without `found`."""
         return {"steps": [step.to_json() for step in self.steps], "name": self.name, "kept": self.kept}
 
     @classmethod
     def from_json(cls, form: Mapping[str, Any]) -> Successor:
-        """The inverse of `to_json`."""
+        """Return the successor that `to_json` wrote as `form`."""
         return cls(tuple(map(PlanStep.from_json, form["steps"])), form["name"], form["kept"])
 
 
 @dataclass(frozen=True, slots=True)
 class Better:
-    """A planner that improves plans has found a better one."""
+    """News that an `Improving` planner has found a better plan."""
 
     answer: PlanFound
 
 
 @dataclass(frozen=True, slots=True)
 class StepEnded:
-    """The active step, the last one before a successor, has ended."""
+    """News that the running step, the last step before a successor, has ended."""
 
 
 Heard = News | Found | NotFound | Better | StepEnded
-"""The news that monitoring answers."""
+"""The news that `Monitoring` handles."""
 
 
 @dataclass(slots=True)
 class PlanRun:
-    """A plan that has a plot.
+    """A plan that has a plot, and the state of its execution.
 
     Attributes:
-        name: of its plot.
-        goal: the goal that it is for.
-        progress: its done, running and remaining steps.
-        attempt: the earlier answers to failures on the way to the goal.
-        holder, seconds, replans: the rules, bound and budget of the dynamic state that it is for.
-        improvements: better plans from its planner.
-        replaces: name of the plan that it replaces when its own monitoring begins.
+        name: the name of the plan and of its plot.
+        goal: the goal of the plan.
+        progress: done, running and remaining steps.
+        attempt: the earlier failures for the goal, and the answers to them.
+        holder, seconds, replans: the plot with the inherited rules, the time limit of a search and the replan budget.
+        improvements: better plans of the planner.
+        replaces: the name of the plan that this plan replaces when its monitoring begins.
         state: see `PlanState`.
-        successor: the steps that replace it.
-        begun: numbers of the steps of its plot that have begun.
-        news: unanswered news, oldest first.
-        searching_since: second of run time at which a search for a successor began.
-        missed: numbers of the steps that began between a restart and the monitor's own restart.
-        on_begin: receives the number of each step that begins, while the plan is monitored.
-        superseded: set when no more of its steps may begin, while the active one continues.
+        successor: the steps that replace this plan; `None` without a replacement.
+        begun: the numbers of the plot's steps that have begun.
+        news: unhandled news, oldest first.
+        searching_since: the run time, in seconds, at which a search for a successor began.
+        missed: the numbers of the steps that began after a restart of the program and before a restart of the monitor.
+        on_begin: receives the number of each step that begins; `None` while the plan is not monitored.
+        superseded: set when no further step of the plan may begin while the running step continues.
     """
 
     name: str
@@ -214,7 +216,7 @@ class PlanRun:
     superseded: asyncio.Event = field(default_factory=asyncio.Event)
 
     def begin(self, number: int) -> None:
-        """Begin a step of its plot; after a restart the same number may come twice."""
+        """Record that a step of the plot begins; after a restart, a number may arrive twice."""
         again = number in self.begun
         self.begun.add(number)
         if self.on_begin is not None:
@@ -225,7 +227,7 @@ class PlanRun:
             self.missed.append(number)
 
     def follow(self, successor: Successor) -> bool:
-        """Set the successor; return whether it begins with the active step, which then continues."""
+        """Set the successor; return whether it begins with the running step, so that this step continues."""
         self.successor = successor
         if self.progress.steps_of(self.progress.running) != successor.steps[:1]:
             return False
@@ -236,15 +238,15 @@ class PlanRun:
         return True
 
     def shortened(self, steps: tuple[PlanStep, ...]) -> Successor:
-        """The successor with other steps; without one, these steps of the plan itself."""
+        """Return the successor with other steps; without a successor, return these steps of the plan as one."""
         return Successor(steps) if self.successor is None else replace(self.successor, steps=steps)
 
     def renew(self, now: Settled) -> None:
-        """Rewrite the conditions of its steps for another state of the world."""
+        """Expand the conditions of the steps for another state of the world."""
         self.progress = self.progress.renewed(now.domain, now.condition(self.goal))
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data, without improvements and without plans that are found again after a restart."""
+        """Return the run as plain data, without news and improvements that a new search finds after a restart."""
         return {
             **{name: getattr(self, name) for name in _PLAIN},
             "goal": to_text(self.goal),
@@ -258,7 +260,7 @@ class PlanRun:
 
     @classmethod
     def from_json(cls, form: Mapping[str, Any], now: Settled) -> PlanRun:
-        """The inverse of `to_json`, with conditions written for the present state of the world."""
+        """Return the run that `to_json` wrote as `form`, with conditions expanded for the present world."""
         goal = parse_condition(form["goal"])
         run = cls(
             goal=goal,
@@ -276,58 +278,58 @@ class PlanRun:
 
 
 class PlanRuns:
-    """The plans that have a plot and are not over."""
+    """The plans that have a plot and have not ended, by name."""
 
     def __init__(self) -> None:
         self._runs: dict[str, PlanRun] = {}
         self._named = 0
 
     def new_name(self) -> str:
-        """A name that no earlier plan of the program's run has."""
+        """Return a name that no earlier plan of the program run has."""
         self._named += 1
         return f"plan_{self._named}"
 
     def get(self, name: str) -> PlanRun | None:
-        """The plan of that name, if there is one."""
+        """Return the plan of that name, or `None`."""
         return self._runs.get(name)
 
     def required(self, name: str) -> PlanRun:
-        """The plan of that name; raises `UnknownNameError`."""
+        """Return the plan of that name; raise `UnknownNameError` if there is no such plan."""
         if name not in self._runs:
             raise UnknownNameError(f"there is no plan '{name}'", found=name, valid=self._runs)
         return self._runs[name]
 
     def add(self, run: PlanRun) -> None:
-        """Keep a plan, and forget the oldest ones beyond `MOST_UNMONITORED` that have no monitor."""
+        """Add a plan, and delete the oldest plans without a monitor beyond `MOST_UNMONITORED`."""
         unmonitored = [name for name, one in self._runs.items() if one.on_begin is None]
         for name in unmonitored[:-MOST_UNMONITORED]:
             del self._runs[name]
         self._runs[run.name] = run
 
     def over(self, name: str) -> None:
-        """Forget a plan, the one that it replaces, and a successor that has not begun."""
+        """Delete a plan, the plan that it replaces, and a successor that has not begun."""
         run = self._runs.pop(name, None)
         if run is not None and run.replaces is not None:
             self.over(run.replaces)
         self.withdraw(name)
 
     def withdraw(self, name: str) -> None:
-        """Forget a successor of the plan that has not begun, since the chart did not take it."""
+        """Delete a successor of the plan that has not begun, because the chart did not use the successor."""
         for successor in [one.name for one in self._runs.values() if one.replaces == name]:
             del self._runs[successor]
 
     def begin(self, run: PlanRun) -> None:
-        """Begin the monitoring of a plan, which ends the one that it replaces."""
+        """Begin the monitoring of a plan; this deletes the plan that it replaces."""
         replaced, run.replaces = run.replaces, None
         if replaced is not None:
             self.over(replaced)
 
     def remember(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return all plans as plain data."""
         return {"plans": self._named, "runs": [one.to_json() for one in self._runs.values()]}
 
     def recall(self, memory: Mapping[str, Any], now: Settled) -> None:
-        """The inverse of `remember`, with conditions written for the present state of the world."""
+        """Restore the plans that `remember` returned, with conditions expanded for the present world."""
         self._named = memory["plans"]
         self._runs = {form["name"]: PlanRun.from_json(form, now) for form in memory["runs"]}
 

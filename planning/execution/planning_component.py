@@ -1,4 +1,4 @@
-"""PlanningComponent offers planning as skills: it finds plans, monitors them, repairs them and validates their end."""
+"""Planning as skills of a component: search, monitoring and repair of plans, and the test of the goal at the end."""
 
 from __future__ import annotations
 
@@ -36,23 +36,24 @@ _PLAN_FOUND = {"plot": "plot", "name": "symbol", "steps": "number"}
 
 
 class PlanningComponent(Component):
-    """The skills behind the plot `achieve` and the plots of plans: `plan`, `monitor`, `hold`, `repair`, `judge`.
+    """The component whose skills `plan`, `monitor`, `hold`, `repair` and `judge` the planning plots call.
 
-    Several plans may run in parallel regions, or one inside a step of another. Each has a name; the component's
-    parameter of that name is the number of the step that has begun.
+    Several plans may be executed in parallel regions, or one plan inside a step of another plan. Each plan has a name.
+    The component has a parameter of that name, whose value is the number of the step that has begun.
 
     Args:
         domain: the planning domain.
-        library: plots that implement its actions, and the holders whose rules are inherited.
-        knowledge: read only.
-        planner: finds plans; an `Improving` one may find better plans later.
-        clock: holds simulated time during a search.
+        library: the plots that implement planning actions, and the plots whose rules the plots of plans inherit.
+        knowledge: the knowledge base; the component only reads it.
+        planner: the planner; an `Improving` planner may find better plans later.
+        clock: the clock of the run; a search stops simulated time.
         trace: receives the records `plan.*`.
-        parallel: whether independent steps run in parallel.
+        parallel: whether independent steps are executed in parallel.
         shared: names of components that can execute several skills concurrently.
-        working_for: names of the components that execute skills for the state that started an action, by the
-            action's id. Their observations belong to the running step and are validated at its end.
-        foresight: simulates plans before their execution.
+        working_for: returns, for the id of an action, the names of the components that execute skills for the state
+            that started the action. Their observations count as effects of the running step, and are validated at the
+            step's end.
+        foresight: simulates each plan before its execution.
     """
 
     name = "planner"
@@ -82,23 +83,23 @@ class PlanningComponent(Component):
         plotting = Plotting(self._derivation, library, knowledge, parallel, {self.name, *shared})
         self._choices = Choices(self._derivation.domain, library)
         self._escalation = Escalation(plotting, self._runs, self._choices, self._search, self._records)
-        self._cancelled: set[asyncio.Task[None]] = set()  # searches that have not ended
-        self._answers: dict[str, Outcome] = {}  # by action, until `forget`
+        self._cancelled: set[asyncio.Task[None]] = set()  # searches that have been cancelled and have not ended
+        self._answers: dict[str, Outcome] = {}  # outcomes by action id, until `forget`
 
     async def over(self) -> None:
-        """Wait for cancelled searches before the program's loop ends.
+        """Wait until cancelled searches have ended; called before the event loop of the run ends.
 
-        A planner that ignores its cancellation is abandoned after `planner_call.STOPPING` seconds.
+        A search that ignores its cancellation is abandoned after `planner_call.STOPPING` seconds.
         """
         if self._cancelled:
             await asyncio.wait(self._cancelled)
 
     def note_choices(self, step: Step) -> None:
-        """Note the plots chosen for planning actions; called by the sequencer."""
+        """Store the plots chosen for planning actions; the sequencer calls this method after each macrostep."""
         self._choices.note(step)
 
     def remember(self) -> Any:
-        """Plans, excluded steps, choices, and the answers that the sequencer has not taken."""
+        """Return plans, excluded steps, choices and outcomes that the sequencer has not received, as data."""
         self._answers = {one: answer for one, answer in self._answers.items() if self._working_for(one)}
         return {
             **self._runs.remember(),
@@ -108,28 +109,28 @@ class PlanningComponent(Component):
         }
 
     def recall(self, memory: Any) -> None:
-        """The inverse of `remember`, in the present world."""
+        """Restore the data that `remember` returned, with the conditions of plans expanded for the present world."""
         self._runs.recall(memory, self._derivation.at(self._knowledge))
         self._search.recall(memory["excluded"])
         self._choices.recall(memory["chosen"])
         self._answers = {one: Outcome(event, attributes) for one, (event, attributes) in memory["answers"].items()}
 
     async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-        """Execute a skill; keep its answer until `forget`, since plans have changed with it."""
+        """Execute a skill and keep its outcome until `forget`, because the skill has already changed the plans."""
         answer = self._answers[call.action_id] = await super().execute(skill_name, call, arguments)
         return answer
 
     async def forget(self, action_id: str) -> None:
-        """Forget an answer that the sequencer has taken."""
+        """Delete the outcome of an action after the sequencer has received it."""
         self._answers.pop(action_id, None)
 
     async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:
-        """Return the answer from before a restart; any other action continues with its plan."""
+        """Return the outcome that was kept before a restart, or report that the action is still running."""
         answer = self._answers.get(action_id)
         return await super().status(action_id, skill_name, arguments) if answer is None else Ended(answer)
 
     async def configure(self, parameter: str, value: Any) -> None:
-        """Begin step number `value` of the plan named `parameter`; this validates the effects of earlier steps."""
+        """Begin step number `value` of the plan `parameter`; the monitor then validates effects of earlier steps."""
         await super().configure(parameter, value)
         run = self._runs.get(parameter)
         if run is not None:
@@ -152,19 +153,19 @@ class PlanningComponent(Component):
         replans: int,
         after: str,
     ) -> Outcome:
-        """Find a plan for the goal and make its plot.
+        """Find a plan for the goal and generate the plot of the plan.
 
-        `after` is the name of the plan that it replaces, if there is one. `no_plan` has the kind `unsolvable`,
-        `timed_out` or `failed`.
+        `after` is the name of the plan that the new one replaces; empty for the first plan. The attribute `kind` of
+        `no_plan` is `unsolvable`, `timed_out` or `failed`.
         """
         try:
             return await self._planned(call, goal, holder, seconds, replans, self._runs.get(after))
-        finally:  # not before: an interrupted search needs the plan again
+        finally:  # at the end, since an interrupted search needs the replaced plan again
             self._runs.over(after)
 
     @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}}, after_crash="repeat")
     async def judge(self, call: SkillCall, goal: str, plan: str = "") -> Outcome:  # noqa: ARG002
-        """Test the goal after the end of `plan`; `goal_open` names the part that does not hold."""
+        """Test the goal after the end of `plan`; `goal_open` contains the part of the goal that does not hold."""
         try:
             wanted = self._derivation.at(self._knowledge).condition(parse_condition(goal))
             why = explain(wanted, self._knowledge)
@@ -184,10 +185,10 @@ class PlanningComponent(Component):
         after_crash="repeat",
     )
     async def monitor(self, call: SkillCall, plan: str) -> Outcome:
-        """Monitor the plan of that name; end with the plan that replaces it, or when it no longer leads to the goal.
+        """Monitor a plan until another plan replaces it, its goal holds, or it no longer leads to the goal.
 
-        A change by another author is validated immediately, a change by the running step at the end of that step. A
-        step with which the new plan begins too continues.
+        The monitor validates a change by another author immediately. It validates a change by the running step at the
+        end of that step. If a new plan begins with the running step, that step continues.
         """
 
         def is_own(author: str) -> bool:
@@ -201,7 +202,7 @@ class PlanningComponent(Component):
 
     @skill(outcomes={"held": {}}, after_crash="repeat")
     async def hold(self, call: SkillCall, plan: str) -> Outcome:  # noqa: ARG002
-        """End when no more steps of that plan may begin, since others follow its running step."""
+        """End with `held` when no further step of the plan may begin, since a successor follows the running step."""
         run = self._runs.get(plan)
         superseded = asyncio.Event() if run is None else run.superseded
         await superseded.wait()
@@ -217,9 +218,9 @@ class PlanningComponent(Component):
         after_crash="repeat",
     )
     async def repair(self, call: SkillCall, plan: str, why: str) -> Outcome:  # noqa: ARG002
-        """Answer the failure of the plan of that name, see `planning.execution.plan_run.EscalationStep`.
+        """Return the answer to the failure of a plan, see `planning.execution.plan_run.EscalationStep`.
 
-        `plan_found` continues without a planner call, `replan` requests one.
+        `plan_found` contains a plan that needs no planner call; `replan` requests a planner call.
         """
         return self._escalation.answer(self._runs.required(plan), why)
 

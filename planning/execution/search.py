@@ -1,6 +1,7 @@
-"""Search asks for plans until one holds in the present world, without steps that failed before.
+"""Search for a plan that is valid in the present world and contains no excluded step.
 
-However a planner behaves, an answer comes within a bound of real time. Only a plan that leads to the goal counts.
+The search ends within a bound of real time, even if the planner does not end. The search returns only plans that lead
+to the goal.
 """
 
 from __future__ import annotations
@@ -38,13 +39,13 @@ if TYPE_CHECKING:
 
 
 class Foresight(Protocol):
-    """A simulation that knows more than the planning domain does, e.g. the physics of a ready world (S1.10)."""
+    """A simulation that models more than the planning domain does, e.g. the physics of a ready world (S1.10)."""
 
     def foresee(self, plan: Plan, world: World) -> Validation:
-        """Simulate the plan from `world`, the world that the robot believes in.
+        """Simulate the plan from `world`, the state of the world that the robot believes, and return the result.
 
-        The search rejects a plan that is not valid, and omits its failing step from the next one. The call runs in its
-        own thread; it must end and change nothing.
+        The search rejects an invalid plan and excludes the failing step from the next plan. This method runs in a
+        separate thread; it must end, and must not change any state.
         """
         ...
 
@@ -54,24 +55,24 @@ _Result = TypeVar("_Result")
 EXCLUDED_SECONDS = 120.0
 """Seconds of run time for which new plans omit a step that failed repeatedly."""
 MAX_ATTEMPTS = 3
-"""The number of searches for one plan while the world changes."""
+"""The maximum number of searches for one plan if the world changes during each search."""
 MAX_REJECTED = 5
-"""The number of plans that the simulation may reject."""
+"""The maximum number of plans that the simulation may reject."""
 _IN_CONCERT = "the only plan has concurrent steps that need each other, which no plot executes yet"
 LOCAL_REPAIR_SECONDS = 2.0
-"""Bound of real time for a local repair."""
+"""The limit of real time for a local repair, in seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A plan that leads to the goal from the present.
+    """A plan that leads from the present world to the goal.
 
     Attributes:
-        answer: the plan, and where it comes from.
-        kept: the number of last steps that it shares with the plan before.
-        better: better plans of the planner; the caller closes them.
-        order: its partial order, computed by the validation; `None` for a plan with a schedule.
-        version: of the knowledge that it was validated on.
+        answer: the outcome of the planner, with the plan.
+        kept: the number of last steps that the plan shares with the replaced plan.
+        better: the better plans of the planner; the caller must close them.
+        order: the partial order of the plan, computed by the validation; `None` for a plan with a schedule.
+        version: the version of the knowledge base on which the plan was validated.
     """
 
     answer: PlanFound
@@ -82,34 +83,39 @@ class Found:
 
     @property
     def steps(self) -> tuple[PlanStep, ...]:
-        """The plan's steps."""
+        """The steps of the plan."""
         return self.answer.plan.steps
 
     def known_order(self, steps: tuple[PlanStep, ...], version: int) -> PartialOrder | None:
-        """The order, if the plan has these steps, at this version of the knowledge."""
+        """Return the partial order if the plan has these steps and was validated on this version; otherwise `None`."""
         return self.order if self.version == version and self.steps == steps else None
 
     async def close(self) -> None:
-        """Close the better plans."""
+        """Close the generator of better plans."""
         if self.better is not None:
             await self.better.aclose()
 
 
 @dataclass(frozen=True, slots=True)
 class NotFound:
-    """No plan: `kind` is `unsolvable`, `timed_out` or `failed`, `reason` says more."""
+    """Result of a search without a plan.
+
+    Attributes:
+        kind: `unsolvable`, `timed_out` or `failed`.
+        reason: the explanation, as text.
+    """
 
     kind: str
     reason: str
 
 
 class Search:
-    """Finds plans for goals, and remembers the excluded steps.
+    """Search for plans, with a list of excluded steps.
 
     Args:
-        domain, knowledge, planner, clock: as in the planning component.
-        records: receives excluded, readmitted and rejected steps.
-        foresight: has to agree with a plan before it counts.
+        domain, knowledge, planner, clock: see `PlanningComponent`.
+        records: receives a record of each excluded, readmitted and rejected step.
+        foresight: simulates each plan; the search returns only plans that the simulation accepts.
     """
 
     def __init__(
@@ -130,31 +136,31 @@ class Search:
         self._excluded: dict[PlanStep, float] = {}
 
     def exclude(self, step: PlanStep, why: str) -> None:
-        """Exclude a step from new plans for some seconds."""
+        """Exclude a step from new plans for `EXCLUDED_SECONDS` of run time, and record the reason `why`."""
         self._excluded[step] = self._clock.now() + EXCLUDED_SECONDS
         self._records.excluded(step, EXCLUDED_SECONDS, why)
 
     def remember(self) -> list[Any]:
-        """The excluded steps and the ends of their exclusion, as plain data."""
+        """Return the excluded steps and the times at which their exclusions end, as plain data."""
         return [[step.to_json(), until] for step, until in self._excluded.items()]
 
     def recall(self, memory: Iterable[Any]) -> None:
-        """The inverse of `remember`."""
+        """Restore the excluded steps from the data that `remember` returned."""
         self._excluded = {PlanStep.from_json(step): until for step, until in memory}
 
     async def plan(
         self, goal: Expression, seconds: float, before: PlanProgress | None, sleep: Callable[[float], Awaitable[None]]
     ) -> Found | NotFound:
-        """Return a plan for the goal that is valid in the present world when it is found.
+        """Return a plan that is valid in the world at the end of the search.
 
         Args:
-            goal: a condition.
+            goal: the condition to reach.
             seconds: real time for one search.
-            before: the plan that it replaces, and that a local repair may keep in part.
-            sleep: passes the simulated time of a search; an interrupted search has begun earlier.
+            before: the plan to replace; a local repair may keep some of its steps.
+            sleep: waits for the simulated duration of a search. After an interruption it counts from the first start.
 
         Raises:
-            InputError: the goal names a missing object, or needs more than any engine supports.
+            InputError: the goal contains a missing object, or needs a feature that no engine supports.
         """
         rejected: dict[PlanStep, str] = {}
         changed = 0
@@ -191,8 +197,8 @@ class Search:
                 return NotFound("failed", f"the world changes faster than plans are made: {verdict.why}")
 
     def _judged(self, plan: Plan, goal: Expression) -> tuple[Validation, PartialOrder | None]:
-        """Validate the plan and compute its order, in one pass over its steps."""
-        world = self._knowledge.snapshot()  # its reads need no lock
+        """Validate the plan and compute its partial order, in one pass over the steps."""
+        world = self._knowledge.snapshot()  # reads of a snapshot need no lock
         if not plan.schedule:
             with contextlib.suppress(InputError):
                 return Validation(valid=True), deordered(plan, self._domain, world, goal)
@@ -213,7 +219,7 @@ class Search:
         rejected: dict[PlanStep, str],
         snapshot: WorldState,
     ) -> Found | NotFound:
-        """Return a plan for the world of the snapshot."""
+        """Search for a plan in the world of the snapshot, first by local repair, then by a planner call."""
         budget = WorkLimit(seconds)
         repaired = None if before is None else await self._repaired(goal, seconds / 2, before, snapshot)
         if isinstance(repaired, Found):
@@ -236,17 +242,17 @@ class Search:
             return NotFound("unsolvable", f"the simulation foresees that every plan fails: {reasons}")
         missing: tuple[str, ...] = ()
         left = WorkLimit(budget.left)
-        with contextlib.suppress(WorkLimitError):  # the search for the missing conditions takes too long
+        with contextlib.suppress(WorkLimitError):  # the explanation takes too long; the reason of the planner suffices
             missing = await self._aside(lambda: why_unsolvable(self._domain, snapshot, goal, left), left)
         return NotFound("unsolvable", "; ".join(missing) or answer.reason)
 
     async def _aside(self, work: Callable[[], _Result], patience: WorkLimit | None = None) -> _Result:
-        """Do the work in a thread, so that a cancellation ends the wait; simulated time does not pass meanwhile."""
+        """Call `work` in a thread; a cancellation ends the wait, and simulated time stops during the call."""
         with self._clock.hold():
             return await aside(work, patience)
 
     async def _answer(self, problem: Problem, seconds: float, rejected: Collection[PlanStep]) -> Answer:
-        """Return the planner's answer, without the excluded steps if a plan without them exists."""
+        """Return the planner's outcome for the problem without excluded steps; readmit them if no such plan exists."""
         excluded, patience = self._excluded_now(), WorkLimit(seconds)
         answer, better = await self._planner.solve(without(problem, {*excluded, *rejected}), seconds)
         if isinstance(answer, ProvenUnsolvable) and excluded and not problem.unreachable:
@@ -258,7 +264,7 @@ class Search:
     async def _repaired(
         self, goal: Expression, seconds: float, before: PlanProgress, snapshot: WorldState
     ) -> Found | TimedOut | None:
-        """Return the local repair of the plan before; `TimedOut` at a limit of real time."""
+        """Return a local repair of the plan `before`; `TimedOut` at the time limit, or `None` without a repair."""
         excluded, patience = self._excluded_now(), WorkLimit(seconds)
         try:
             how = await self._aside(
@@ -295,7 +301,7 @@ class Search:
 def _unknown(
     answer: NoneFound | TimedOut | EngineFailed | NobodyCan, domain: PlanningDomain, goal: Expression, seconds: float
 ) -> NotFound:
-    """Describe an answer without a plan and without a proof."""
+    """Convert an outcome without a plan and without a proof of unsolvability."""
     match answer:
         case NoneFound(reason=reason):
             return NotFound("unsolvable", reason)
@@ -308,7 +314,7 @@ def _unknown(
 
 
 def without(problem: Problem, steps: Collection[PlanStep]) -> Problem:
-    """Return the problem of reaching the goal without any of these steps."""
+    """Return the problem without the ground actions of these steps."""
     if not steps:
         return problem
     allowed = tuple(action for action in problem.actions if action.step not in steps)
