@@ -1,4 +1,4 @@
-"""A behaviour tree as a skill (S4.7), through the extra `bt` (py_trees): it is ticked only while the skill is active.
+"""Behaviour trees as skills (S4.7), with the extra `bt` (py_trees); a tree is ticked only while its skill is active.
 
 ```python
 class Butler(Component):
@@ -35,9 +35,9 @@ from knowledge_base.language.checking.inputs import shown
 PERIOD = 0.1
 """Seconds between two ticks."""
 FOREVER = -1
-"""Number of repetitions without end."""
+"""Argument `times` of `repeat` for repetition without end."""
 _observe: ContextVar[Callable[[Delta], None]] = ContextVar("observe")
-"""Receives the observations of a tree's actions; each skill runs in a separate context."""
+"""Function that receives the observations of a tree's actions; each skill runs in a separate context."""
 _Body = TypeVar("_Body", bound=Callable[..., Behaviour])
 
 
@@ -49,21 +49,21 @@ def tree_skill(
     period: float = PERIOD,
     after_crash: AfterCrash = "sense",
 ) -> Callable[[_Body], _Body]:
-    """Declare a method that returns a behaviour tree as a skill; each call makes a new tree.
+    """Declare a method that returns a behaviour tree as a skill; each call creates a new tree.
 
-    An action's observation is asserted when the action ends, regardless of the skill's outcome.
+    The observation of an action is asserted when the action ends, regardless of the skill's outcome.
 
     Args:
         success: the outcome when the root succeeds.
-        failure: the outcome when it fails.
-        outcomes: these two without attributes, and those that actions report.
-        types: of the parameters, as for `skill`.
+        failure: the outcome when the root fails.
+        outcomes: `success` and `failure`, both without attributes, and the outcomes that actions report.
+        types: types of the parameters, as for `skill`.
         period: seconds of run time between two ticks.
-        after_crash: as for `skill`; the tree then starts again.
+        after_crash: as for `skill`; a repeated skill starts its tree again from the root.
 
     Raises:
-        UnknownNameError: success or failure is not among the outcomes.
-        InputError: it has attributes, or the outcomes are not a mapping.
+        UnknownNameError: `success` or `failure` is not among the outcomes.
+        InputError: `success` or `failure` has attributes, or the outcomes are not a mapping.
     """
     require_names(outcomes, "the outcomes of a tree", "outcomes={'served': {}, 'not_served': {}}")
     for end in (success, failure):
@@ -94,38 +94,43 @@ def _require_bare(end: str, outcomes: Mapping[str, Mapping[str, str | None]]) ->
 
 
 def sequence(*children: Behaviour, name: str = "sequence", reactive: bool = False) -> Behaviour:
-    """Run the children in order, until one fails; if `reactive`, each tick starts with the first child.
+    """Return a node that runs the children in order, until one fails.
 
-    A condition before an action holds when the action begins or, if `reactive`, while it runs. An action before another
-    one is then started again, too.
+    If `reactive`, each tick starts with the first child. A condition before an action is then true during the whole
+    action; without `reactive`, the condition is only tested before the action begins. If `reactive`, an action that
+    precedes another action is started again at each tick.
     """
     return Sequence(name, memory=not reactive, children=list(children))
 
 
 def fallback(*children: Behaviour, name: str = "fallback", reactive: bool = False) -> Behaviour:
-    """Run the children in order, until one succeeds; if `reactive`, each tick starts with the first child."""
+    """Return a node that runs the children in order, until one succeeds.
+
+    If `reactive`, each tick starts with the first child.
+    """
     return Selector(name, memory=not reactive, children=list(children))
 
 
 def repeat(child: Behaviour, times: int = FOREVER) -> Behaviour:
-    """Run the child that many times; fail when it fails."""
+    """Return a node that runs the child `times` times, and fails as soon as the child fails."""
     return Repeat(f"repeat {child.name}", child, times)
 
 
 def retry(child: Behaviour, times: int) -> Behaviour:
-    """Run the child until it succeeds, at most that many times."""
+    """Return a node that runs the child until it succeeds, at most `times` times."""
     return Retry(f"retry {child.name}", child, times)
 
 
 def condition(name: str, holds: Callable[[], bool]) -> Behaviour:
-    """Succeed if the test is true at the tick, else fail."""
+    """Return a leaf that succeeds if `holds()` is true at the tick, else fails."""
     return _Condition(name, holds)
 
 
 def action(name: str, begin: Callable[[], Awaitable[Outcome]], ends: Collection[str]) -> Behaviour:
-    """Run a coroutine, e.g. another skill; succeed if it ends with one of these outcomes, else fail.
+    """Return a leaf that runs a coroutine, e.g. another skill.
 
-    An exception of the coroutine ends the whole skill. When the tree leaves the action, the coroutine is cancelled.
+    The leaf succeeds if the coroutine ends with an outcome in `ends`, else it fails. An exception of the coroutine ends
+    the whole skill. The coroutine is cancelled when the tree leaves the leaf.
     """
     return _Action(name, begin, frozenset(ends))
 
@@ -171,7 +176,7 @@ class _Action(Behaviour):
 
 
 async def _halt(root: Behaviour) -> None:
-    """Cancel the running actions of the tree, and wait for them."""
+    """Cancel the running actions of the tree, and wait until they have stopped."""
     if root.status is Status.RUNNING:
         root.stop(Status.INVALID)
     stopping = [task for one in root.iterate() if isinstance(one, _Action) for task in one.stopping]

@@ -1,4 +1,4 @@
-"""Component: a deployed part of the robot with skills, parameters, modes and a life cycle."""
+"""Components: deployed parts of the robot with skills, parameters, modes and a life cycle."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_argu
 from knowledge_base.errors import UnknownNameError
 
 ALWAYS = ""
-"""Stands for every mode in `ComponentHooks.needs`."""
+"""Key of `ComponentHooks.needs` that applies in every mode."""
 
 
 class ComponentHooks:
-    """Attributes to set and hooks to override in a subclass of `Component`; all are optional.
+    """Attributes and hooks that a subclass of `Component` may override; all are optional.
 
     Attributes:
-        name: the name in charts; the deployment may choose another.
-        domain: its part of the planning domain: a PDDL file, or PDDL text; `None` for nothing.
-        concurrent: whether it executes several skills together. If not, steps of a plan that use it never overlap;
-            plots may still start them in parallel.
+        name: the name in charts; the deployment may choose another name.
+        domain: the component's part of the planning domain: a PDDL file or PDDL text; `None` without such a part.
+        concurrent: whether the component executes several skills concurrently. If not, steps of a plan that use the
+            component never overlap; plots may still start its skills in parallel.
         modes: the sub-states of Alive besides `neutral`; if empty, any mode is valid.
-        declares: its parameters with type, range and the roles that may change them; if empty, any name is valid.
-        relations: conditions between its parameters that always hold.
-        needs: mode -> a tuple of names of required components; `ALWAYS`: in every mode.
+        declares: the parameters with type, range and the roles that may change them; if empty, any name is valid.
+        relations: conditions between the parameters that must always be true.
+        needs: for each mode, a tuple of names of required components; the key `ALWAYS` applies in every mode.
         parameters: the present values, by name.
-        life: its life cycle; call `self.life.become(Life.FATAL_ERROR, "no power")` when the device is lost.
+        life: the life cycle. When the device is lost, call `self.life.become(Life.FATAL_ERROR, "no power")`.
     """
 
     name: str = ""
@@ -48,84 +48,87 @@ class ComponentHooks:
     life: LifeCycle
 
     async def start(self) -> None:
-        """From Init to Alive: override to open devices; an error leads to FatalError."""
+        """Change from Init to Alive. Override to open devices; an error leads to FatalError."""
 
     async def stop(self) -> None:
-        """To Shutdown: override to close devices."""
+        """Change to Shutdown. Override to close devices."""
 
     async def activate(self, active: bool) -> None:  # noqa: FBT001
-        """Become active for a state or an active component, or inactive (S1.9, S4.1).
+        """Become active for a state or an active component, or become inactive (S1.9, S4.1).
 
-        Override to acquire and release resources. The first call comes between `start` and the first skill, and a
-        restart repeats it. `False` only follows `True`. An error leads to FatalError.
+        Override to acquire resources if `active`, and to release them if not. The first call comes between `start` and
+        the first skill, and is repeated after a restart. A call with `False` only follows a call with `True`. An error
+        leads to FatalError.
         """
 
     async def configure(self, parameter: str, value: object) -> None:
-        """The *param* port: set a named parameter; override to react.
+        """Set a named parameter, for the *param* port; override to react to the new value.
 
-        `None` resets a declared one. Parameters that depend on it are unbound, see `Parameter.depends_on`.
+        The value `None` resets a declared parameter. The parameters that depend on it are reset too, see
+        `Parameter.depends_on`.
 
         Raises:
-            UnknownNameError: the component declares its parameters, and this is not among them.
+            UnknownNameError: the component declares parameters, and `parameter` is not among them.
             InputError: the value violates its declaration or a relation.
         """
         self.parameters.configure(parameter, value)
 
     async def switch(self, mode: str) -> None:
-        """The *state* port: enter a mode (`neutral` when idle); override to react."""
+        """Enter a mode (`neutral` when idle), for the *state* port; override to react."""
         self.life.mode = mode
 
 
 class RestartHooks:
-    """Hooks for runs with a store, which a component overrides if its actions or data outlive the program."""
+    """Hooks for runs with a store; a component overrides them if its actions or data outlast the program."""
 
     async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
-        """The status of an action that another process started; override to query the robot.
+        """Return the status of an action that another process started; override to query the robot.
 
-        After `RUNNING` and `NOT_BEGUN` the skill is executed with that id: it awaits the end of the action, or begins
-        it. After `UNKNOWN` the skill's `after_crash` decides.
+        After `RUNNING` and `NOT_BEGUN`, the skill is executed with that id: the skill then awaits the end of the
+        running action, or begins the action. After `UNKNOWN`, the skill's `after_crash` determines the reaction.
         """
         return Status.UNKNOWN
 
     async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
         """Stop an action that was cancelled just before a crash, if it still runs.
 
-        The cancellation may not have reached the robot. Override it if actions survive this process.
+        The cancellation may not have reached the robot. Override this hook if actions outlast this process.
 
         Returns:
-            Its end, if it ended before it was stopped: these observations are true.
+            The action's end, if the action ended before it was stopped, as its observations are true; else `None`.
         """
         return None
 
     async def forget(self, action_id: str) -> None:
-        """Forget the end of an action: it was taken and, with a store, is kept.
+        """Delete the stored end of an action: the sequencer has handled it and, with a store, has written it.
 
-        Override it if ends are remembered for `status`.
+        Override this hook if the component stores ends for `status`.
         """
 
     def remember(self) -> Any:
-        """Plain data for `recall` after a restart; called with each macrostep that is committed."""
+        """Return plain data for `recall` after a restart; called with each committed macrostep."""
         return None
 
     def recall(self, memory: Any) -> None:
-        """Restore the state at the time of `memory`; called first after a restart."""
+        """Restore the state at the time of `memory`; after a restart, this hook is called before all others."""
 
 
 class Component(ComponentHooks, RestartHooks):
-    """Base class of components: the ports through which sequencer, supervisors and hosts use one.
+    """Base class of components, with the ports that the sequencer, supervisors and hosts use.
 
     A subclass declares skills and ports by decorators, and overrides `ComponentHooks` and `RestartHooks`.
 
     Attributes:
-        activations: the activations of its events.
-        pushes, streams: its push ports and its subscriptions to others, by name; see `dsc.components.streams`.
+        activations: the activations of the component's events.
+        pushes: the push ports, by name; see `dsc.components.streams`.
+        streams: the subscriptions to push ports of other components, by name.
     """
 
     _ports: ClassVar[Mapping[str, Push | Stream]] = {}
     _functions: Mapping[str, SkillBody] = {}  # skills that are functions
 
     def __init_subclass__(cls, **named: Any) -> None:
-        """Validate the declared parameters, and collect the ports; raises `InputError`."""
+        """Validate the declared parameters, and collect the ports; raise `InputError` for an invalid declaration."""
         super().__init_subclass__(**named)
         check_declarations(cls.name or cls.__name__.lower(), cls.declares, cls.relations, cls.__module__)
         cls._ports = {name: one for name, one in inspect.getmembers(cls) if isinstance(one, Push | Stream)}
@@ -147,7 +150,7 @@ class Component(ComponentHooks, RestartHooks):
 
     @property
     def mode(self) -> str:
-        """The sub-state of Alive, `neutral` when idle."""
+        """The sub-state of Alive; `neutral` when idle."""
         return self.life.mode
 
     @mode.setter
@@ -155,24 +158,28 @@ class Component(ComponentHooks, RestartHooks):
         self.life.mode = mode
 
     def needed(self) -> tuple[str, ...]:
-        """Names of required components in the present mode; override it if they depend on more than the mode."""
+        """Return the names of required components in the present mode; override if other values determine them."""
         return tuple(dict.fromkeys((*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))))
 
     async def reach(self, name: str) -> Component:  # noqa: ARG002
-        """Wait for a required component that is not deployed here; override it where others can be found."""
+        """Wait for a required component that is not deployed in this process.
+
+        The default waits without end. Override this method if such components can be found elsewhere.
+        """
         never: asyncio.Future[Component] = asyncio.get_running_loop().create_future()
         return await never
 
     def skills(self) -> dict[str, SkillSignature]:
-        """The signatures of all decorated methods, by skill name."""
+        """Return the signatures of all decorated methods, by skill name."""
         return dict(signatures(type(self), self.name))  # type: ignore[arg-type]  # mypy: classes are hashable
 
     def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Awaitable[Outcome]:
-        """Start the named skill; the sequencer's dispatcher awaits and may cancel it.
+        """Start the named skill and return its awaitable outcome; the dispatcher awaits and may cancel it.
 
         Raises:
             UnknownNameError: the component has no such skill.
             InputError: an argument is missing or unknown.
+            SchemaError: a declared parameter of the component has no value.
         """
         signatures = self.skills()
         signature = signatures.get(skill_name)
@@ -188,12 +195,14 @@ class Component(ComponentHooks, RestartHooks):
         return declared.carry_out(self, body, call, arguments)
 
     async def configure_all(self, values: Mapping[str, Any]) -> None:
-        """Restore the parameters of before a restart: validate them as one set, then `configure` each.
+        """Restore the parameters after a restart: validate them as one set, then `configure` each.
 
-        They come in the order of their last changes, as each change unbinds the parameters that depend on it.
+        The parameters must be in the order of their last changes, as each change resets the parameters that depend on
+        it.
 
         Raises:
-            UnknownNameError, InputError: as `configure`; if one value is invalid, none is set.
+            UnknownNameError: the component declares parameters, and a name is not among them.
+            InputError: a value violates its declaration or a relation; then no value is set.
         """
         with self.parameters.as_one_set(values):
             for parameter, value in values.items():
@@ -203,7 +212,7 @@ class Component(ComponentHooks, RestartHooks):
         """Execute a chart's `switch`: enter a mode, restart (`init`) or shut down (`shutdown`).
 
         Raises:
-            UnknownNameError: the component declares its modes, and this is not among them.
+            UnknownNameError: the component declares its modes, and `mode` is not among them.
         """
         if mode == Life.INIT:
             self.life.become(Life.INIT)
@@ -218,10 +227,10 @@ class Component(ComponentHooks, RestartHooks):
             await self.switch(mode)
 
     async def take(self, port: str, message: Mapping[str, Any]) -> None:
-        """The *send* port: a one-way message for the method of that name with the decorator `takes`.
+        """Pass a one-way message to the method `port`, which has the decorator `takes`; for the *send* port.
 
         Raises:
-            UnknownNameError: there is no such method.
+            UnknownNameError: the component has no such method.
             InputError: a part of the message is missing or unknown.
         """
         taking = {n: m for n, m in inspect.getmembers(type(self), inspect.isfunction) if hasattr(m, TAKES)}
@@ -231,7 +240,7 @@ class Component(ComponentHooks, RestartHooks):
         await getattr(self, port)(**message)
 
     def update(self, event: str, *values: Any) -> None:
-        """Test a new value for each activation of the event, and for later ones at their beginning.
+        """Pass new values to the test of each activation of the event; later activations begin with these values.
 
         Raises:
             UnknownNameError: the component has no such event.
@@ -242,7 +251,7 @@ class Component(ComponentHooks, RestartHooks):
         self.activations.update(event, values)
 
     async def diagnose(self) -> dict[str, Any]:
-        """The *diagnose* port: its status as plain data; override it to add more."""
+        """Return the status as plain data, for the *diagnose* port; override to add more."""
         return {
             "component": self.name,
             "life": str(self.life.state),

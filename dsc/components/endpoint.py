@@ -1,12 +1,13 @@
-"""Endpoint: an address on a transport, for calls that are executed at most once, and pushes of which the newest counts.
+"""Endpoints: addresses on a transport, for calls that are executed at most once, and for pushes.
 
-A call is sent again until its answer arrives, and the receiver keeps the answer until the caller has it. So every
-pattern with an answer (query, param, state, send, event) survives loss, duplicates and reordering. A call without an
-answer in time raises `NoAnswerError`. Pushes are sent once; an overtaken push is dropped.
+An endpoint repeats a call until its answer arrives. The receiver stores the answer until the caller has received it. So
+every pattern with an answer (query, param, state, send, event) tolerates loss, duplicates and reordering of frames. A
+call without an answer in time raises `NoAnswerError`. Pushes are sent one time; a push that arrives after a newer one
+is dropped.
 
-Any bytes may arrive. A frame in another form, or beyond a bound, is dropped and counted; a caller sends its frame
-again. A peer is remembered until it has been silent for `REMEMBERED` seconds. So a flood from new addresses cannot
-cause a second execution.
+Any bytes may arrive. A malformed frame, or a frame beyond a bound, is dropped and counted; its caller sends it again.
+An endpoint remembers a peer until `REMEMBERED` seconds after the peer's last frame. So a flood of frames from new
+addresses cannot cause a second execution of a call.
 """
 
 from __future__ import annotations
@@ -23,87 +24,87 @@ from dsc.components.hooks import contained
 from knowledge_base.errors import InputError, described, text_of
 
 Answers = Callable[[str, Any], Awaitable[Any]]
-"""Answers a call; receives the sender's address and the body."""
+"""Function that answers a call; receives the sender's address and the body."""
 Hears = Callable[[str, Any], None]
-"""Takes a push; receives the sender's address and the body."""
+"""Function that handles a push; receives the sender's address and the body."""
 Receive = Callable[[str, bytes], None]
-"""Takes a frame; receives the sender's address and the frame."""
+"""Function that handles a frame; receives the sender's address and the frame."""
 EVERYBODY = "*"
-"""The address of all other attached endpoints."""
+"""The address of all attached endpoints except the sender."""
 WITHIN = 5.0
-"""Seconds for a call, by default."""
+"""Default timeout of a call, in seconds."""
 AGAIN = 0.2
 """Seconds after which an unanswered call is sent again."""
 MOST_PEERS = 1_000
-"""Lives of senders that an endpoint remembers."""
+"""Number of senders that an endpoint remembers; a restarted sender counts as a new one."""
 REMEMBERED = 60.0
-"""Seconds of silence after which one of `MOST_PEERS` senders may be forgotten."""
+"""Seconds without a frame after which a full endpoint may forget a sender."""
 MOST_CALLS = 1_000
-"""Calls of one sender that are running, or whose answer it may still need."""
+"""Number of calls of one sender that are running, or whose answer the sender may still need."""
 _LONGEST = 1_000
-"""Characters of the name of a kind or a life."""
+"""Maximum number of characters of a `kind` or `life` in a frame."""
 
 
 class NoAnswerError(Exception):
-    """No answer has come in time: the other side is gone, late, or unreachable."""
+    """No answer arrived in time: the other endpoint has ended, is late, or is unreachable."""
 
 
 class RefusedError(Exception):
-    """The other side could not execute a call; the message has its reason."""
+    """The other endpoint could not execute a call; the message has its reason."""
 
 
 class Transport(Protocol):
-    """Carries frames without guarantees; `dsc.testing.transport_suite` tests it."""
+    """A carrier of frames without guarantees; `dsc.testing.transport_suite` tests an implementation."""
 
     def attach(self, address: str, receive: Receive) -> None:
         """Pass frames for the address to `receive`, from the loop's own thread.
 
         Raises:
-            InputError: another endpoint in this program has the address; both would share it.
+            InputError: another endpoint in this program has the address.
         """
         ...
 
     def detach(self, address: str) -> None:
-        """Pass no more frames for the address, if it is attached."""
+        """Stop passing frames for the address, if it is attached."""
         ...
 
     def send(self, sender: str, to: str, frame: bytes) -> None:
-        """Send a frame to an address, or to `EVERYBODY`. It may be lost, doubled, late, or overtaken."""
+        """Send a frame to an address, or to `EVERYBODY`. The frame may be lost, duplicated, delayed, or overtaken."""
         ...
 
 
 class LocalTransport:
-    """Inside one process: every frame arrives, once, in order."""
+    """A transport inside one process: every frame arrives, one time, in order."""
 
     def __init__(self) -> None:
         self._attached: dict[str, Receive] = {}
 
     def attach(self, address: str, receive: Receive) -> None:
-        """Pass frames for the address to `receive`; raises `InputError` if it is in use."""
+        """Pass frames for the address to `receive`; raise `InputError` if the address is in use."""
         if address in self._attached:
             message = f"the address '{address}' is in use: share its endpoint (`host.endpoint`), or close it first"
             raise InputError(message, found=address)
         self._attached[address] = receive
 
     def detach(self, address: str) -> None:
-        """Pass no more frames for the address."""
+        """Stop passing frames for the address."""
         self._attached.pop(address, None)
 
     def send(self, sender: str, to: str, frame: bytes) -> None:
-        """Send a frame; it arrives with the loop's next turn."""
+        """Send a frame; it arrives in the next iteration of the loop."""
         asyncio.get_running_loop().call_soon(self.deliver, sender, to, frame)
 
     def deliver(self, sender: str, to: str, frame: bytes) -> None:
-        """Pass a frame on now."""
+        """Pass a frame to its receivers immediately."""
         others = [address for address in self._attached if address != sender] if to == EVERYBODY else [to]
         for address in others:
-            receive = self._attached.get(address)  # an earlier receiver may have detached it
+            receive = self._attached.get(address)  # an earlier receiver may have detached the address
             if receive is not None:
                 receive(sender, frame)
 
 
 def encoded(value: Any) -> bytes:
-    """Plain data as a frame; raises `InputError` for other data."""
+    """Return plain data as a frame; raise `InputError` for other data."""
     try:
         return json.dumps(value, separators=(",", ":"), allow_nan=False).encode()
     except (TypeError, ValueError, RecursionError) as error:
@@ -112,13 +113,13 @@ def encoded(value: Any) -> bytes:
 
 @dataclass(slots=True)
 class _Peer:
-    """One life of one sender.
+    """One sender between its start and its end; a restarted sender is another peer.
 
     Attributes:
-        answers: by the call's number; `None` while it runs.
+        answers: encoded answers by the call's number; `None` while the call runs.
         newest: the number of the newest push of each kind.
         forgotten: answers to calls with smaller numbers are dropped.
-        at: the second of its last frame.
+        at: loop time of the sender's last frame, in seconds.
     """
 
     answers: dict[int, bytes | None] = field(default_factory=dict)
@@ -128,17 +129,17 @@ class _Peer:
 
 
 class Endpoint:
-    """One address on a transport; for the loop's own thread.
+    """One address on a transport; use it only in the loop's own thread.
 
     Attributes:
-        address: its name for others.
-        life: distinguishes it from earlier endpoints at the address.
+        address: the name for other endpoints.
+        life: identifier that distinguishes this endpoint from earlier ones at the address.
         dropped: number of dropped frames, by reason.
 
     Args:
-        address: its name for others.
-        transport: carries its frames.
-        life: random by default.
+        address: the name for other endpoints.
+        transport: carries the frames.
+        life: the identifier; random by default.
     """
 
     def __init__(self, address: str, transport: Transport, life: str | None = None) -> None:
@@ -156,25 +157,25 @@ class Endpoint:
         transport.attach(address, self._receive)
 
     def answer(self, kind: str, answers: Answers) -> None:
-        """Answer calls of that kind: each is executed at most once, even if it is sent again."""
+        """Answer calls of that kind with `answers`; a repeated call is executed only one time."""
         self._answering[kind] = answers
 
     def hear(self, kind: str, hears: Hears) -> None:
-        """Take pushes of that kind, none older than the last one from the same sender."""
+        """Pass pushes of that kind to `hears`, except those older than the sender's newest push."""
         self._hearing[kind] = hears
 
     def deafen(self, kind: str) -> None:
-        """Take no more pushes of that kind."""
+        """Stop handling pushes of that kind."""
         self._hearing.pop(kind, None)
         for peer in self._peers.values():
             peer.newest.pop(kind, None)
 
     async def call(self, to: str, kind: str, body: Any = None, within: float = WITHIN) -> Any:
-        """Send a call to the address, and wait for its answer.
+        """Send a call to the address, and return its answer.
 
         Raises:
-            NoAnswerError: no answer has come within that many seconds. It may have been executed.
-            RefusedError: the other side could not execute it.
+            NoAnswerError: no answer arrived within that many seconds; the call may have been executed.
+            RefusedError: the other endpoint could not execute the call.
             InputError: the body is not plain data.
         """
         number = self._last = self._last + 1
@@ -192,16 +193,16 @@ class Endpoint:
             del self._asked[number]
 
     def push(self, to: str, kind: str, body: Any) -> None:
-        """Send a push to an address, which may be lost; raises `InputError` if it is not plain data."""
+        """Send a push, which may be lost, to an address; raise `InputError` if the body is not plain data."""
         self._last += 1
         self._send(to, "push", kind, self._last, body)
 
     def broadcast(self, kind: str, body: Any) -> None:
-        """Push to `EVERYBODY`."""
+        """Send a push to `EVERYBODY`."""
         self.push(EVERYBODY, kind, body)
 
     async def close(self) -> None:
-        """Leave the address, and cancel running calls."""
+        """Detach from the address, and cancel running calls."""
         self._transport.detach(self.address)
         for task in self._running:
             task.cancel()
@@ -211,7 +212,7 @@ class Endpoint:
     # -- frames ------------------------------------------------------------------------------------------
 
     def _send(self, to: str, what: str, kind: str, number: int, body: Any) -> None:
-        # The receiver may forget answers to calls before `low`: this endpoint does not wait for them.
+        # The receiver may forget answers to calls before `low`: this endpoint no longer waits for them.
         low = min(self._asked, default=number)
         frame = {"what": what, "kind": kind, "n": number, "low": low, "life": self.life, "body": body}
         self._transport.send(self.address, to, encoded(frame))
@@ -231,7 +232,7 @@ class Endpoint:
             self._heard(sender, peer, said)
 
     def _peer(self, sender: str, life: str) -> _Peer | None:
-        """The peer of a frame; `None` if it is new and beyond the bound."""
+        """Return the peer that sent a frame; `None` if the peer is new and the endpoint remembers too many."""
         now, peer = asyncio.get_running_loop().time(), self._peers.get((sender, life))
         if peer is None:
             if len(self._peers) >= MOST_PEERS:
@@ -257,7 +258,7 @@ class Endpoint:
             try:
                 with contained():
                     self._hearing[kind](sender, said["body"])
-            except Exception:  # noqa: BLE001  # a faulty push must not stop the others
+            except Exception:  # noqa: BLE001  # a faulty push must not stop other pushes
                 self.dropped[f"push '{kind}' that cannot be read"] += 1
 
     def _answered(self, said: Mapping[str, Any]) -> None:
@@ -275,7 +276,7 @@ class Endpoint:
             peer.forgotten = said["low"]
             peer.answers = {n: answer for n, answer in peer.answers.items() if n >= peer.forgotten}
         if number < peer.forgotten:
-            return  # a late duplicate: the caller no longer waits
+            return  # a late duplicate: the caller no longer waits for an answer
         if number in peer.answers:
             again = peer.answers[number]
             if again is not None:
@@ -310,7 +311,7 @@ class Endpoint:
 
 
 def _frame(frame: bytes) -> dict[str, Any] | None:
-    """The content of a frame; `None` if no endpoint can have sent it."""
+    """Return the content of a frame; `None` if no endpoint can have sent the frame."""
     try:
         said = json.loads(frame)
     except (ValueError, TypeError, RecursionError):

@@ -1,4 +1,4 @@
-"""Heartbeats carry the activation tree over a transport: active components name their needs (S1.9, S4.1)."""
+"""Heartbeats: the activation tree over a transport; active components broadcast their needs (S1.9, S4.1)."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from dsc.components.endpoint import Endpoint
 BEAT = 0.5
 """Seconds between heartbeats."""
 SILENCE = 3.0
-"""Seconds without a heartbeat after which a component counts as gone: some may be lost."""
+"""Seconds without a heartbeat after which a component counts as gone, as single heartbeats may be lost."""
 
 Changed = Callable[[bool], Awaitable[None]]
-"""Called when the component becomes active, to take its resources, or inactive, to free them."""
+"""Function that acquires a component's resources when it becomes active (`True`), and releases them otherwise."""
 
 
 class Heartbeat:
     """One component's part in the activation tree.
 
     Args:
-        endpoint: its address.
-        needs: names of the components it needs at present; asked at each beat, so it may depend on its state.
-        changed: called when it becomes active or inactive.
-        root: active without an activator, as the sequencer is.
+        endpoint: the component's address.
+        needs: returns the names of the components that this one needs at present; called at each heartbeat.
+        changed: called when the component becomes active or inactive.
+        root: whether the component is active without an activator, like the sequencer.
     """
 
     def __init__(
@@ -42,15 +42,18 @@ class Heartbeat:
 
     @property
     def activators(self) -> frozenset[str]:
-        """Names of the components that need it at present."""
+        """Names of the components that need this one at present."""
         return frozenset(self._activators)
 
     def stir(self) -> None:
-        """Beat immediately: its needs have changed."""
+        """Send a heartbeat immediately, as the needs have changed."""
         self._stirred.set()
 
     async def run(self) -> None:
-        """Beat until cancelled; then the component is inactive, and says so."""
+        """Send heartbeats until cancelled.
+
+        Then the component becomes inactive, and broadcasts that it needs nothing.
+        """
         try:
             while True:
                 await self._beat()
@@ -72,12 +75,12 @@ class Heartbeat:
         if active == self.active:
             return
         self.active = active
-        if not active:  # dependants need not wait for silence
+        if not active:  # dependencies need not wait for `SILENCE`
             self._endpoint.broadcast("heartbeat", {"needs": []})
         await self._changed(active)
 
     def need(self, sender: str) -> None:
-        """Add an active component that needs this one, without its heartbeat."""
+        """Add an active component that needs this one, without waiting for its heartbeat."""
         self._heard(sender, {"needs": [self._endpoint.address]})
 
     def _heard(self, sender: str, said: Any) -> None:

@@ -1,6 +1,7 @@
-"""Calls of code that a robot's builder wrote: however a hook ends, its caller gets a value or an `Exception`.
+"""Calls of hooks, which a robot's builder wrote: each hook returns a value or raises an `Exception`.
 
-`sys.exit` in a hook, or an exception of no usual kind, would end the program with the task that runs it.
+Without this containment, `sys.exit` in a hook would end the program with the hook's task. So would an exception that is
+not an `Exception`.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from knowledge_base.errors import described
 
 
 class contained:  # noqa: N801  # a context manager, as `suppress`
-    """Inside, a hook runs: an exception that is no `Exception` becomes a `RuntimeError` that describes it.
+    """Context manager in which a hook runs: an exception that is not an `Exception` becomes a `RuntimeError`.
 
-    A cancellation by others, the closing of the coroutine, and Ctrl-C pass.
+    A cancellation by another task, the closing of the coroutine, and Ctrl-C pass unchanged.
     """
 
     __slots__ = ("_task",)
@@ -37,13 +38,15 @@ class contained:  # noqa: N801  # a context manager, as `suppress`
 
 
 def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:
-    """Whether the hook itself raised it, rather than a cancellation, the end of its coroutine, or Ctrl-C.
+    """Return whether the hook itself raised the error.
+
+    The other causes are a cancellation by another task, the closing of the hook's coroutine, and Ctrl-C.
 
     Args:
-        error: raised inside the hook.
-        task: the task that runs the hook, `None` outside any.
+        error: the error, raised inside the hook.
+        task: the task that runs the hook; `None` outside of a task.
     """
-    kind = type(error)  # `isinstance` would ask the exception for its class, which may fail
+    kind = type(error)  # `isinstance` would read the exception's `__class__`, which may fail
     if issubclass(kind, asyncio.CancelledError):
         return task is not None and task.cancelling() == 0
     if issubclass(kind, GeneratorExit):  # a coroutine is closed by others, never by the task that runs it
@@ -52,7 +55,7 @@ def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:
 
 
 def running_task() -> asyncio.Task[Any] | None:
-    """The task that is running in this thread, if any."""
+    """Return the task that runs in this thread; `None` outside of a task."""
     try:
         return asyncio.current_task()
     except RuntimeError:
@@ -60,7 +63,10 @@ def running_task() -> asyncio.Task[Any] | None:
 
 
 def _from_keyboard(error: BaseException) -> bool:
-    """Whether it may be Ctrl-C: with the handler of `asyncio.run` its traceback tells, with others nothing does."""
+    """Return whether the error may be Ctrl-C.
+
+    With the signal handler of `asyncio.run`, the traceback identifies Ctrl-C. With another handler, Ctrl-C is assumed.
+    """
     if threading.current_thread() is not threading.main_thread():
         return False
     handler = signal.getsignal(signal.SIGINT)
@@ -72,7 +78,7 @@ def _from_keyboard(error: BaseException) -> bool:
     return innermost is not None and innermost.tb_frame.f_code is _ON_SIGINT.__code__
 
 
-_ON_SIGINT: Any = getattr(Runner, "_on_sigint", None)  # it has no public name
+_ON_SIGINT: Any = getattr(Runner, "_on_sigint", None)  # the handler has no public name
 
 
 GRACE = 30.0
@@ -80,7 +86,7 @@ GRACE = 30.0
 
 
 def give_up_after(task: asyncio.Task[Any], seconds: float, say: Callable[[], None]) -> None:
-    """Abandon the task if it is not over after that many seconds of loop time, and call `say`."""
+    """Abandon the task if it has not ended after `seconds` of loop time, and call `say`."""
 
     def overdue() -> None:
         give_up(task)
@@ -91,9 +97,10 @@ def give_up_after(task: asyncio.Task[Any], seconds: float, say: Callable[[], Non
 
 
 def give_up(task: asyncio.Task[Any]) -> None:
-    """Abandon a task: the loop does not wait for it when it closes.
+    """Abandon a task, so that the loop does not wait for the task when the loop closes.
 
-    Asyncio waits without end for a task that ignores its cancellation. Its documentation names this way for extensions.
+    Asyncio waits without end for a task that ignores its cancellation. Its documentation permits this function's calls
+    to extensions.
     """
-    task._log_destroy_pending = False  # type: ignore[attr-defined]  # noqa: SLF001  # it is known to be pending
+    task._log_destroy_pending = False  # type: ignore[attr-defined]  # noqa: SLF001  # the task is known to be pending
     asyncio.tasks._unregister_task(task)  # noqa: SLF001  # documented under "Extending"

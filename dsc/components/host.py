@@ -1,7 +1,7 @@
-"""Host: offers a component on a transport, and executes its actions for clients, each once for its id.
+"""Hosts: components on a transport, whose actions are executed for clients, each only one time for its id.
 
-An action's reports and end are kept until its client lets them be forgotten, within the bounds `MOST_ACTIONS` and
-`MOST_KEPT`. The host publishes the component's life, mode and needs after each change, as on a push port.
+A host stores an action's reports and end until the client releases them, within the bounds `MOST_ACTIONS` and
+`MOST_KEPT`. After each change, the host publishes the component's life, mode and needs, as on a push port.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from knowledge_base.exchange import delta_form, delta_of
 from knowledge_base.language.checking.inputs import require_delta, require_time, shown
 
 MOST_ACTIONS = 1_000
-"""Running actions of a host; also the ended ones that were not forgotten, of which the latest are kept."""
+"""Number of running actions of a host, and of ended actions that were not forgotten; the latest ends are kept."""
 MOST_KEPT = 10_000
-"""Reports of an action that are kept for a resumed client; older ones become empty observations."""
+"""Number of an action's reports that are kept for a resumed client; older reports become empty observations."""
 CONDITION = "its condition"
 """The port of a component's life, mode and needs; no declared port has a blank in its name."""
 
 
 class Host:
-    """Offers a component on a transport, as a part of the activation tree there, until it is closed.
+    """The services of one component on a transport, and its part in the activation tree, until `close`.
 
     Attributes:
-        endpoint: the component's address; all its services there share it.
+        endpoint: the component's address, which all these services share.
     """
 
     def __init__(self, component: Component, transport: Transport, clock: Clock) -> None:
@@ -58,7 +58,7 @@ class Host:
         component.life.listen(self._changed)
 
     async def close(self) -> None:
-        """Stop all services without a message: for the clients, the component has died."""
+        """Stop all services without a message; clients treat the component as failed."""
         self._component.life.leave(self._changed)
         await self.endpoint.close()
         tasks = [self._beating, *self._actions.tasks(), *self._streams.close()]
@@ -81,12 +81,12 @@ class Host:
         life = self._component.life
         before = life.state
         await life.come_alive(self._component.start)
-        if before is not Life.ALIVE and self._is_active.is_set():  # it was restarted
+        if before is not Life.ALIVE and self._is_active.is_set():  # the component was restarted
             await life.become_active(id(self), self._component.activate, active=True)
         return self._condition.newest
 
     async def _be_active(self, sender: str, _: Any) -> dict[str, Any]:
-        """Take the call as a heartbeat with a need, and answer when the component is active."""
+        """Handle the call like a heartbeat that needs this component, and answer when the component is active."""
         self._heart.need(sender)
         await self._is_active.wait()
         return self._condition.newest
@@ -104,17 +104,17 @@ class Host:
 
 
 def outcome_form(outcome: Outcome) -> dict[str, Any]:
-    """An outcome as plain data."""
+    """Return an outcome as plain data."""
     return {"event": outcome.event, "attributes": dict(outcome.attributes), "observed": delta_form(outcome.observed)}
 
 
 def outcome_of(form: Mapping[str, Any]) -> Outcome:
-    """The inverse of `outcome_form`."""
+    """Return the outcome of a form that `outcome_form` returned."""
     return Outcome(form["event"], form["attributes"], delta_of(form["observed"]))
 
 
 _NO_REPORT = {"report": outcome_form(Outcome(OBSERVED))}
-"""Replaces an old report that its client has received."""
+"""Replacement of an old report that the client has received."""
 
 
 @dataclass(slots=True)
@@ -129,11 +129,14 @@ class _Action:
 
     @property
     def over(self) -> bool:
-        """Whether its task has ended."""
+        """Whether the action's task has ended."""
         return self.task is None or self.task.done()
 
     def take(self, received: int) -> None:
-        """Note that the client has received that many messages: further reports may come, old ones are dropped."""
+        """Record that the client has received the first `received` messages.
+
+        This permits further reports, and replaces old reports by empty ones.
+        """
         assert self.reports is not None  # noqa: S101
         for number in range(self.received, min(received, len(self.messages))):
             if number >= MOST_KEPT:
@@ -143,7 +146,7 @@ class _Action:
 
 
 class HostedActions:
-    """Answers `start`, `how` and `stop` at an endpoint for a component's skills."""
+    """Handler of the calls `start`, `how` and `stop` at an endpoint, for a component's skills."""
 
     def __init__(self, component: Component, endpoint: Endpoint, clock: Clock) -> None:
         self._component = component
@@ -155,12 +158,12 @@ class HostedActions:
         endpoint.answer("stop", self._stop)
 
     def tasks(self) -> list[asyncio.Task[None]]:
-        """The tasks of all actions that were not forgotten."""
+        """Return the tasks of all actions that were not forgotten."""
         return [action.task for action in self._actions.values() if action.task is not None]
 
     async def _start(self, sender: str, said: dict[str, Any]) -> None:
         action = self._actions.get(_key(said))
-        if action is not None:  # its client has restarted
+        if action is not None:  # the client has restarted
             action.client = sender
             return
         self._make_room()
@@ -169,7 +172,7 @@ class HostedActions:
         action.task = asyncio.get_running_loop().create_task(self._execute(said, action, action.reports))
 
     def _make_room(self) -> None:
-        """Forget the first unclaimed end; refuse a new action while too many are running."""
+        """Delete the oldest ended actions beyond the bound; raise `InputError` if too many actions are running."""
         over = [key for key, action in self._actions.items() if action.over]
         if len(self._actions) - len(over) >= MOST_ACTIONS:
             raise InputError(f"{MOST_ACTIONS} actions are running here, and no more are accepted")
@@ -198,7 +201,7 @@ class HostedActions:
         self._tell(said["id"], action, end)
 
     async def _how(self, _: str, said: dict[str, Any]) -> list[dict[str, Any]] | None:
-        """The messages that the client has not received; `None` for an unknown action."""
+        """Return the messages that the client has not received; `None` for an unknown action."""
         action = self._actions.get(_key(said))
         if action is None:
             return None
@@ -208,7 +211,7 @@ class HostedActions:
         return action.messages[said["heard"] :]
 
     async def _stop(self, _: str, said: dict[str, Any]) -> None:
-        """Cancel a running action, and forget it."""
+        """Cancel an action that is running, and forget it."""
         action = self._actions.get(_key(said))
         if action is not None and action.task is not None and not action.over:
             action.task.cancel()
@@ -217,7 +220,7 @@ class HostedActions:
 
 
 def _plain(outcome: Outcome) -> Outcome:
-    """The outcome, if it can be sent; raises `InputError`."""
+    """Return the outcome if it can be sent; raise `InputError` if not."""
     if not isinstance(outcome, Outcome) or not isinstance(outcome.event, str):
         raise InputError(f"it ended with {shown(outcome)}, which is not an outcome")
     require_delta(outcome.observed)

@@ -1,4 +1,4 @@
-"""The life of a component: Init, Alive, Shutdown, FatalError (S1.2). Its modes are sub-states of Alive."""
+"""Life cycles of components: Init, Alive, Shutdown, FatalError (S1.2). Modes are sub-states of Alive."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from knowledge_base.errors import InputError, described
 
 
 class Life(StrEnum):
-    """States of a component; as a mode (`switch: arm`, `to: init`) each is a command."""
+    """States of a component's life cycle; in `switch: arm`, `to: init`, a state is a command."""
 
     INIT = "init"
     ALIVE = "alive"
@@ -25,12 +25,12 @@ _NEXT = {
     Life.INIT: {Life.ALIVE, Life.SHUTDOWN, Life.FATAL_ERROR},
     Life.ALIVE: {Life.INIT, Life.SHUTDOWN, Life.FATAL_ERROR},
     Life.SHUTDOWN: {Life.INIT},
-    Life.FATAL_ERROR: {Life.INIT, Life.ALIVE, Life.SHUTDOWN},  # Alive: the device is back by itself
+    Life.FATAL_ERROR: {Life.INIT, Life.ALIVE, Life.SHUTDOWN},  # Alive: the device has recovered by itself
 }
 
 
 class Announcer:
-    """Calls its listeners after each change; used inside the loop's own thread."""
+    """Source of change notifications for listeners; use it only in the loop's own thread."""
 
     def __init__(self) -> None:
         self._listeners: set[Callable[[], None]] = set()
@@ -41,7 +41,7 @@ class Announcer:
             listener()
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Call the listener after each change from now on."""
+        """Call the listener after each later change."""
         self._listeners.add(listener)
 
     def leave(self, listener: Callable[[], None]) -> None:
@@ -49,7 +49,7 @@ class Announcer:
         self._listeners.discard(listener)
 
     async def until(self, holds: Callable[[], bool]) -> None:
-        """Wait until `holds` is true; evaluate it after each change."""
+        """Wait until `holds()` is true; call `holds` again after each change."""
         changed = asyncio.Event()
         self.listen(changed.set)
         try:
@@ -61,12 +61,12 @@ class Announcer:
 
 
 class LifeCycle(Announcer):
-    """The life of one component; it announces changes of life, mode and needs.
+    """The life cycle of one component; it announces changes of state, mode and needs.
 
     Attributes:
         state: one of `Life`.
         reason: the cause of FatalError, else empty.
-        starting: whether the component's `start` runs.
+        starting: whether the component's `start` is running.
     """
 
     def __init__(self) -> None:
@@ -78,12 +78,12 @@ class LifeCycle(Announcer):
         self._mode = NEUTRAL
 
     def __getstate__(self) -> dict[str, object]:
-        """The state that is pickled: listeners stay in this process."""
+        """Return the state for pickling, without listeners, which stay in this process."""
         return {**self.__dict__, "_listeners": set()}
 
     @property
     def mode(self) -> str:
-        """The sub-state of Alive, also while the component is not alive."""
+        """The sub-state of Alive; it is kept while the component is not alive."""
         return self._mode
 
     @mode.setter
@@ -97,12 +97,12 @@ class LifeCycle(Announcer):
         return bool(self._activators)
 
     async def come_alive(self, start: Callable[[], Awaitable[None]]) -> None:
-        """Start a component in Init or FatalError; concurrent callers wait for the same start.
+        """Start a component in Init or FatalError; concurrent callers wait for one start.
 
         Args:
             start: the component's hook; its error leads to FatalError.
         """
-        while self.starting:  # if that start is cancelled, another caller begins it
+        while self.starting:  # if that start is cancelled, another caller begins a new one
             await self.until(lambda: not self.starting)
             if self.state is not Life.INIT:
                 return
@@ -114,23 +114,23 @@ class LifeCycle(Announcer):
         try:
             with contained():
                 await start()
-        except Exception as error:  # noqa: BLE001  # with any error the component cannot work
+        except Exception as error:  # noqa: BLE001  # after any error the component cannot work
             became, reason = Life.FATAL_ERROR, described(error)
         else:
             became, reason = Life.ALIVE, ""
         finally:
             self.starting = False
             self.announce()
-        if self.state is Life.INIT:  # else it was shut down meanwhile, or has reported its state itself
+        if self.state is Life.INIT:  # else it was shut down meanwhile, or `start` has set the state
             self.become(became, reason)
 
     async def become_active(self, activator: int, activate: Callable[[bool], Awaitable[None]], *, active: bool) -> None:
         """Add or remove an activator.
 
         Args:
-            activator: its number.
-            activate: the component's hook, called for the first and for the last activator; its error leads to
-                FatalError.
+            activator: the activator's number.
+            activate: the component's hook, called for the first added and for the last removed activator. Its error
+                leads to FatalError.
             active: whether the activator needs the component from now on, or no longer.
         """
         others = self._activators - {activator}
@@ -141,12 +141,12 @@ class LifeCycle(Announcer):
         try:
             with contained():
                 await activate(active)
-        except Exception as error:  # noqa: BLE001  # with any error the component lacks its resources
+        except Exception as error:  # noqa: BLE001  # after any error the component lacks its resources
             if self.state is not Life.SHUTDOWN:
                 self.become(Life.FATAL_ERROR, described(error))
 
     def become(self, state: Life, reason: str = "") -> None:
-        """Enter a state, unless the component is in it already.
+        """Enter a state; announce the change also if the component is in that state already.
 
         Raises:
             InputError: the present state has no transition to it.

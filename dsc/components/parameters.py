@@ -1,4 +1,4 @@
-"""Parameters of components: a builder declares a range, an integrator a value, others change it at run time (S1.11)."""
+"""Parameters of components: a builder declares ranges, an integrator sets values, others change them (S1.11)."""
 
 from __future__ import annotations
 
@@ -31,14 +31,15 @@ class Parameter:
 
     Attributes:
         type: `number`, `text` (any word) or `boolean`.
-        default: its value until another one is set; without a default, a profile must set it.
-        least, most: the range of a number.
-        among: the permitted values; empty means any.
-        changed_by: the role that may change it: `nobody`; a `profile`, before a run; an `operator`, during a run; the
-            `rules` of plots, after a failure; `plots` anywhere. Each role includes those before it.
-        follows: instead of a default, a term over other parameters, as `(* 0.5 ?cycle)`.
-        depends_on: parameters that its value depends on, besides those that it follows. A new value of one of them
-            resets it: to its default, to the value of its term, or to no value.
+        default: the value until another value is set; without a default, a profile must set the value.
+        least: the smallest permitted number.
+        most: the largest permitted number.
+        among: the permitted values; empty permits any value.
+        changed_by: the role that may change the value: `nobody`; a `profile`, before a run; an `operator`, during a
+            run; the `rules` of plots, after a failure; `plots` anywhere. Each role includes those before it.
+        follows: instead of a default, a term over other parameters, e.g. `(* 0.5 ?cycle)`.
+        depends_on: parameters that the value depends on, besides those in `follows`. A new value of one of them resets
+            this parameter to its default, to the value of its term, or to no value.
     """
 
     type: Type
@@ -52,11 +53,14 @@ class Parameter:
 
     @property
     def reasons(self) -> frozenset[str]:
-        """The parameters that its value depends on."""
+        """Names of the parameters that this one's value depends on."""
         return frozenset(self.depends_on) | (free_variables(_term(self.follows)) if self.follows else frozenset())
 
     def unset(self, values: Mapping[str, Value]) -> Value | None:
-        """Its value while no role has set one, given the values of others; `None` if it has no value then."""
+        """Return the value that applies while no role has set one, computed from the `values` of other parameters.
+
+        The result is `None` if the parameter has no value then.
+        """
         if self.follows is None:
             return self.default
         term = _term(self.follows)
@@ -67,7 +71,7 @@ class Parameter:
 
     @property
     def range(self) -> Range:
-        """Its permitted values."""
+        """Permitted values of the parameter."""
         return Range(self.type, self.least, self.most, self.among)
 
 
@@ -75,10 +79,10 @@ class Parameters(dict[str, Any]):
     """The present values of one component's parameters.
 
     Args:
-        component: its name, for messages.
+        component: the component's name, for messages.
         declared: the declarations; if empty, any name is valid.
-        relations: conditions over the parameters, as `(<= ?speed (* 0.5 ?cycle))`; each holds as soon as its
-            parameters have values.
+        relations: conditions over the parameters, e.g. `(<= ?speed (* 0.5 ?cycle))`. Each must be true as soon as all
+            its parameters have values.
     """
 
     def __init__(self, component: str, declared: Mapping[str, Parameter], relations: Iterable[str]) -> None:
@@ -92,7 +96,7 @@ class Parameters(dict[str, Any]):
         """Set a parameter; `None` resets a declared one.
 
         Raises:
-            UnknownNameError: the component declares its parameters, and this is not among them.
+            UnknownNameError: the component declares parameters, and `name` is not among them.
             InputError: the value violates its declaration or a relation.
         """
         after = self._after(self, {name: value})
@@ -102,7 +106,12 @@ class Parameters(dict[str, Any]):
 
     @contextmanager
     def as_one_set(self, values: Mapping[str, Any]) -> Iterator[None]:
-        """Validate values as one set; inside, `configure` validates no relations. Raises as `configure`."""
+        """Validate values as one set; inside the block, `configure` checks no relations.
+
+        Raises:
+            UnknownNameError: the component declares parameters, and a name is not among them.
+            InputError: a value violates its declaration or a relation.
+        """
         after: Mapping[str, Any] = self
         for name, value in values.items():
             after = self._after(after, {name: value})
@@ -114,15 +123,21 @@ class Parameters(dict[str, Any]):
             self._as_one_set = False
 
     def check(self, name: str, value: Any, who: Who) -> None:
-        """Validate a value of a declared parameter without setting it; raises as `configure`, or if `who` may not."""
+        """Validate a value of a declared parameter without setting it.
+
+        Raises:
+            UnknownNameError: the component declares no such parameter.
+            InputError: the role `who` may not change the parameter, or the value violates its declaration or a
+                relation.
+        """
         refuse_change(f"{self._component}.{name}", who, known(self._component, name, self._declared).changed_by)
         self._check_relations(self._after(self, {name: value}))
 
     def after(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """The values after the settings of a profile.
+        """Return the values after the settings of a profile.
 
         Raises:
-            SchemaError: a parameter has no value, a setting violates its declaration, or a relation does not hold.
+            SchemaError: a parameter has no value, a setting violates its declaration, or a relation is false.
         """
         found = self._after(self, settings)
         self._require_bound(found)
@@ -130,7 +145,7 @@ class Parameters(dict[str, Any]):
         return found
 
     def replace(self, values: Mapping[str, Any]) -> None:
-        """Set all values without validation."""
+        """Replace all values without validation."""
         found = dict(values)
         self.clear()
         self.update(found)
@@ -164,7 +179,7 @@ class Parameters(dict[str, Any]):
 
 
 def known(component: str, name: str, declared: Mapping[str, Parameter]) -> Parameter:
-    """The declaration of a parameter; raises `UnknownNameError` if there is none."""
+    """Return the declaration of a parameter; raise `UnknownNameError` if it is missing."""
     if name not in declared:
         message = f"component '{component}' has no parameter '{name}'"
         raise UnknownNameError(message, found=name, valid=declared)
@@ -174,13 +189,13 @@ def known(component: str, name: str, declared: Mapping[str, Parameter]) -> Param
 def _changed(
     component: str, declared: Mapping[str, Parameter], values: Mapping[str, Value], settings: Mapping[str, Value | None]
 ) -> dict[str, Value]:
-    """The values of all parameters after new settings; `None` resets one.
+    """Return the values of all parameters after new settings; the setting `None` resets a parameter.
 
-    A parameter that depends on one of them is reset, unless it has a new setting, too (S1.11). The same value set again
-    resets dependent ones, too. So the last settings, in order, determine all values, also after a restart.
+    A new setting resets the parameters that depend on it, unless they have a new setting too (S1.11). This applies also
+    if the setting equals the former value. So the last settings, in order, determine all values, also after a restart.
 
     Raises:
-        InputError: a value violates its declaration, also one that follows.
+        InputError: a value violates its declaration, also a value that is computed by `follows`.
     """
     found, others = dict(values), set[str]()
     reasons = {name: parameter.reasons for name, parameter in declared.items()}
@@ -203,15 +218,14 @@ def check_declarations(
     """Validate the declarations of a component class.
 
     Args:
-        component: its name, for messages.
+        component: the component's name, for messages.
         declares: the parameters by name.
-        relations: conditions between them.
+        relations: conditions between the parameters.
         module: the module of the class, for messages.
 
     Raises:
-        InputError: a type, role or name is unknown, a range is empty, a default is outside it, or a relation is not a
-            condition. The message has the file, the parameter, the value found and the
-            nearest name.
+        InputError: a type, role or name is unknown, a range is empty, or a default is outside its range. Or a relation
+            is not a condition. The message has the file, the parameter, the value found and the nearest name.
     """
     try:
         for name, parameter in declares.items():

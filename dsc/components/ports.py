@@ -1,4 +1,4 @@
-"""Ports of a component next to its skills: events, queries and one-way messages, as decorators (S1.1).
+"""Ports of a component besides its skills: events, queries and one-way messages, as decorators (S1.1).
 
 ```python
 class Battery(Component):
@@ -13,7 +13,7 @@ class Battery(Component):
     async def calibrate(self, full: float) -> None: ...
 ```
 
-`self.update("low", 17.5)` tests a new value for each activation of the event.
+`self.update("low", 17.5)` passes a new value to the test `low`, for each activation of the event.
 """
 
 from __future__ import annotations
@@ -32,16 +32,21 @@ from dsc.skills import Declared, SkillBody, require_names
 ANSWERED = "answered"
 """The outcome of a query; its attributes are the answer."""
 TAKES = "__dsc_takes__"
-"""The attribute in which `takes` notes its declaration."""
+"""Name of the attribute in which `takes` stores its declaration."""
 _Body = TypeVar("_Body", bound=Callable[..., Any])
 Test = Callable[..., None]
-"""Receives each new value of an event."""
+"""Function that receives each new value of an event."""
 
 
 def query(answer: Mapping[str, str | None], types: Mapping[str, str] | None = None) -> Callable[[_Body], _Body]:
-    """Declare a coroutine method as a query, e.g. `async def lasts(self, watts)`; it returns the answer's values.
+    """Declare a coroutine method as a query, e.g. `async def lasts(self, watts)`.
 
-    A chart starts it with `trigger` and a time `within`; the event `answered` carries the answer.
+    The method returns the values of the answer by name. A chart starts the query with `trigger` and a time `within`.
+    The event `answered` carries the answer.
+
+    Args:
+        answer: names and types of the answer's values.
+        types: types of the query's parameters by name, as for `skill`.
     """
     require_names(answer, "the values of an answer", "@query({'hours': 'number'})")
     return Declared(dict(types or {}), {ANSWERED: dict(answer)}, _ask, own=1, pattern="query", after_crash="repeat")
@@ -50,14 +55,16 @@ def query(answer: Mapping[str, str | None], types: Mapping[str, str] | None = No
 def event(attributes: Mapping[str, str | None], types: Mapping[str, str] | None = None) -> Callable[[_Body], _Body]:
     """Declare an event that charts activate with parameters, under a name that they choose (S0.6).
 
-    The decorated method is the event's test. `update` calls it for each activation, with the new values and the
-    activation's parameters; it returns the event's attributes or `None`. The event is posted each time the test
-    becomes true. A chart activates it with `trigger`, until it leaves the state. The event has the method's name, which
-    `as` replaces. With `within`, the event `timed_out` ends the activation.
+    The decorated method is the event's test. For each activation, `update` calls the test with the new values and the
+    activation's parameters. The test returns the event's attributes, or `None` if the condition is false. The event is
+    posted each time the test changes from `None` to attributes. A chart activates the event with `trigger`, until the
+    state is left. The event has the method's name unless the chart renames it with `as`. With `within`, the event
+    `timed_out` ends the activation.
 
     Args:
-        attributes: the event's, with types.
-        types: of the activation's parameters; these follow those for the values, and have defaults.
+        attributes: the event's attributes, with types.
+        types: types of the activation's parameters. In the method, these follow the parameters for values, and have
+            defaults.
     """
     require_names(attributes, "the attributes of an event", "@event({'level': 'number'})")
 
@@ -72,7 +79,7 @@ def event(attributes: Mapping[str, str | None], types: Mapping[str, str] | None 
 
 
 def takes(body: _Body) -> _Body:
-    """Declare a coroutine method that takes a one-way message: `send: voice.say` in a chart."""
+    """Declare a coroutine method that receives one-way messages, e.g. `send: voice.say` in a chart."""
     setattr(body, TAKES, Declared({}, {}, _ask, own=1))
     return body
 
@@ -85,22 +92,22 @@ class EventActivations:
         self._tests: defaultdict[str, list[Test]] = defaultdict(list)
 
     def __getstate__(self) -> dict[str, object]:
-        """The state that is pickled: activations stay in this process."""
+        """Return the state for pickling, without activations, which stay in this process."""
         return {"_values": self._values, "_tests": defaultdict(list)}
 
     def active(self, event: str) -> bool:
-        """Whether the event has an activation."""
+        """Return whether the event has an activation."""
         return bool(self._tests[event])
 
     def update(self, event: str, values: tuple[Any, ...]) -> None:
-        """Call all tests of the event."""
+        """Store the event's values, and call all its tests with them."""
         self._values[event] = values
         for test in tuple(self._tests[event]):
             test(*values)
 
     @contextmanager
     def tested(self, event: str, test: Test) -> Iterator[None]:
-        """Inside, call the test with the event's present values, if any, and with each update."""
+        """Call the test with the event's present values, if any, and inside the block with each update."""
         self._tests[event].append(test)
         try:
             if event in self._values:
@@ -115,7 +122,7 @@ async def _ask(_: Any, body: SkillBody, __: SkillCall, arguments: Mapping[str, A
 
 
 async def _activate(component: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-    """Test each value until the cancellation, or until the test fails."""
+    """Test each new value until the action is cancelled or the test raises an error."""
     held = False
     failed: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
 
@@ -127,7 +134,7 @@ async def _activate(component: Any, body: SkillBody, call: SkillCall, arguments:
             if found is not None and not held:
                 call.report(Outcome(body.__name__, found))
             held = found is not None
-        except Exception as error:  # noqa: BLE001  # it fails this activation, not the caller of `update`
+        except Exception as error:  # noqa: BLE001  # the error fails this activation, not the caller of `update`
             if not failed.done():
                 failed.set_exception(error)
 

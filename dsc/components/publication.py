@@ -1,7 +1,7 @@
-"""Push ports over a transport: one component publishes values to many, and none is older than the last (S1.1).
+"""Push ports over a transport: one component publishes values, and each subscriber receives the newest (S1.1).
 
-A subscriber renews its subscription periodically. So it gets the newest value also after a lost push, and a publisher
-that starts late or restarts finds its subscribers. The publisher forgets subscribers that do not renew.
+A subscriber renews its subscription periodically. So it receives the newest value also after a lost push. A publisher
+that starts late, or restarts, learns its subscribers. The publisher forgets subscribers that do not renew.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from knowledge_base.errors import InputError, described
 RENEWED = 1.0
 """Seconds after which a subscriber renews its subscription."""
 FORGOTTEN = 5.0
-"""Seconds after which a publisher forgets a subscriber without renewal."""
+"""Seconds after which a publisher forgets a subscriber that has not renewed its subscription."""
 MOST_SUBSCRIBERS = 1_000
-"""Subscribers of one port; more are refused."""
+"""Maximum number of subscribers of one port; further subscribers are refused."""
 MOST_LIVES = 100
-"""Earlier lives of a publisher that a subscriber remembers."""
+"""Number of earlier instances of a publisher that a subscriber remembers."""
 
 
 class Publisher:
-    """Publishes values at an endpoint.
+    """The publishing end of a push port, at an endpoint.
 
     Args:
         endpoint: the publisher's address.
         port: the port's name.
-        values: names and types of the values; subscribers of other ones are refused.
+        values: names and types of the values; subscribers that require other values are refused.
 
     Attributes:
-        newest: the newest value with its number, as subscribers `take` it.
+        newest: the newest value with its number, in the form for `Subscription.take`.
     """
 
     def __init__(self, endpoint: Endpoint, port: str, values: Values | None = None) -> None:
@@ -47,7 +47,7 @@ class Publisher:
         endpoint.answer(f"subscribe {port}", self._subscribe)
 
     def put(self, value: Any) -> None:
-        """Push a new value to all subscribers; raises `InputError` if it is not plain data."""
+        """Push a new value to all subscribers; raise `InputError` if it is not plain data."""
         self.newest = {"life": self._endpoint.life, "n": self.newest["n"] + 1, "value": value}
         self._forget()
         for subscriber in self._subscribers:
@@ -69,7 +69,7 @@ class Publisher:
 
 
 class Subscription:
-    """The newest value of another component's push port; `run` renews it.
+    """The newest value of another component's push port; `run` renews the subscription.
 
     Args:
         endpoint: the subscriber's address.
@@ -80,7 +80,7 @@ class Subscription:
 
     Attributes:
         value: the newest known value; `None` before the first.
-        problem: the reason for the publisher's refusal, if any.
+        problem: the reason for the publisher's refusal; `None` without a refusal.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class Subscription:
         self._endpoint = endpoint
         self._publisher = publisher
         self._port = port
-        self._numbers: dict[str, int] = {}  # the newest number of each life of the publisher, the present one last
+        self._numbers: dict[str, int] = {}  # the newest number of each instance of the publisher, the present one last
         self._at = -math.inf
         endpoint.hear(_kind(publisher, port), self._pushed)
 
@@ -114,8 +114,8 @@ class Subscription:
                 kind = f"subscribe {self._port}"
                 newest = await self._endpoint.call(self._publisher, kind, self._wanted, FORGOTTEN)
             except NoAnswerError:
-                pass  # it may start later
-            except RefusedError as refused:  # its successor may accept
+                pass  # the publisher may start later
+            except RefusedError as refused:  # a restarted publisher may accept
                 self.problem = str(refused)
             else:
                 try:
@@ -130,10 +130,10 @@ class Subscription:
             self.take(newest)
 
     def take(self, newest: Any) -> None:
-        """Take a `Publisher.newest` that came by any way, unless it is older than a known one.
+        """Store a received `Publisher.newest`, unless it is older than the known one.
 
         Raises:
-            InputError: it has another form; nothing is taken.
+            InputError: `newest` is malformed; the known value is unchanged.
         """
         match newest:
             case {"life": str(life), "n": int(number), "value": value}:
@@ -155,12 +155,12 @@ class Subscription:
 
 
 def _kind(publisher: str, port: str) -> str:
-    """The kind of pushes; ports of two publishers may have one name."""
+    """Return the kind of a port's pushes; ports of two publishers may have equal names."""
     return f"push {publisher}.{port}"
 
 
 class HostedStreams:
-    """Publishes a hosted component's push ports, and subscribes to its streams, at its host's endpoint."""
+    """Publisher of a hosted component's push ports, and subscriber for its streams, at its host's endpoint."""
 
     def __init__(self, component: Component, endpoint: Endpoint) -> None:
         self._publishing = [(port, Publisher(endpoint, name, port.values)) for name, port in component.pushes.items()]
@@ -173,14 +173,14 @@ class HostedStreams:
             self._tasks.append(asyncio.get_running_loop().create_task(subscription.run()))
 
     def close(self) -> list[asyncio.Task[None]]:
-        """Stop publishing; return the tasks to cancel."""
+        """Stop publishing; return the subscription tasks, which the caller must cancel."""
         for port, publisher in self._publishing:
             port.leave(publisher.put)
         return self._tasks
 
 
 class RemotePush(Push):
-    """A push port of a component elsewhere, with a subscription while it has listeners; its host keeps the period."""
+    """A push port of a remote component, with a subscription while it has listeners; the host applies the period."""
 
     def __init__(self, endpoint: Endpoint, component: str, port: str, values: Mapping[str, str | None]) -> None:
         super().__init__(values, name=f"{component}.{port}")
@@ -188,7 +188,7 @@ class RemotePush(Push):
         self._running: asyncio.Task[None] | None = None
 
     def listen(self, listener: Receiver) -> None:
-        """Pass all values to the listener."""
+        """Pass all later values to the listener."""
         super().listen(listener)
         if self._running is None:
             self._running = asyncio.get_running_loop().create_task(self._subscription.run())

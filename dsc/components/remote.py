@@ -1,8 +1,9 @@
-"""Remote components: a component on the other side of a transport is used here like any other.
+"""Remote components: clients of hosted components, used like local components.
 
-An action is started by its id. The host executes it once, however often a frame arrives, and keeps its end until it is
-taken; a resumed run still gets it. The client queries the host periodically. A host that is silent for `SILENCE`
-seconds counts as FatalError here: the action ends with `skill_error`, and the next action connects again.
+An action has an id, by which the host executes it only one time, also if frames are repeated. The host stores the
+action's end until the client has received it, so that a resumed run also receives it. The client queries the host
+periodically. After `SILENCE` seconds without an answer, the client's component enters FatalError. The action then ends
+with `skill_error`, and the next action connects again.
 """
 
 from __future__ import annotations
@@ -27,13 +28,14 @@ from knowledge_base.language.checking.inputs import require_text
 WATCH = 1.0
 """Seconds between queries of an action's state."""
 SILENCE = 3.0
-"""Seconds for the host's answer, and for any message from it."""
+"""Seconds after which a host without an answer, or without any message, counts as failed."""
 
 
 class RemoteComponent(Component):
-    """The client of a hosted component; made by `connect`.
+    """The client of a hosted component; `connect` creates it.
 
-    The host outlives programs, and their action ids are alike. A name of the program's run tells them apart.
+    The host outlasts programs, and programs may use equal action ids. So each id is sent with the name of the program's
+    run.
     """
 
     def __init__(self, name: str, transport: Transport, endpoint: Endpoint, skills: dict[str, SkillSignature]) -> None:
@@ -47,16 +49,16 @@ class RemoteComponent(Component):
         self._working: tuple[asyncio.Task[None], ...] = ()
 
     def remember(self) -> str:
-        """The name of this program's run, under which the host knows its actions."""
+        """Return the name of this program's run, by which the host identifies its actions."""
         return self._run
 
     def recall(self, memory: Any) -> None:
-        """Continue the actions of before a restart."""
+        """Continue the actions of the run before a restart."""
         self._run = memory
 
     @classmethod
     async def connect(cls, name: str, transport: Transport, within: float = WITHIN) -> RemoteComponent:
-        """The component of that name, with its present skills.
+        """Return the component of that name, with its present skills.
 
         Raises:
             NoAnswerError: no host has answered.
@@ -81,34 +83,34 @@ class RemoteComponent(Component):
         return remote
 
     def skills(self) -> dict[str, SkillSignature]:
-        """The signatures at the time of the connection."""
+        """Return the signatures at the time of the connection."""
         return dict(self._skills)
 
     def needed(self) -> tuple[str, ...]:
-        """Names of the components that it needs in its present mode, by its last message."""
+        """Return the names of the components that this one needs in its present mode, from the host's last message."""
         return tuple(self._condition.value["needs"])
 
     async def reach(self, name: str) -> Component:
-        """Wait for a required component on its own transport."""
+        """Wait for a required component on the transport of this one."""
         while True:
             with suppress(NoAnswerError):
                 return await RemoteComponent.connect(name, self._transport, WATCH)
 
     async def start(self) -> None:
-        """Start it at its host.
+        """Start the component at its host.
 
         Raises:
-            NoAnswerError: the host is silent.
-            RefusedError: it cannot start.
+            NoAnswerError: the host does not answer.
+            RefusedError: the component cannot start.
         """
         self._require_alive(await self._endpoint.call(self.name, "come alive"))
 
     async def activate(self, active: bool) -> None:  # noqa: FBT001
-        """Activate it at its host, and watch it while it is active.
+        """Activate the component at its host, and watch the host while the component is active.
 
         Raises:
-            NoAnswerError: the host is silent.
-            RefusedError: it cannot become active.
+            NoAnswerError: the host does not answer.
+            RefusedError: the component cannot become active.
         """
         loop = asyncio.get_running_loop()
         if active:
@@ -150,11 +152,11 @@ class RemoteComponent(Component):
         self.life.mode = mode
 
     async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-        """Let the host execute the skill.
+        """Execute the skill at the host, and return its outcome.
 
         Raises:
-            RefusedError: it failed there, or the host does not know it any longer.
-            NoAnswerError: the host is silent.
+            RefusedError: the skill failed there, or the host no longer knows the action.
+            NoAnswerError: the host does not answer.
         """
         news = asyncio.Event()
         self._endpoint.hear(f"news {call.action_id}", lambda _, __: news.set())
@@ -163,14 +165,14 @@ class RemoteComponent(Component):
             await self._ask_about(call.action_id, "start", skill=skill_name, arguments=dict(arguments), seconds=seconds)
             return await self._end_of(call, news)
         except asyncio.CancelledError:
-            with suppress(NoAnswerError):  # if the host is lost, so is the action
+            with suppress(NoAnswerError):  # if the host is lost, the action is lost too
                 await self._ask_about(call.action_id, "stop", WITHIN if self.life.state is Life.ALIVE else WATCH)
             raise
         finally:
             self._endpoint.deafen(f"news {call.action_id}")
 
     async def _end_of(self, call: SkillCall, news: asyncio.Event) -> Outcome:
-        """Pass the action's reports on, and return its outcome."""
+        """Pass the action's reports to `call.report`, and return its outcome."""
         received = 0
         while True:
             news.clear()
@@ -190,38 +192,44 @@ class RemoteComponent(Component):
                     await asyncio.wait_for(news.wait(), WATCH)
 
     async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
-        """`RUNNING` if the host knows the action, also an ended one; a restarted host knows none."""
+        """Return `RUNNING` if the host knows the action, also after its end; else `UNKNOWN`.
+
+        A restarted host knows no action.
+        """
         return Status.UNKNOWN if await self._ask_about(action_id, "how", heard=0) is None else Status.RUNNING
 
     async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
-        """Stop it at the host; raises `NoAnswerError`."""
+        """Stop the action at the host; return its end if it has ended.
+
+        Raise `NoAnswerError` if the host does not answer.
+        """
         messages = await self._ask_about(action_id, "how", heard=0)
         await self._ask_about(action_id, "stop")
         return next((Ended(outcome_of(form["ended"])) for form in messages or () if "ended" in form), None)
 
     async def forget(self, action_id: str) -> None:
-        """Let the host forget it, if the host is still there."""
+        """Release the action at the host, if the host still answers."""
         with suppress(NoAnswerError):
             await self._ask_about(action_id, "stop")
 
     async def configure(self, parameter: str, value: object) -> None:
-        """Set a parameter at the host; raises `NoAnswerError` or `RefusedError`."""
+        """Set a parameter at the host; raise `NoAnswerError` or `RefusedError`."""
         await self._ask("set", {"parameter": parameter, "value": value})
 
     async def configure_all(self, values: Mapping[str, Any]) -> None:
-        """Set parameters at the host as one set; raises `NoAnswerError` or `RefusedError`."""
+        """Set parameters at the host as one set; raise `NoAnswerError` or `RefusedError`."""
         await self._ask("set all", dict(values))
 
     async def change_mode(self, mode: str) -> None:
-        """Change the mode at the host; raises `NoAnswerError` or `RefusedError`."""
+        """Change the mode at the host; raise `NoAnswerError` or `RefusedError`."""
         self._condition.take(await self._ask("switch", {"mode": mode}))
 
     async def take(self, port: str, message: Mapping[str, Any]) -> None:
-        """Send a message to the host; raises `NoAnswerError` or `RefusedError`."""
+        """Send a message to the host; raise `NoAnswerError` or `RefusedError`."""
         await self._ask("take", {"port": port, "message": dict(message)})
 
     async def diagnose(self) -> dict[str, Any]:
-        """Its status at the host; raises `NoAnswerError` or `RefusedError`."""
+        """Return the component's status at the host; raise `NoAnswerError` or `RefusedError`."""
         status: dict[str, Any] = await self._endpoint.call(self.name, "diagnose")
         return status
 
@@ -238,4 +246,4 @@ class RemoteComponent(Component):
 
 
 async def _ignore(_: bool) -> None:  # noqa: FBT001
-    """A client acquires no resources for its heartbeat."""
+    """Do nothing: a client acquires no resources for its heartbeat."""

@@ -1,4 +1,4 @@
-"""Components of a robot: made of plain functions, found by `module:name`, checked before a run, and connected."""
+"""Components of a robot: creation from functions, import by `module:name`, checks before a run, and connections."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from knowledge_base.language.checking.inputs import require_several, shown
 
 
 def component_of(name: str, *functions: SkillBody) -> Component:
-    """A component whose skills are decorated functions: `async def greet(call, person)`.
+    """Return a component whose skills are decorated functions, e.g. `async def greet(call, person)`.
 
     Raises:
         InputError: a function is not decorated with `skill`.
@@ -31,7 +31,7 @@ def component_of(name: str, *functions: SkillBody) -> Component:
 
 
 class _OfFunctions(Component):
-    """A component with functions as skills."""
+    """A component whose skills are functions."""
 
     def __init__(self, name: str, functions: Mapping[str, SkillBody]) -> None:
         super().__init__(name)
@@ -43,15 +43,16 @@ class _OfFunctions(Component):
             self._signatures[skill] = signature_of(self.name, skill, function, without_self)
 
     def skills(self) -> dict[str, SkillSignature]:
-        """The signatures of the functions."""
+        """Return the signatures of the functions."""
         return dict(self._signatures)
 
 
 def robot_of(named: str) -> tuple[Component, ...]:
-    """The components of a robot, or those that its function without arguments returns.
+    """Return the components at `module:name`, or those that the function at `module:name` returns.
 
     Args:
-        named: `module:name`; the module is found as by `python -m`, also in the present folder, and executed.
+        named: `module:name`. The module is found like with `python -m`, also in the present folder, and is executed. A
+            function must have no parameters.
 
     Raises:
         InputError: the module or the name does not exist, or its value is not components.
@@ -81,11 +82,11 @@ def robot_of(named: str) -> tuple[Component, ...]:
 
 
 def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
-    """Validate components: their instances, unique names and needs; return them.
+    """Validate the instances, unique names and needs of components; return the components.
 
     Raises:
         InputError: the argument is not a list, an item is not a component instance, or its needs are malformed.
-        SchemaError: two have one name.
+        SchemaError: two components have equal names.
     """
     require_several(components, "components")
     components = tuple(components)
@@ -102,11 +103,11 @@ def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
 
 
 def _require_needs(component: Component) -> None:
-    """Raise an error unless a component's `needs` are names, for modes that it has.
+    """Raise an error unless a component's `needs` map its modes to tuples of names.
 
     Raises:
         InputError: the needs in a mode are not a tuple of names, e.g. one name without the comma.
-        UnknownNameError: the component declares its modes, and one is not among them.
+        UnknownNameError: the component declares its modes, and a mode in `needs` is not among them.
     """
     name, needs = component.name, component.needs
     if not isinstance(needs, Mapping):
@@ -123,15 +124,15 @@ def _require_needs(component: Component) -> None:
 
 
 def require_deployed(components: Collection[Component], besides: Iterable[str] = ()) -> None:
-    """Raise `UnknownNameError` for a component that another needs, in any mode, and that is not deployed.
+    """Raise `UnknownNameError` for a component that another one needs, in any mode, and that is not deployed.
 
     Args:
-        components: all components; those that reach others elsewhere are skipped.
+        components: all components; those that override `reach` are skipped.
         besides: names of further components.
     """
     deployed = {*(component.name for component in components), *besides}
     for component in components:
-        if type(component).reach is not Component.reach:  # it may find them elsewhere
+        if type(component).reach is not Component.reach:  # the component may find required components elsewhere
             continue
         for needed in (*component.needed(), *(name for names in component.needs.values() for name in names)):
             if needed not in deployed:
@@ -146,8 +147,8 @@ class Wiring:
     """Connections between the streams and push ports of deployed components, also of those deployed late.
 
     Raises:
-        UnknownNameError: a stream names a port, or a value of it, that its component does not have.
-        SchemaError: a value is of another type than in the stream.
+        UnknownNameError: a stream requires a port, or a value of a port, that the publisher lacks.
+        SchemaError: a value has another type than in the stream.
     """
 
     def __init__(self, components: Mapping[str, Component]) -> None:
@@ -156,7 +157,7 @@ class Wiring:
         self._connect()
 
     def deployed(self, component: Component) -> None:
-        """Connect a component, which may replace another one."""
+        """Connect a newly deployed component, which may replace another one."""
         self._disconnect(component.name)
         self._connect()
 
@@ -177,11 +178,11 @@ class Wiring:
 
 
 def require_wired(components: Iterable[Component]) -> None:
-    """Raise an error unless all streams of these components have the ports that they name.
+    """Raise an error unless the components have the push ports that their streams require.
 
     Raises:
         UnknownNameError: there is no such component, port or value.
-        SchemaError: a value is of another type.
+        SchemaError: a value has another type than in the stream.
     """
     deployed = {component.name: component for component in components}
     for component in deployed.values():

@@ -1,4 +1,4 @@
-"""Streams carry data between components past the plots: *push newest* and *push timed* ports (S1.1, S1.15)."""
+"""Streams: data between components that bypass plots, through *push newest* and *push timed* ports (S1.1, S1.15)."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
 
 Values = Mapping[str, str | None]
-"""Names of pushed values with types: `number`, `boolean`, a word of any other type, or `None`: any plain data."""
+"""Names of pushed values with types: `number`, `boolean`, another type for a word, or `None` for any plain data."""
 Receiver = Callable[[dict[str, Any]], None]
-"""Receives pushed values, as a separate copy."""
+"""Function that receives pushed values, as a separate copy."""
 _EXAMPLE = "{'metres': 'number'}"
 
 
@@ -25,13 +25,14 @@ class Push:
     """A push port of a component.
 
     Args:
-        values: the names and types of its values.
-        period: seconds between pushes of the newest values (*push timed*); without it, each `put` pushes.
+        values: the names and types of the values.
+        period: seconds between pushes of the newest values (*push timed*); without a period, each `put` pushes.
         name: `component.port`, for messages; the component sets it.
-        life: of the component; a timed port is silent while the component is lost.
+        life: the component's life cycle; in FatalError and Shutdown, a timed port does not push.
 
     Attributes:
-        values, period: as given.
+        values: the names and types of the values.
+        period: seconds between pushes, or `None`.
 
     Raises:
         InputError: the period is not a positive number, or the values are not names with types.
@@ -51,14 +52,14 @@ class Push:
         self._timer: asyncio.TimerHandle | None = None
 
     def __getstate__(self) -> dict[str, object]:
-        """The state that is pickled: listeners stay in this process."""
+        """Return the state for pickling, without listeners, which stay in this process."""
         return {**self.__dict__, "_listeners": {}, "_timer": None}
 
     def put(self, **values: Any) -> None:
-        """Set new values; from the loop's own thread.
+        """Set new values; call it in the loop's own thread.
 
         Raises:
-            InputError: a value is missing, of another type, or not plain data.
+            InputError: a value is missing, has another type, or is not plain data.
             UnknownNameError: a value is not declared.
         """
         for name in values:
@@ -103,16 +104,17 @@ class Push:
 
 
 class Stream:
-    """A component's subscription to a push port of another, which is also among its `needs`.
+    """A component's subscription to a push port of another component, which must also be among its `needs`.
 
     Args:
-        source: the port, `component.port`.
+        source: the port, as `component.port`.
         values: names and types of the required values.
 
     Attributes:
-        source, values: as given.
+        source: the port, as `component.port`.
+        values: names and types of the required values.
         value: the newest values; `None` before the first.
-        problem: returns the known reason for silence, or `None`.
+        problem: returns the known reason why no values arrive, or `None`.
 
     Raises:
         InputError: the source is not `component.port`, or the values are not names with types.
@@ -130,16 +132,19 @@ class Stream:
         self._waiting: set[asyncio.Future[None]] = set()
 
     def __getstate__(self) -> dict[str, object]:
-        """The state that is pickled: waiting tasks stay in this process."""
+        """Return the state for pickling, without waiting tasks, which stay in this process."""
         return {**self.__dict__, "_waiting": set(), "problem": _no_problem}
 
     @property
     def age(self) -> float:
-        """Seconds since the newest value; infinite before the first. Far above the period, the port is silent."""
+        """Seconds since the newest value; infinite before the first.
+
+        An age far above the port's period indicates a lost publisher.
+        """
         return asyncio.get_running_loop().time() - self._at
 
     async def next(self, within: float) -> dict[str, Any]:
-        """Wait for the next values; raises `NoAnswerError` after that many seconds."""
+        """Wait for the next values and return them; raise `NoAnswerError` after `within` seconds."""
         coming: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._waiting.add(coming)
         try:
@@ -155,7 +160,7 @@ class Stream:
         return self.value
 
     def receive(self, value: dict[str, Any]) -> None:
-        """Take pushed values."""
+        """Store pushed values, and resume the tasks that wait for them."""
         self.value = value
         self._at = asyncio.get_running_loop().time()
         for coming in self._waiting:
@@ -167,8 +172,8 @@ def require_fitting(source: str, wanted: Values, offered: Values) -> None:
     """Raise an error unless a port pushes the values of a stream.
 
     Raises:
-        UnknownNameError: it has no such value.
-        SchemaError: the value is of another type.
+        UnknownNameError: the port lacks a value.
+        SchemaError: a value of the port has another type.
     """
     for name, kind in wanted.items():
         if name not in offered:
@@ -179,7 +184,7 @@ def require_fitting(source: str, wanted: Values, offered: Values) -> None:
 
 
 def _no_problem() -> None:
-    """Before a publisher has refused."""
+    """Return `None`: the publisher has not refused the subscription."""
 
 
 def _checked(values: object, what: str) -> Values:
