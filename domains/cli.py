@@ -1,4 +1,4 @@
-"""The command `dsc`: mounts the commands of each room, and runs ready worlds."""
+"""The command `dsc`: combines the commands of all packages, and runs ready worlds."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from knowledge_base.store import KnowledgeBase
 
 BAD_INPUT, NOT_WRITTEN, NOBODY_READS = 2, 74, 141
-"""Exit statuses of every command; the last two are EX_IOERR of sysexits.h and a shell's status for a broken pipe."""
+"""Exit statuses of every command: bad input, EX_IOERR of sysexits.h, and a shell's status for a broken pipe."""
 
 NO_FILE = frozenset({errno.ELOOP, errno.ENAMETOOLONG, errno.ENOTDIR, errno.EACCES, errno.EPERM})
-"""Errors of paths that lead to no file, or to one without access."""
+"""Error numbers for a path that leads to no file, or to a file without permission."""
 
 
 class _Commands(TyperGroup):
-    """The commands, which end when the reader of their output closes the pipe."""
+    """The group of commands; a closed pipe of the reader ends a command with `NOBODY_READS`."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -68,14 +68,14 @@ WORLDS = ("clean-up-table",)
 
 
 class Durability(StrEnum):
-    """The events that a kept run survives: the death of the process, or a power cut too."""
+    """The events that a kept run survives: a crash of the process, or also a power failure."""
 
     process = "process"
     power = "power"
 
 
 def _scenario(path: Path) -> KnowledgeBase:
-    """Return the robot's knowledge at the start of the scenario, for `dsc kb`."""
+    """Return the robot's knowledge base at the start of the scenario, for `dsc kb`."""
     from domains.clean_up_table.deployment import deploy
     from domains.clean_up_table.scenario import Scenario
 
@@ -170,7 +170,7 @@ def run(
 def _viewed(
     deployed: CleanUpTable, follow: partial[Report], port: int, *, opens: bool, control: bool, wait: bool
 ) -> Report:
-    """Run with a page in the browser, which stays open after the run."""
+    """Run with a page in the browser, and return the report; with `wait`, the page stays open after the run."""
     from dsc.cli.runs import page, until_interrupt, viewer_installed
     from dsc.trace import header
 
@@ -197,7 +197,7 @@ def _followed(
     trace: Output | None,
     prepare: Callable[[Sequencer], None] | None = None,
 ) -> Report:
-    """Run, with progress unless `quiet`, and write the trace."""
+    """Run and return the report; print the progress unless `quiet`, and write the trace."""
     from contextlib import ExitStack
 
     from rich.console import Console
@@ -234,7 +234,7 @@ def _print(report: Report, *, as_json: bool) -> None:
 def main() -> None:
     """The entry point: bad input becomes one message and exit status 2, never a traceback."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # a terminal may lack characters that a file has
+        if isinstance(stream, TextIOWrapper):  # a terminal may not support every character
             stream.reconfigure(errors="backslashreplace")
     try:
         _command()
@@ -255,7 +255,7 @@ def main() -> None:
 def _command() -> None:
     as_json = "--json" in sys.argv
     try:
-        status = app(standalone_mode=not as_json)  # without --json, Typer reports wrong words itself
+        status = app(standalone_mode=not as_json)  # without --json, Typer itself reports wrong arguments
     except Exception as error:
         from knowledge_base.errors import InputError
 
@@ -268,18 +268,18 @@ def _command() -> None:
 
 
 def _unusable(error: Exception) -> InputError | None:
-    """Return an error for a path in the command's words that the operating system refused, or `None`."""
+    """Return the error for a path argument that the operating system refused; `None` for any other error."""
     from knowledge_base.errors import InputError
 
     if isinstance(error, RuntimeError) and isinstance(error.__context__, OSError):
-        error = error.__context__  # Python 3.11 raises this for circular links
+        error = error.__context__  # Python 3.11 raises a RuntimeError for circular links
     if not isinstance(error, OSError) or error.errno not in NO_FILE or error.filename is None:
         return None
     return InputError(f"cannot use '{error.filename}': {error.strerror}", found=str(error.filename))
 
 
 def _misused(error: Exception) -> Exception:
-    """Return an error for wrong words of a command, for programs; other errors unchanged."""
+    """Return an `InputError` for wrong arguments of a command; return any other error unchanged."""
     from knowledge_base.errors import InputError
 
     message = getattr(error, "format_message", None)
@@ -291,7 +291,7 @@ def _misused(error: Exception) -> Exception:
 
 
 def _tell(error: InputError, *, as_json: bool) -> None:
-    """Print the error on standard error, or with --json on standard output."""
+    """Print the error on standard error, or with --json as JSON on standard output."""
     import json
 
     from knowledge_base.errors import Place
@@ -306,9 +306,9 @@ def _tell(error: InputError, *, as_json: bool) -> None:
 
 
 def _drop_unwritten() -> None:
-    """Discard unwritten output, so that Python does not report a second error at its end."""
+    """Discard unwritten output, so that Python reports no second error at its exit."""
     try:
-        if sys.stdout is not None:  # it is `None` when started without one
+        if sys.stdout is not None:  # `None` if the process started without standard output
             sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

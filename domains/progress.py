@@ -1,4 +1,4 @@
-"""Progress of a run from its records: counts, lines of text anywhere, and a status line on a terminal."""
+"""Progress of a run, computed from its records: counts, lines of text, and a status line on a terminal."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ _STEP = re.compile(r"step_\d+")
 
 
 class Tally:
-    """A trace listener that counts.
+    """A trace listener that counts records.
 
     Attributes:
-        outcomes: events that skills ended with.
-        recoveries: rules that answered, by their label.
-        candidates: plots that dynamic states chose, without planning.
-        plans: plans that were found; `replans`: plans that replaced a running one.
-        excluded: steps that plans avoided for a while after a failure.
-        seconds: run time of the last record.
+        outcomes: number of each outcome event of skills.
+        recoveries: number of uses of each rule, by its label.
+        candidates: number of choices of each plot by dynamic states, without choices of planning.
+        plans: number of plans found; `replans`: number of plans that replaced a running plan.
+        excluded: number of exclusions of each plan step after failures.
+        seconds: run time of the last record, in seconds.
     """
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class Tally:
 
 
 def _working(scope: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the states with a plot as content, inside composites and regions too."""
+    """Return the states whose content is a plot or a goal, also those inside composites and regions."""
     found: dict[str, dict[str, Any]] = {}
     for name, state in scope["states"].items():
         inner = [state] if "states" in state else state.get("regions", {}).values()
@@ -80,7 +80,7 @@ def _working(scope: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 class PlainProgress:
-    """A listener that writes one line for each notable record."""
+    """A trace listener that writes one line for each notable record."""
 
     def __init__(self, write: Callable[[str], None]) -> None:
         self._write = write
@@ -101,7 +101,7 @@ class PlainProgress:
             self._steps = {name: state["about"] for name, state in working.items() if _STEP.fullmatch(name)}
 
     def lines(self, record: Record) -> list[str]:
-        """Return the lines for a record; empty for most types."""
+        """Return the lines of text for a record; empty for most record types."""
         if record.type in _SAYS:
             return [_SAYS[record.type](record.data)]
         if record.type == "end" and record.data["problem"]:
@@ -122,12 +122,15 @@ class PlainProgress:
 
 
 class LiveProgress(PlainProgress):
-    """The same lines on a terminal, over a status line: the time, what runs, what is left, plans and replans.
+    """A listener that writes the lines of `PlainProgress` on a terminal, above a status line.
+
+    The status line contains the run time, the running skill, the number of items left, and the numbers of plans and
+    replans.
 
     Args:
         console: the terminal.
-        left: returns the number of items left.
-        tally: counts the run's plans; it must receive each record before this listener does.
+        left: returns the number of items that are left.
+        tally: the counts of the run; it must receive each record before this listener does.
     """
 
     def __init__(self, console: Console, left: Callable[[], int], tally: Tally) -> None:

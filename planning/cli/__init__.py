@@ -1,6 +1,6 @@
-"""Commands `dsc plan`, `dsc doctor` and `dsc bundles`: find a plan, and list engines and bundles.
+"""Commands `dsc plan`, `dsc doctor` and `dsc bundles`: find a plan, list engines, list bundles.
 
-The commands import their modules inside the function, so that `dsc --help` stays light.
+Each command imports its modules inside its function, so that `dsc --help` stays fast.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def _lines(said: dict[str, Any]) -> list[str]:
 
 
 PIPE_WIDTH = 120
-"""Columns of a table that is not printed on a terminal."""
+"""Width, in columns, of a table that is not printed on a terminal."""
 
 EVERY_ENGINE = (
     "Negative conditions, disjunctions, quantifiers, conditional effects and derived predicates are compiled away,"

@@ -1,4 +1,4 @@
-"""Report of `dsc plan`: plain data for `--json`, a text for readers, and warnings about the problem."""
+"""Report of `dsc plan`: plain data for `--json`, text for users, and warnings about the problem."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from planning.plan import (
 )
 
 FOUND, UNSOLVABLE, TIMED_OUT, FAILED = 0, 1, 3, 4
-"""Exit statuses; 2 is bad input, for every command."""
+"""Exit statuses of `dsc plan`; status 2 is bad input, for every command."""
 
 
 def end(status: int, answer: dict[str, Any], notes: list[str], *, as_json: bool) -> NoReturn:
-    """Print the answer, the notes on standard error, and exit."""
+    """Print the answer, print the notes on standard error, and exit with `status`."""
     for note in () if as_json else notes:
         typer.echo(f"note: {note}", err=True)
     typer.echo(json.dumps(answer | {"notes": notes}) if as_json else _text(answer), err=status != FOUND and not as_json)
@@ -41,7 +41,7 @@ def end(status: int, answer: dict[str, Any], notes: list[str], *, as_json: bool)
 
 
 def answer_of(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
-    """Return the exit status and the answer to print."""
+    """Return the exit status and the answer to print, as JSON data."""
     match outcome:
         case PlanFound(plan=plan, engine=engine, seconds=seconds, cost=cost):
             found: dict[str, Any] = {"outcome": "plan", "steps": [str(step) for step in plan.steps]}
@@ -61,7 +61,7 @@ def answer_of(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
 
 
 def ordered(order: PartialOrder) -> dict[str, Any]:
-    """Return the concurrent chains, and the steps that each step waits for; steps are numbered from 1."""
+    """Return the concurrent chains of steps, and the steps for which each step waits; steps are numbered from 1."""
     linked = {(link.provider, link.user) for link in order.links}
     found = chains(order.earlier, lambda one, other: (one, other) in linked)
     waits = {number: list(earlier) for number, earlier in order.waits_for.items()}
@@ -69,7 +69,7 @@ def ordered(order: PartialOrder) -> dict[str, Any]:
 
 
 def purposes(order: PartialOrder) -> dict[str, Any]:
-    """Return the facts that each step establishes, each with its user; 0 is the goal."""
+    """Return the facts that each step establishes, each with the step that needs it; 0 stands for the goal."""
     purposes: dict[int, list[dict[str, Any]]] = {number: [] for number in range(1, len(order.steps) + 1)}
     for link in order.links:
         if link.provider:
@@ -95,7 +95,7 @@ def _text(answer: Mapping[str, Any]) -> str:
 
 
 def _plan_text(answer: Mapping[str, Any]) -> str:
-    """Return one step a line, by lanes if they are known, each with its waits and purposes."""
+    """Return the plan as text, one step per line, by chains if they are given, with waits and purposes."""
     lanes = answer.get("lanes") or [range(1, len(answer["steps"]) + 1)]
     lines: list[str] = []
     for number, lane in enumerate(lanes, 1):
@@ -119,7 +119,7 @@ def _time_text(start: float, seconds: float) -> str:
 
 
 def without_derived(read: ProblemText, domain: PlanningDomain, file: Path) -> ProblemText:
-    """Return the problem without facts of derived predicates, with a note for each predicate."""
+    """Return the problem without initial facts of derived predicates, with a note for each such predicate."""
     derived = {axiom.predicate for axiom in domain.axioms}
     said = dict.fromkeys(fact.predicate for fact in read.init if fact.predicate in derived)
     notes = [f"{file}: facts of '{name}' in :init are ignored, since it is derived" for name in said]
@@ -128,7 +128,7 @@ def without_derived(read: ProblemText, domain: PlanningDomain, file: Path) -> Pr
 
 
 def valueless(plan: Plan, domain: PlanningDomain, read: ProblemText) -> list[str]:
-    """Return a note for each number that a step of the plan reads without a value; it counts as 0."""
+    """Return a note for each number that a step of the plan reads before it has a value; the value is then 0."""
     given, missing = set(read.values), dict[Fact, None]()
     for step in plan.steps:
         ground = domain.ground(step)
@@ -153,7 +153,7 @@ def _assigned(effect: Effect) -> Iterator[tuple[Fact, Term]]:
 
 
 def _fluents(e: Expression | Term) -> Iterator[Fact]:
-    """Yield the fluents without variables."""
+    """Yield the ground fluents of a condition or term."""
     if isinstance(e, Call) and all(isinstance(arg, Constant) for arg in e.args):
         yield Fact(e.function, tuple(arg.value for arg in e.args if isinstance(arg, Constant)))
     for part in parts_of(e):

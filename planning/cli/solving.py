@@ -1,4 +1,4 @@
-"""The work of `dsc plan`: read files, plan, wait for a cheaper plan, explain why there is none."""
+"""Implementation of `dsc plan`: read the files, find a plan, wait for cheaper plans, explain why no plan exists."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from planning.strips import Problem
 
 PLOT_NAME = "plan"
 PATIENCE, PATIENT_SECONDS = 3.0, 2.0
-"""The wait for a cheaper plan: a factor on the time of the first one, and the minimum in seconds."""
+"""The wait for a cheaper plan: a factor on the time of the first plan, and the minimum in seconds."""
 
 
 def plan(
@@ -80,7 +80,7 @@ def _order(plan: Plan, domain: PlanningDomain, world: KnowledgeBase, goal: Expre
 
 
 def _untraced(domain: PlanningDomain) -> list[str]:
-    """Return a note if plans are only for display."""
+    """Return a note if the domain allows plans only for display, because causal links cannot be traced."""
     form = Derivable.of(domain)
     names = ", ".join(f"'{one}'" for one in sorted(form.predicates)) if form else ""
     why = "planning actions change what it follows from, itself included"
@@ -88,17 +88,17 @@ def _untraced(domain: PlanningDomain) -> list[str]:
 
 
 def _plot_text(plan: Plan, domain: PlanningDomain, order: PartialOrder | None) -> str:
-    from dsc.text.plot_files import plot_to_yaml  # only here: plots take a while to import
+    from dsc.text.plot_files import plot_to_yaml  # imported here, because the import of plots is slow
     from planning.generation.plan_to_plot import plot_from_plan
 
     return plot_to_yaml(plot_from_plan(plan, domain, None, name=PLOT_NAME, order=order))
 
 
 def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, KnowledgeBase]:
-    """Return the domain, the problem and its initial world.
+    """Return the domain, the problem, and the world of the problem's initial state.
 
     Raises:
-        InputError: a file cannot be read or has a mistake, or there is no problem or no goal.
+        InputError: a file cannot be read or contains an error, the problem file is missing, or the problem has no goal.
     """
     if len(files) < 2:
         raise InputError(f"dsc plan takes a domain and a problem, there is only '{files[0]}'")
@@ -115,10 +115,10 @@ def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, Knowledg
 def solved(
     domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, seconds: float, engine: str | None
 ) -> tuple[Problem, PlanningOutcome]:
-    """Return the problem and the planning outcome; `seconds` is the limit for both together.
+    """Return the problem and the planning outcome; `seconds` limits problem construction and planning together.
 
     Raises:
-        WorkLimitError: the time was up during problem construction.
+        WorkLimitError: the time limit ended problem construction.
     """
     patience = WorkLimit(seconds)
     durations = bool(timing()) or engine is not None
@@ -145,7 +145,7 @@ def solved(
 
 
 def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, seconds: float) -> list[str]:
-    """Return why there is no plan, one sentence a line, or that the explanation timed out."""
+    """Return the reasons why no plan exists, one sentence per item, or a note that the time limit has passed."""
     patience = WorkLimit(seconds)
 
     def why() -> tuple[str, ...]:
@@ -160,7 +160,7 @@ def why_none(domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, se
 
 
 async def _cheapest(planner: PlannerProcess | PlannerRace, problem: Problem, seconds: float) -> PlanningOutcome:
-    """Return the first outcome; if actions have costs, the cheapest plan within some more time."""
+    """Return the first outcome; if actions have costs, the cheapest plan found within some additional time."""
     started = time.monotonic()
     async with aclosing(planner.plans(problem, seconds)) as plans:
         best = await anext(plans)
@@ -174,7 +174,11 @@ async def _cheapest(planner: PlannerProcess | PlannerRace, problem: Problem, sec
 
 
 def _planner(problem: Problem, engine: str | None) -> PlannerProcess | PlannerRace:
-    """Return the named engine if it supports the problem and is installed; without a name, a race."""
+    """Return the planner of the named engine, or a race if `engine` is `None`.
+
+    Raises:
+        InputError: the engine is unknown, lacks a feature of the problem, or is not installed.
+    """
     if engine is None:
         return PlannerRace()
     forms = [problem, *([problem.timed] if problem.timed else ())]

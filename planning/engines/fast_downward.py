@@ -1,7 +1,7 @@
-"""Driver of Fast Downward that bypasses its translator and writes the search input from the ground problem.
+"""Driver of Fast Downward that replaces its translator, and writes the search input from the ground problem.
 
-The translator, a Python program that grounds PDDL, starts for each problem and takes most of the time. The problem here
-is ground already. The text is SAS+ as in Helmert 2006, *The Fast Downward Planning System*, format version 3
+The translator is a Python program that grounds PDDL. It starts for each problem and takes most of the time, but the
+problem is already ground. The text is SAS+ as in Helmert 2006, *The Fast Downward Planning System*, format version 3
 (https://www.fast-downward.org/latest/documentation/translator-output-format/), with one binary variable for each fact.
 """
 
@@ -18,8 +18,8 @@ from pathlib import Path
 from planning.engines.registry import Engine
 from planning.engines.worker import Answers, Request, Search
 
-# The first search is lazy greedy with h_FF alone. On the clean-up table, preferred operators and landmarks are not
-# faster up to 50 items, and plans have up to twice as many trips. Later searches only look for a better plan.
+# The first search is lazy greedy with h_FF alone. For clean-up-table, preferred operators and landmarks are not faster
+# with up to 50 items, and their plans have up to twice as many trips. Later searches only improve the plan.
 _FIRST = "lazy_greedy([h],cost_type=one)"
 _BETTER = ["lazy_greedy([h],reopen_closed=false)"] + [f"lazy_wastar([h],preferred=[h],w={w})" for w in (5, 3, 2, 1)]
 
@@ -29,14 +29,14 @@ _SEARCHES = {
 }
 
 _PROVEN = (11, 12)
-"""Exit codes of an exhausted search; with safe heuristics, as here, that is a proof."""
+"""Exit codes of an exhausted search, which is a proof of unsolvability with the safe heuristics used here."""
 
 _OUT_OF_MEMORY = (22, 24)
-_FINEST_COST = 1000  # parts of a unit: SAS+ costs are integers, so fractions are rounded to these
+_FINEST_COST = 1000  # fractions of a cost unit; SAS+ costs are integers, so costs are rounded to these fractions
 
 
 def searching(engine: Engine) -> Search:
-    """Return the search with the engine's configuration, for `planning.engines.worker`.
+    """Return the search function with the engine's configuration, for `planning.engines.worker`.
 
     Raises:
         ModuleNotFoundError: Fast Downward is not installed.
@@ -57,7 +57,7 @@ def _program() -> Path:
 
 
 def _plans(program: str, options: str, text: str) -> Answers:
-    """Yield plans as the program finds them; it writes each to a separate file before it reports the cost."""
+    """Yield each plan when the program finds it; the program writes a file for each plan before it reports the cost."""
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as task:
         task.write(text)
         task.seek(0)
@@ -91,13 +91,13 @@ def _failure(status: int) -> Exception:
 
 
 def _read(file: Path) -> list[int]:
-    """Return the numbers of the actions: a line is `(a17 )`, and `;` begins a comment."""
+    """Return the indices of the actions; a line of a plan is e.g. `(a17 )`, and `;` begins a comment."""
     lines = file.read_text(encoding="utf-8").splitlines()
     return [int(line.strip("() ").removeprefix("a")) for line in lines if line.startswith("(")]
 
 
 def sas(request: Request) -> str:
-    """Return the problem in the translator's output format; actions are called `a0`, `a1`, ... by number."""
+    """Return the problem in the output format of the translator; action i has the name `ai`."""
     number, init, goal, actions = len(request["facts"]), set(request["init"]), request["goal"], request["actions"]
     prices = {cost: Fraction(cost).limit_denominator(_FINEST_COST) for cost in {action[4] for action in actions}}
     unit = lcm(*(price.denominator for price in prices.values()))
@@ -114,13 +114,13 @@ def sas(request: Request) -> str:
 
 
 class _Words:
-    """The text of conditions and effects by fact number, made once for all operators."""
+    """Cached texts of conditions and effects by fact number, shared by all operators."""
 
     def __init__(self, number: int) -> None:
         self._holds = [f"{n} 1" for n in range(number)]
         self._added = [f"0 {n} -1 1" for n in range(number)]
         self._deleted = [f"0 {n} -1 0" for n in range(number)]
-        self._moved = [(f"0 {n} 1 0", f"0 {n} 1 1") for n in range(number)]  # of facts in the precondition
+        self._moved = [(f"0 {n} 1 0", f"0 {n} 1 1") for n in range(number)]  # for facts in the precondition
 
     def operator(self, name: str, needs: list[int], adds: list[int], deletes: list[int], cost: int) -> str:
         moved = self._moved

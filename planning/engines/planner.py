@@ -1,4 +1,4 @@
-"""The planner interface, and a planner with one engine that never waits longer than its limit."""
+"""The planner interface, and a planner that runs one engine within a limit of real time."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from planning.strips import Problem
 
 @runtime_checkable
 class Improving(Protocol):
-    """The interface of a `Planner` that improves plans; used in real time only, since no two such runs are equal."""
+    """The interface of a `Planner` that improves plans; for real time only, since improvements are not repeatable."""
 
     def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        """Yield the outcome of `solve`, then each better plan found within `seconds` of real time.
+        """Yield the outcome of `solve`, then each better plan that is found within `seconds` of real time.
 
         Closing the generator ends the search.
         """
@@ -33,13 +33,13 @@ class Improving(Protocol):
 
 
 ENGINE = "pyperplan"
-"""The embedded engine: always installed, with the same plan for the same problem."""
+"""The embedded engine, which is always installed and is deterministic."""
 
 START_UP_SECONDS = 60.0
 
 
 class Planner(Protocol):
-    """The interface of a planner, replaceable in tests and deployments."""
+    """The interface of a planner; tests and deployments may replace the planner."""
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
         """Return the outcome after at most `seconds` of real time."""
@@ -47,10 +47,10 @@ class Planner(Protocol):
 
 
 class PlannerProcess:
-    """One engine, warm in a separate process.
+    """A planner with one engine in a separate process, which stays ready between problems.
 
-    It solves one problem at a time; a second one waits for the first. Closing the generator of `plans` ends the search
-    and all processes started by it; the worker process stays warm.
+    The process solves one problem at a time; the next problem waits. Closing the generator of `plans` ends the search
+    and all processes of the search; the worker process stays ready.
     """
 
     def __init__(
@@ -65,11 +65,11 @@ class PlannerProcess:
         """Configure the planner without starting its process.
 
         Args:
-            engine: its name in `planning.engines.registry`.
-            clock_hold: entered while the engine works, e.g. to hold a simulated clock.
-            command: the command of the worker process; by default the engine's own.
-            start_up_seconds: limit of the start, which does not count as planning time.
-            megabytes: memory limit of each process of a search; by default the worker's.
+            engine: the name of the engine in `planning.engines.registry`.
+            clock_hold: returns a context that is entered during a search, e.g. to stop a simulated clock.
+            command: the command of the worker process; by default the command of the engine's worker.
+            start_up_seconds: the limit for the start of the process; the start does not count as planning time.
+            megabytes: the memory limit of each process of a search; by default the limit of the worker.
         """
         self.engine = engine
         self._clock_hold = clock_hold
@@ -80,10 +80,10 @@ class PlannerProcess:
         self._lock = asyncio.Lock()
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        """Plan within `seconds` of real time, counted while the engine works.
+        """Return the outcome after at most `seconds` of real time, counted while the engine searches.
 
-        A sliced problem is tried as a whole if the slice has no plan, or none in half the time. An engine with
-        durations first tries the temporal problem, then the one with one action at a time.
+        If a slice has no plan, or none in half the time, the whole problem is tried. An engine that supports durations
+        first tries the temporal problem, then the problem with one action at a time.
         """
         async with aclosing(self.plans(problem, seconds)) as plans:
             return await anext(plans)
@@ -91,7 +91,7 @@ class PlannerProcess:
     async def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
         """Yield the outcome of `solve`, then each cheaper plan that an anytime engine finds in the remaining time.
 
-        Closing the generator ends the search: `async with contextlib.aclosing(...)`.
+        Closing the generator ends the search; use `async with contextlib.aclosing(...)`.
         """
         known = self._without_search(problem)
         if known is not None:
@@ -104,23 +104,23 @@ class PlannerProcess:
                         yield outcome
 
     async def warm_up(self) -> None:
-        """Start the process now, so that the first problem does not wait; the first problem reports a failed start."""
+        """Start the process before the first problem; if the start fails, the first problem reports the failure."""
         async with self._turn():
             with self._clock_hold(), contextlib.suppress(OSError, EngineStoppedError, OutOfTimeError):
                 await self._ready()
 
     async def close(self) -> None:
-        """End the process; a later `solve` starts a new one."""
+        """End the process; a later `solve` starts a new process."""
         self.kill()
 
     def kill(self) -> None:
-        """End the process; needs no event loop."""
+        """End the process; this method needs no event loop."""
         if self._process is not None:
             self._process.kill()
             self._process = None
 
     def _turn(self) -> asyncio.Lock:
-        """Return the running loop's lock: a planner may outlive a run and its loop."""
+        """Return the lock of the running event loop, since a planner may be used after its first loop has ended."""
         loop = asyncio.get_running_loop()
         if loop is not self._loop:
             self._loop, self._lock = loop, asyncio.Lock()
@@ -141,17 +141,17 @@ class PlannerProcess:
         return NoneFound(self.engine, f"no plan with one action at a time ({reason}); {in_concert()}")
 
     def _timed(self, problem: Problem) -> bool:
-        """Return whether the engine can try the temporal problem."""
+        """Return whether the problem has a temporal form and the engine supports durations."""
         return problem.timed is not None and can_time(self.engine)
 
     def _forms(self, problem: Problem) -> list[Callable[[], Problem]]:
-        """Return makers of the forms of a problem, in the order in which they are tried."""
+        """Return constructors of the forms of a problem, in the order in which the forms are tried."""
         forms = [problem.timed] if self._timed(problem) else []
         made = [_made(one) for one in (*forms, problem) if one is not None and not one.unreachable]
         return made if problem.unsliced is None else [*made, problem.unsliced]
 
     async def _tried(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        """Yield the plans of the first form with a plan; each form but the last gets half of the remaining time."""
+        """Yield the plans of the first form that has one; each form except the last uses half of the remaining time."""
         *first, last = self._forms(problem)
         cut_short = False
         for form in first:
@@ -164,13 +164,13 @@ class PlannerProcess:
                     yield replace(outcome, reproducible=not cut_short) if isinstance(outcome, PlanFound) else outcome
                 else:
                     return
-            seconds -= min(time.monotonic() - started, seconds / 2)  # a restart is not planning time
+            seconds -= min(time.monotonic() - started, seconds / 2)  # the restart of a process does not count
         async with aclosing(self._attempt(last(), seconds)) as outcomes:
             async for outcome in outcomes:
                 yield replace(outcome, reproducible=not cut_short) if isinstance(outcome, PlanFound) else outcome
 
     async def _attempt(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        """Yield the first outcome and each cheaper plan; any other outcome is the last."""
+        """Yield the first outcome, then each cheaper plan; an outcome without a plan ends the search."""
         best: PlanFound | None = None
         try:
             process = await self._ready()
@@ -196,12 +196,12 @@ class PlannerProcess:
                 yield TimedOut(self.engine, seconds) if out_of_time else EngineFailed(self.engine, str(error))
 
     async def _ready(self) -> EngineProcess:
-        """Return the ready process; a cancelled caller does not cancel the start."""
+        """Return the ready process; a cancellation of the caller does not cancel the start of the process."""
         known = self._process
         if known is not None:
             with contextlib.suppress(OutOfTimeError, EngineStoppedError):
                 await self._started(known)
-            if known.alive:  # checked late: the previous search may just have ended the process
+            if known.alive:  # after the wait: the end of the previous search may have killed the process
                 return known
             self.kill()
         self._process = process = EngineProcess(self._command)
@@ -213,7 +213,7 @@ class PlannerProcess:
             await aside(lambda: process.start(self._start_up_seconds))
 
     def _judged(self, answer: dict[str, Any], problem: Problem, seconds: float) -> PlanningOutcome:
-        """Return the outcome of the engine's answer: a plan counts only if it solves the problem."""
+        """Return the outcome for the engine's answer; a plan that does not solve the problem is a failure."""
         if "failed" in answer:
             return EngineFailed(self.engine, str(answer["failed"]))
         durations = "durations" in problem.features

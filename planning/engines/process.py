@@ -1,4 +1,4 @@
-"""A worker process as an object, which a thread or a task asks in real time, and which can be killed."""
+"""A worker process: start, search with a deadline in real time, and termination with all processes of the search."""
 
 from __future__ import annotations
 
@@ -18,39 +18,39 @@ import weakref
 from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
 from typing import Any
 
-_LONGEST_ANSWER = 1 << 26  # bytes; endless output must not fill the memory
+_LONGEST_ANSWER = 1 << 26  # bytes; endless output must not exhaust the memory
 
 _GRACE = 1.0  # seconds for a worker to report the end of a killed search
 
 _MOST_PROCESSES = 1 << 31  # upper bound of process ids
 
-_LONGEST_WAIT = 3600.0  # seconds; a selector takes no infinity
+_LONGEST_WAIT = 3600.0  # seconds; a selector does not support an infinite timeout
 
 
 def worker(engine: str, megabytes: int | None = None) -> tuple[str, ...]:
-    """Return the command of an engine's worker, with the memory limit of a search if given."""
+    """Return the command of an engine's worker, optionally with the memory limit of a search."""
     limit = () if megabytes is None else (str(megabytes),)
     return (sys.executable, "-P", "-m", "planning.engines.worker", engine, *limit)
 
 
 class OutOfTimeError(Exception):
-    """The time of the search is up."""
+    """Error: the deadline of a search or a start has passed."""
 
 
 class EngineStoppedError(Exception):
-    """The search or its process ended, or its output is not an answer."""
+    """Error: the search or its process ended, or its output is unreadable."""
 
 
 class Deadline:
     """A deadline in real time, which any thread may shorten."""
 
     def __init__(self, seconds: float) -> None:
-        """Set the deadline `seconds` from now."""
+        """Set the deadline to `seconds` from now."""
         self._at = time.monotonic() + seconds
 
     @property
     def left(self) -> float:
-        """Seconds until the deadline; not positive after it."""
+        """The seconds until the deadline; zero or negative after the deadline."""
         return self._at - time.monotonic()
 
     def shorten(self, seconds: float) -> None:
@@ -59,15 +59,15 @@ class Deadline:
 
 
 class EngineProcess:
-    """One running worker, which dies with its owner; see `planning.engines.worker` for the protocol.
+    """One running worker process; see `planning.engines.worker` for the protocol.
 
-    The worker leads a separate session, and each search a separate process group, so that all processes of an engine
-    are ended. A temporary folder for their files is removed with them. Garbage collection of the object and the exit of
-    the interpreter kill all of them. If the owner is killed, the worker sees the end of its input.
+    The worker leads a separate session, and each search has a separate process group, so that all processes of an
+    engine can be killed. Their temporary folder is then deleted. Garbage collection of this object and the exit of the
+    interpreter kill all processes. If the owner process is killed, the worker detects the end of its input and ends.
     """
 
     def __init__(self, command: Sequence[str]) -> None:
-        """Start the process without waiting for it.
+        """Start the process, and return without waiting until the process is ready.
 
         Raises:
             OSError: the command cannot be started.
@@ -103,30 +103,30 @@ class EngineProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether the process still runs."""
+        """Whether the process is still running."""
         return self._end.alive and _runs(self._pid)
 
     @property
     def idle(self) -> bool:
-        """Whether the process is ready and answers no request at the moment."""
+        """Whether the process is ready and handles no request."""
         return self._ready and not self._turn.locked()
 
     def kill(self) -> None:
-        """Kill the process and all processes that it started; further calls do nothing."""
+        """Kill the process and all processes that it started; a second call has no effect."""
         self._end()
         self.wake()
 
     def wake(self) -> None:
-        """Let the thread that waits for an answer check its deadline again."""
-        with contextlib.suppress(BlockingIOError):  # the pipe is full, so that the thread wakes anyway
+        """Wake the thread that waits for an answer, so that it checks its deadline again."""
+        with contextlib.suppress(BlockingIOError):  # the pipe is full, so the thread wakes anyway
             os.write(self._wake, b"!")
 
     def start(self, seconds: float) -> None:
         """Wait until the process is ready.
 
         Raises:
-            OutOfTimeError: it is not ready within `seconds`; the process is gone.
-            EngineStoppedError: it ended, was killed, or sent unreadable output; the process is gone.
+            OutOfTimeError: the process was not ready within `seconds`, and has been killed.
+            EngineStoppedError: the process ended, was killed, or wrote unreadable output.
         """
         with self._turn:
             if not self._ready and "ready" not in self._in_time(Deadline(seconds)):
@@ -135,15 +135,16 @@ class EngineProcess:
             self._ready = True
 
     def ask(self, request: bytes, deadline: Deadline, hear: Callable[[dict[str, Any]], object]) -> None:
-        """Run a search; return when it has ended.
+        """Send a request to the worker, and return after the end of the search.
 
         Args:
             request: the problem, as a line of JSON.
-            deadline: the end of the search.
+            deadline: the deadline of the search.
             hear: called with each answer, in this thread.
 
         Raises:
-            OutOfTimeError: the deadline has passed; the search is gone. So is the process, unless it is ready again.
+            OutOfTimeError: the deadline has passed, and the search has been killed. The process has been killed too,
+                unless it is ready again.
             EngineStoppedError: the search ended or was killed before an answer, or its answer is unreadable.
         """
         with self._turn:
@@ -160,7 +161,7 @@ class EngineProcess:
                 raise EngineStoppedError(f"the search {_ending(said['ended'])} without an answer")
 
     def _follow(self, group: object) -> None:
-        """Add the search's process group, which must belong to the worker's session."""
+        """Store the process group of the search; raise `EngineStoppedError` for a group of another session."""
         with contextlib.suppress(ProcessLookupError):  # the search has ended with all its processes
             if not isinstance(group, int) or not 0 < group < _MOST_PROCESSES or os.getsid(group) != self._pid:
                 self.kill()
@@ -179,7 +180,7 @@ class EngineProcess:
             raise EngineStoppedError(str(error)) from error
 
     def _abandon(self) -> None:
-        """Kill the search, and the process too unless it soon reports the end of the search."""
+        """Kill the search; kill the process too if it does not soon report the end of the search."""
         if not self._searches:
             self.kill()
             return
@@ -203,7 +204,7 @@ class EngineProcess:
         return said
 
     def _exchange(self, deadline: Deadline) -> None:
-        """Send and receive the bytes that the pipes allow now."""
+        """Send and receive as many bytes as the pipes allow without waiting."""
         with selectors.DefaultSelector() as selector:
             selector.register(self._woken, selectors.EVENT_READ)
             selector.register(self._from, selectors.EVENT_READ)
@@ -215,7 +216,7 @@ class EngineProcess:
         if self._woken in able:
             os.read(self._woken, 4096)
         if self._to in able:
-            with contextlib.suppress(BrokenPipeError):  # the process's output reports its end
+            with contextlib.suppress(BrokenPipeError):  # the process has ended; its output reports the end
                 self._unsent = self._unsent[os.write(self._to, self._unsent[:65536]) :]
         if self._from in able:
             self._receive()
@@ -229,7 +230,7 @@ class EngineProcess:
             raise ValueError(f"no answer: over {_LONGEST_ANSWER} bytes without an end")
 
     def _status(self) -> int | None:
-        """Return the exit status; end a process that only closed its output."""
+        """Return the exit status of the process; kill a process that only closed its output."""
         return self._end()
 
 
@@ -240,13 +241,16 @@ def _ending(status: object) -> str:
 
 
 def _environment(folder: str) -> dict[str, str]:
-    """The environment: this interpreter's module path, fixed string hashes so that plans repeat, a temporary folder."""
+    """Return the environment of the worker.
+
+    Fixed string hashes make plans repeatable. The module path equals the path of this interpreter.
+    """
     modules = os.pathsep.join(filter(None, sys.path))
     return {**os.environ, "PYTHONHASHSEED": "0", "PYTHONPATH": modules, "TMPDIR": folder}
 
 
 def _runs(pid: int) -> bool:
-    """Return whether a child process still runs; it stays on the process table, and its number reserved."""
+    """Return whether a child process is running; its process id stays reserved because it is not reaped here."""
     try:
         return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
     except ChildProcessError:
@@ -256,7 +260,7 @@ def _runs(pid: int) -> bool:
 def _end(popen: subprocess.Popen[bytes], searches: set[int], folder: str) -> int:
     _kill_groups([*searches, popen.pid])
     status = popen.wait()
-    shutil.rmtree(folder, ignore_errors=True)  # killed engines leave files
+    shutil.rmtree(folder, ignore_errors=True)  # killed engines do not delete their files
     return status
 
 
@@ -272,10 +276,10 @@ def _close(fds: Iterable[int]) -> None:
 
 
 async def answers(process: EngineProcess, request: bytes, seconds: float) -> AsyncGenerator[dict[str, Any], None]:
-    """Yield the process's answers as they arrive; closing the generator ends the search.
+    """Yield the answers of the process when they arrive; closing the generator ends the search.
 
     Raises:
-        OutOfTimeError, EngineStoppedError: as `EngineProcess.ask`.
+        OutOfTimeError, EngineStoppedError: as for `EngineProcess.ask`.
     """
     loop, deadline = asyncio.get_running_loop(), Deadline(seconds)
     heard: asyncio.Queue[dict[str, Any] | Exception | None] = asyncio.Queue()
@@ -303,6 +307,6 @@ async def answers(process: EngineProcess, request: bytes, seconds: float) -> Asy
 
 
 def _call(loop: asyncio.AbstractEventLoop, what: Callable[[], object]) -> None:
-    """Call `what` in the loop; a closed loop has no waiting task."""
+    """Call `what` in the loop; do nothing if the loop is closed, since then no task waits."""
     with contextlib.suppress(RuntimeError):
         loop.call_soon_threadsafe(what)

@@ -1,7 +1,7 @@
-"""Driver of pyperplan: makes its ground task directly from the ground problem.
+"""Driver of pyperplan that constructs pyperplan's ground task directly from the ground problem.
 
-Conversion through unified-planning would build the problem twice more: as that library's, and as a lifted one that
-pyperplan grounds. On all but the hardest problems this takes several times as long as the search.
+A conversion by unified-planning would construct two more problems: a problem of that library, and a lifted problem that
+pyperplan grounds. Except for the hardest problems, the conversion takes several times as long as the search.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from planning.engines.worker import Answers, Request, Search
 
 
 def searching(engine: Engine) -> Search:  # noqa: ARG001
-    """Return a greedy best-first search with h_FF, for `planning.engines.worker`."""
+    """Return a greedy best-first search with the heuristic h_FF, for `planning.engines.worker`."""
 
     def search(request: Request) -> Answers:
         return _plans(task(request))
@@ -26,10 +26,10 @@ def searching(engine: Engine) -> Search:  # noqa: ARG001
 
 
 def task(request: Request) -> Task:
-    """Return the problem as pyperplan's; action numbers are the operators' names.
+    """Return the problem as a task of pyperplan; each operator has the index of its action as name.
 
     pyperplan breaks ties by the order of its sets, which depends on the hashes of names. With fixed hashes
-    (PYTHONHASHSEED) the same problem gets the same plan.
+    (PYTHONHASHSEED) equal problems have equal plans.
     """
     names = [f"f{number}" for number in range(len(request["facts"]))]
 
@@ -45,7 +45,7 @@ def task(request: Request) -> Task:
 
 
 def _plans(posed: Task) -> Answers:
-    # The search prunes only states that h_FF proves hopeless even without deletes. An exhausted search is therefore a
-    # proof.
+    # The search prunes only states that are hopeless by h_FF even without deletions. An exhausted search is therefore a
+    # proof of unsolvability.
     found = greedy_best_first_search(posed, hFFHeuristic(posed))
     yield None if found is None else [operator.name for operator in found]

@@ -1,7 +1,7 @@
-"""Planners of several engines: a race in real time, and a cache of outcomes by problem.
+"""Planners with several engines: a race in real time, and a cache of outcomes by problem.
 
-The first valid plan wins a race, and a cheaper one may follow. In simulated time one named engine plans
-(`planning.engines.planner.PlannerProcess`), so that a run is repeatable. The winner of a race depends on the machine.
+The first valid plan wins a race, and cheaper plans may follow. The winner depends on the speed of the machine. A run
+in simulated time must be repeatable, and uses one engine instead (`planning.engines.planner.PlannerProcess`).
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from planning.strips import Problem
 _PLAIN = Problem("", {}, (), (), ())
 
 _Answer = tuple[str, PlanningOutcome | None]
-"""An engine's name and outcome; `None` after its last outcome."""
+"""The name of an engine and an outcome; `None` instead of an outcome marks the end of the engine's search."""
 
 _Failing = PlanFound | ProvenUnsolvable | NoneFound | TimedOut
-"""The outcomes that can list failures of other engines."""
+"""The outcomes that can contain failures of other engines."""
 
 
 class PlannerRace:
-    """A planner that races the engines that suit a problem: at most two, by its features and size.
+    """A planner that races at most two engines, chosen by the features and the size of the problem.
 
-    Each engine stays warm in a separate process. A new problem ends the search for a better plan of the last one. It
-    waits while the last one has no plan yet.
+    Each engine stays ready in a separate process. A new problem ends a search that only improves the plan of the
+    previous problem. The new problem waits if the previous problem has no plan yet.
 
     Args:
-        choose: returns the engines for a problem, the preferred one first.
+        choose: returns the engines for a problem, the preferred engine first.
         make: returns the planner of an engine.
     """
 
@@ -61,8 +61,8 @@ class PlannerRace:
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
         """Return the first valid plan within `seconds` of real time, or the combined outcome of all engines.
 
-        `failures` of the outcome lists the engines that failed. If all failed, the outcome is `EngineFailed`, with each
-        in its `engine` and `message`.
+        The attribute `failures` of the outcome lists the engines that failed. If all engines failed, the outcome is
+        `EngineFailed`; its attributes `engine` and `message` contain all of them.
         """
         async with aclosing(self.plans(problem, seconds)) as plans:
             return await anext(plans)
@@ -70,10 +70,10 @@ class PlannerRace:
     async def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
         """Yield the outcome of `solve`, then each cheaper plan that an engine finds in the remaining time.
 
-        A problem with durations first goes to temporal engines. If they find no plan in half the time, it is tried with
-        one action at a time.
+        Temporal engines first try a problem with durations. If they find no plan in half the time, other engines try
+        the problem with one action at a time.
 
-        Closing the generator ends all searches: `async with contextlib.aclosing(...)`.
+        Closing the generator ends all searches; use `async with contextlib.aclosing(...)`.
         """
         failures: tuple[EngineFailed, ...] = ()
         engines = [] if problem.timed is None else self._choose(problem.timed)
@@ -116,16 +116,16 @@ class PlannerRace:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def warm_up(self, problem: Problem | None = None) -> None:
-        """Start the engines for a problem (by default one of plain STRIPS), so that the first problem does not wait."""
+        """Start the engines for `problem` (by default for a STRIPS problem), so that the first search has no delay."""
         engines = self._choose(problem or _PLAIN)
         await asyncio.gather(*(self._planner(one.name).warm_up() for one in engines))
 
     async def close(self) -> None:
-        """End all processes; a later `solve` starts new ones."""
+        """End all processes; a later `solve` starts new processes."""
         self.kill()
 
     def kill(self) -> None:
-        """End all processes; needs no event loop."""
+        """End all processes; this method needs no event loop."""
         for planner in self._planners.values():
             planner.kill()
 
@@ -150,7 +150,7 @@ async def _run(planner: PlannerProcess, problem: Problem, seconds: float, answer
         async with aclosing(planner.plans(problem, seconds)) as plans:
             async for outcome in plans:
                 answers.put_nowait((planner.engine, outcome))
-    except Exception as error:  # noqa: BLE001  a failed planner must not stop the other
+    except Exception as error:  # noqa: BLE001  a failed planner must not stop the other planner
         answers.put_nowait((planner.engine, EngineFailed(planner.engine, described(error))))
     finally:
         answers.put_nowait((planner.engine, None))
@@ -159,7 +159,7 @@ async def _run(planner: PlannerProcess, problem: Problem, seconds: float, answer
 async def _better_and_better(
     answers: asyncio.Queue[_Answer], running: int, seconds: float
 ) -> AsyncGenerator[PlanningOutcome, None]:
-    """Yield the first plan or proof, then each cheaper plan; without either, one outcome with all failures."""
+    """Yield the first plan or proof, then each cheaper plan; without plan or proof, one outcome with all failures."""
     best: PlanFound | None = None
     failures: list[EngineFailed] = []
     late: list[str] = []
@@ -196,19 +196,19 @@ def _names(names: Iterable[str]) -> str:
 
 
 LARGEST = 64
-"""Number of cached problems; one of 50 items has about 3,000 ground actions."""
+"""Number of cached problems; a problem with 50 items has about 3,000 ground actions."""
 
 
 class CachingPlanner:
-    """A planner that answers immediately if the same problem comes again.
+    """A planner that returns the cached outcome of an equal problem.
 
-    Two problems are the same if their facts, goal, numbers and ground actions are equal by value. A cached plan is
-    therefore as valid as a new one; its caller validates each plan against the present world. Plans and proofs are
-    cached, failures and timeouts are not.
+    Two problems are equal if their facts, goals, numbers and ground actions are equal by value. A cached plan is
+    therefore as valid as a new plan; the caller validates each plan against the present world. Plans and proofs of
+    unsolvability are cached; failures and timeouts are not.
 
     Args:
         planner: solves problems that are not cached.
-        largest: number of problems; the least recently used is evicted first.
+        largest: the number of cached problems; the least recently used problem is evicted first.
     """
 
     def __init__(self, planner: PlannerProcess | PlannerRace, largest: int = LARGEST) -> None:
@@ -217,12 +217,12 @@ class CachingPlanner:
         self._known: OrderedDict[Hashable, PlanFound | ProvenUnsolvable] = OrderedDict()
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        """Return the outcome; a cached plan has `from_cache` and takes no time."""
+        """Return the outcome; a cached plan has `from_cache` and its search takes no time."""
         async with aclosing(self.plans(problem, seconds)) as plans:
             return await anext(plans)
 
     async def plans(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
-        """Yield the planner's outcomes and cache the best; a cached outcome is the only one."""
+        """Yield the planner's outcomes and cache the last plan or proof; a cached outcome is yielded alone."""
         started, key = time.monotonic(), _key(problem)
         known = self._known.get(key)
         if known is not None:
@@ -235,11 +235,11 @@ class CachingPlanner:
                 yield outcome
 
     async def close(self) -> None:
-        """End the planner's processes."""
+        """End the processes of the planner."""
         self.kill()
 
     def kill(self) -> None:
-        """End the planner's processes; needs no event loop."""
+        """End the processes of the planner; this method needs no event loop."""
         self._planner.kill()
 
     def _remember(self, key: Hashable, outcome: PlanningOutcome) -> None:
@@ -256,7 +256,7 @@ def _recalled(known: PlanFound | ProvenUnsolvable, seconds: float) -> PlanFound 
 
 
 def _key(problem: Problem) -> Hashable:
-    """Return the key of a problem; the order of facts does not matter."""
+    """Return a key that is equal for equal problems, regardless of the order of facts."""
     numbers = frozenset(problem.numbers.items())
     goal = (frozenset(problem.goal), frozenset(problem.bounds))
     timed = None if problem.timed is None else _key(problem.timed)

@@ -1,7 +1,7 @@
 """The registry of planning engines: their features, and the choice of engines for a problem.
 
-This module imports neither an engine nor unified-planning. Package metadata shows whether an engine is installed, so
-that a query costs almost nothing.
+This module imports neither an engine nor unified-planning. Package metadata show whether an engine is installed, so a
+query takes little time.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from planning.strips import Problem
 DISTRIBUTION = "dynamic-state-charts"
 
 WISHES = frozenset({"costs"})
-"""Features that an engine may ignore: its plan is still valid, but not the cheapest."""
+"""Features that an engine may ignore; the plan is then still valid, but may be expensive."""
 
 AT_ONCE = 2
-"""Maximum number of engines in a race (CONTRACTS.md, Planning); some robots have two cores."""
+"""The maximum number of engines in a race (CONTRACTS.md, Planning), because some robots have only two cores."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,20 +34,20 @@ class Engine:
     """A planning engine and its driver.
 
     Attributes:
-        name: its name on the command line and in outcomes.
-        driver: the module of `planning.engines` that runs it, inside the worker process.
-        made_by: the driver's argument: `module:class` of a unified-planning engine, or a configuration.
-        package: the distribution with the engine.
+        name: the name on the command line and in outcomes.
+        driver: the module of `planning.engines` that runs the engine inside the worker process.
+        made_by: the argument of the driver: `module:class` of a unified-planning engine, or a configuration.
+        package: the distribution that contains the engine.
         at_least: the lower bound of the package's version.
-        licence: the engine's own, which may differ from its package's.
-        features: features beyond STRIPS, out of `planning.strips.FEATURES`.
-        program: a program that must be on the path too.
-        optimal: whether its plans have the lowest cost.
-        anytime: whether it continues to search for better plans.
-        proves: whether it ends when there is no plan.
-        deterministic: whether the same problem gets the same plan on every run.
-        races: whether a race may choose it, or only the user by name.
-        most_actions: largest number of ground actions for which it is useful in a race; `None` without a bound.
+        licence: the licence of the engine, which may differ from the licence of the package.
+        features: the supported features beyond STRIPS, a subset of `planning.strips.FEATURES`.
+        program: a program that must also be on the path; empty if none is needed.
+        optimal: whether plans have the lowest cost.
+        anytime: whether the engine continues to search for better plans.
+        proves: whether the search ends if the problem has no plan.
+        deterministic: whether equal problems have equal plans in every run.
+        races: whether a race may choose the engine; otherwise only the user selects the engine by name.
+        most_actions: the largest number of ground actions with which a race chooses the engine; `None` without a limit.
     """
 
     name: str
@@ -67,11 +67,11 @@ class Engine:
 
     @property
     def version(self) -> str | None:
-        """The installed version of its package; `None` if it is not installed."""
+        """The installed version of the package; `None` if the package is not installed."""
         return _version(self.package)
 
     def lacks(self) -> str:
-        """Return the steps to make it usable; empty if it is usable."""
+        """Return the steps that make the engine usable; empty if the engine is usable."""
         steps = []
         if self.version is None:
             steps.append(f"pip install '{self.package}>={self.at_least}'")
@@ -80,21 +80,21 @@ class Engine:
         return ", ".join(steps)
 
     def can_do(self, features: Collection[str]) -> bool:
-        """Return whether it can plan with these features; `WISHES` are optional."""
+        """Return whether the engine supports these features, except those in `WISHES`."""
         return self.features.issuperset(frozenset(features) - WISHES)
 
 
 @cache
 def _version(package: str) -> str | None:
-    """Return the installed version, cached, since a lookup takes a millisecond and each race needs all of them."""
+    """Return the installed version; cached, since a lookup takes a millisecond and each race checks every engine."""
     try:
         return version(package)
     except PackageNotFoundError:
         return None
 
 
-# The tuple is in the order of preference. Fast Downward bypasses its translator (see the driver), so that it is faster
-# than pyperplan even on the smallest problem. Greedy pyperplan takes seconds from about 1,000 ground actions on.
+# The order is the order of preference. Fast Downward runs without its translator (see the driver), so it is faster than
+# pyperplan even on the smallest problem. Greedy pyperplan takes seconds from about 1,000 ground actions upwards.
 ENGINES = (
     Engine(
         "fast-downward", "fast_downward", "first, then better", "up-fast-downward", "1.0", "GPL-3.0",
@@ -123,10 +123,10 @@ ENGINES = (
 
 
 def engine(name: str) -> Engine:
-    """Return the engine of that name.
+    """Return the engine with this name.
 
     Raises:
-        UnknownNameError: there is no such engine.
+        UnknownNameError: no engine has this name.
     """
     for one in ENGINES:
         if one.name == name:
@@ -135,29 +135,29 @@ def engine(name: str) -> Engine:
 
 
 def able(features: Collection[str], engines: Iterable[Engine] = ENGINES) -> list[Engine]:
-    """Return the engines that can plan with these features; those that also grant the wishes come first."""
+    """Return the engines that support these features; engines that also support the wishes come first."""
     wishes = WISHES.intersection(features)
     suited = [one for one in engines if one.can_do(features)]
     return sorted(suited, key=lambda one: not wishes <= one.features)  # stable: otherwise in the order of preference
 
 
 def installed(one: Engine) -> bool:
-    """Return whether the engine is usable now."""
+    """Return whether the engine is usable without further steps."""
     return not one.lacks()
 
 
 def can_time(name: str) -> bool:
-    """Return whether there is an engine of that name, and it plans with durations."""
+    """Return whether the registry has an engine with this name that supports durations."""
     return any(one.name == name and "durations" in one.features for one in ENGINES)
 
 
 def timing() -> list[Engine]:
-    """Return the installed engines that plan with durations and take part in races."""
+    """Return the installed engines that support durations and take part in races."""
     return [one for one in able({"durations"}) if one.races and installed(one)]
 
 
 def in_concert() -> str:
-    """Return the engines that could plan with concurrent actions, and the steps to make them usable, as text."""
+    """Return, as text, the engines that support concurrent actions, with the steps that make them usable."""
     return "engines that could do several: " + ", ".join(map(described, able({"durations"})))
 
 
@@ -168,12 +168,12 @@ def nobody(problem: Problem, engine: str = "") -> NobodyCan:
 
 
 def cannot(name: str, problem: Problem) -> bool:
-    """Return whether the engine of that name is known to lack a feature of the problem."""
+    """Return whether the engine with this name lacks a feature of the problem; `False` for an unknown engine."""
     return any(one.name == name and not one.can_do(problem.features) for one in ENGINES)
 
 
 def described(one: Engine) -> str:
-    """Return the engine's name with the steps to make it usable."""
+    """Return the name of the engine, with the steps that make the engine usable."""
     lacks = one.lacks()
     return f"{one.name} ({lacks})" if lacks else one.name
 
@@ -181,7 +181,8 @@ def described(one: Engine) -> str:
 def chosen(problem: Problem, *, usable: Callable[[Engine], bool] = installed) -> list[Engine]:
     """Return at most `AT_ONCE` engines for a race; empty if no usable engine supports the problem.
 
-    A temporal problem that is too large for every engine gets none either: the one with one action at a time is faster.
+    The result is also empty for a temporal problem that is too large for every engine: the problem with one action at
+    a time is then solved faster.
     """
     racing = [one for one in able(problem.features) if one.races and usable(one)]
     size = len(problem.actions)
@@ -193,7 +194,7 @@ _JAVA_SECONDS = 10.0
 
 
 def findings() -> dict[str, Any]:
-    """Return plain data: `python`, `java` (its version or null), `packages` (name -> version or null), `engines`."""
+    """Return plain data: `python`, `system`, `java` (version or null), `packages` (versions or null) and `engines`."""
     return {
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}",

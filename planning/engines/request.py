@@ -1,15 +1,15 @@
-"""The request to a worker: a problem as a line of JSON, with facts listed once and referred to by number.
+"""The request to a worker: a problem as a line of JSON, which lists each fact once and refers to facts by number.
 
-Serialization is fast, since a robot may wait. Most ground actions come again in the next problem, so the text of each
-is cached with gaps for the numbers.
+Serialization must be fast, since a robot may wait. Successive problems share most ground actions, so the text of each
+action is cached with gaps for the numbers of its facts.
 
-Keys of the object:
+Keys of the JSON object:
 
 - `facts`: predicate and arguments of each fact.
 - `init` and `goal`: fact numbers.
-- `actions`: for each the step or null; the numbers of its precondition, adds and deletes; cost, bounds, assignments
-  and, if it is durative, its span.
-- `whole`: whether an unsliced form exists, which is sent later if needed.
+- `actions`: arrays of the step or null; fact numbers of precondition, adds and deletes; cost; bounds; assignments; the
+  span of a durative action or null.
+- `whole`: whether the problem has an unsliced form, which a later request may contain.
 - Other attributes of `planning.strips.Problem`.
 """
 
@@ -27,16 +27,16 @@ from planning.quantities import Assignment, NumericBound, from_json, to_json
 from planning.strips import ActionSpan, GroundAction, Problem
 
 _Row = tuple[str, tuple[Fact, ...]]
-"""The text of an action with gaps, and the facts whose numbers fill them."""
+"""The text of an action with gaps, and the facts whose numbers fill the gaps."""
 
 
 def written(problem: Problem) -> bytes:
-    """Return the problem as a line, cached, since all engines of a race get the same."""
+    """Return the problem as a line of JSON; cached, since all engines of a race receive an equal request."""
     return _written.find(problem, None) or _written.keep(problem, None, _line(problem))
 
 
 def read(request: Mapping[str, Any]) -> Problem:
-    """Return the problem of a request."""
+    """Return the problem of a decoded request."""
     facts = [Fact(predicate, tuple(args)) for predicate, *args in request["facts"]]
 
     def named(numbers: Iterable[int]) -> tuple[Fact, ...]:
@@ -72,7 +72,7 @@ def _line(problem: Problem) -> bytes:
     rows = [_rows.find(action, None) or _rows.keep(action, None, _row(action)) for action in problem.actions]
     before = len(problem.init) + len(problem.goal)
     mentioned = [*problem.init, *problem.goal, *chain.from_iterable([facts for _, facts in rows])]
-    places = list(map(id, mentioned))  # compared faster than facts; all facts stay alive meanwhile
+    places = list(map(id, mentioned))  # ids compare faster than facts; `mentioned` keeps the ids unique
     number: dict[Fact, int] = {}
     first = dict(zip(places, mentioned, strict=True))
     known = {place: number.setdefault(fact, len(number)) for place, fact in first.items()}
@@ -111,7 +111,7 @@ def _row(action: GroundAction) -> _Row:
 
 
 def _text(part: Any) -> str:
-    """Return JSON with `%` escaped, for the later formatting."""
+    """Return JSON text with `%` escaped, because the caller formats the text with `%`."""
     return json.dumps(part).replace("%", "%%")
 
 

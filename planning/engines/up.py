@@ -1,4 +1,4 @@
-"""Driver of unified-planning's engines: builds their problem without PDDL text, and reads their answers."""
+"""Driver of unified-planning's engines: constructs their problems without PDDL text, and reads their results."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from planning.strips import ActionSpan, GroundAction, Problem
 
 
 def translated(problem: Problem, *, costs: bool = False, environment: Environment | None = None) -> UpProblem:
-    """Return the problem as one of unified-planning.
+    """Return the problem as a problem of unified-planning.
 
     Args:
-        problem: the problem to translate; action number i is called `ai`.
-        costs: ask for a plan of low cost, for engines that support costs.
-        environment: holds unified-planning's expressions for the whole process; by default a new one. Fast
-            Downward's binding works only in the global one.
+        problem: the problem to translate; the action with index i has the name `ai`.
+        costs: whether to minimise the cost; only for engines that support costs.
+        environment: unified-planning's environment, which keeps all expressions; by default a new one. Fast Downward's
+            binding works only in the global environment.
     """
     return _Translation(problem, Environment() if environment is None else environment, costs=costs).result
 
 
 def ticks(problem: Problem) -> int:
-    """Return the time units per second in the translation; some engines take only integer durations."""
+    """Return the time units per second in the translation, because some engines support only integer durations."""
     spans = [action.span for action in problem.actions if action.span is not None]
     return math.lcm(*(_nearly(one).denominator for span in spans for one in (span.least, span.most)))
 
@@ -161,28 +161,28 @@ class _Translation:
 
 
 def _exact(number: float) -> Fraction:
-    """Return the decimal number as written: 0.1 is a tenth, though the float is not."""
+    """Return the number as its decimal text has it, e.g. 1/10 for 0.1, which the float only approximates."""
     return Fraction(repr(number))
 
 
 def _nearly(number: float) -> Fraction:
-    """Return the number to a thousandth."""
+    """Return the closest fraction with a denominator of at most 1000."""
     return _exact(number).limit_denominator(1000)
 
 
 def _whole(costs: Sequence[float]) -> list[int]:
-    """Return integers in the same proportion, to a thousandth: some engines take no fractions."""
+    """Return integers in the same proportions, rounded to thousandths, since some engines support no fractions."""
     exact = [_nearly(cost) for cost in costs]
     common = math.lcm(*(cost.denominator for cost in exact))
     return [int(cost * common) for cost in exact]
 
 
 _NO_MEMORY = ("OutOfMemoryError", "insufficient memory")
-"""Java's messages for exhausted memory."""
+"""Java's messages about exhausted memory."""
 
 
 def searching(engine: Engine) -> Search:
-    """Return the search of an engine with the class `module:name`, for `planning.engines.worker`.
+    """Return the search function of the engine with the class `module:name`, for `planning.engines.worker`.
 
     Raises:
         ImportError: the engine is not installed.
@@ -206,11 +206,11 @@ def _found(engine: Any, translation: UpProblem, problem: Problem) -> Answers:
 
 
 def _actions(result: PlanGenerationResult) -> list[int] | None:
-    """Return indices of the problem's actions, or `None` if the engine proved that there is no plan.
+    """Return the indices of the plan's actions, or `None` if the engine proved that the problem has no plan.
 
     Raises:
         MemoryError: the engine reports exhausted memory.
-        RuntimeError: the engine ended with none of these.
+        RuntimeError: the engine ended without a plan, a proof or a report of exhausted memory.
     """
     if isinstance(result.plan, TimeTriggeredPlan):
         timed = sorted(result.plan.timed_actions, key=_start)
@@ -226,7 +226,7 @@ def _actions(result: PlanGenerationResult) -> list[int] | None:
 
 
 def _timed(plan: TimeTriggeredPlan, ticks: int) -> list[tuple[int, float, float]]:
-    """Return index, start and duration in seconds of actions with times in ticks."""
+    """Return index, start and duration of each action; the times of the plan are in ticks, the result is in seconds."""
     return [
         (int(action.action.name[1:]), float(start / ticks), float((duration or 0) / ticks))
         for start, action, duration in plan.timed_actions
@@ -245,7 +245,7 @@ def _run_in_our_group(
 ) -> tuple[bool, tuple[list[str], list[str]], int]:
     """Replace unified-planning's `run_command`, which starts the program in a separate session.
 
-    In that session the program would outlive its search.
+    In a separate session the program would continue after the end of its search.
     """
     done = subprocess.run(cmd, capture_output=True, stdin=subprocess.DEVNULL, text=True, check=False)  # noqa: S603
     return False, ([done.stdout], [done.stderr]), done.returncode

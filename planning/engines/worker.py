@@ -1,20 +1,21 @@
 """The planner process: `python -m planning.engines.worker ENGINE [MEGABYTES]`.
 
-The worker imports the engine once and forks for each problem. Every search starts from the same state of the process,
-so that the same problem gets the same plan. The worker survives when a search is killed or crashes, and the search
-returns its memory.
+The worker imports the engine, and then forks a process for each problem. Every search therefore starts from an equal
+process state, so that equal problems have equal plans. The worker continues if a search is killed or crashes, and the
+end of a search frees its memory.
 
-The protocol has one JSON object a line. The worker begins with `{"ready": true}`. It reads problems (see
-`planning.engines.request`) from standard input and writes for each:
+The protocol has one JSON object per line. The worker first writes `{"ready": true}`. It reads problems (see
+`planning.engines.request`) from standard input, and writes for each problem:
 
-- `{"searching": G}`, with the process group G of the search and its processes.
-- Answers, each better than the one before: `{"actions": [3, 0, ...]}` or, with start and duration in seconds,
+- `{"searching": G}`, with the process group G of the search.
+- Answers, each better than the previous one: `{"actions": [3, 0, ...]}` or, with start and duration in seconds,
   `{"timed": [[3, 0.0, 5.0], ...]}`.
 - `{"actions": null}` if the engine proves that there is no plan, or `{"failed": "why"}`.
-- At last, always, `{"ended": STATUS}`.
+- `{"ended": STATUS}`, always as the last line.
 
-Each answer has `"translated"`: seconds of processor time for reading the problem and translating it for the engine. The
-worker and its search end with standard input, so that a planner never outlives its caller.
+Each answer contains `"translated"`: the processor time, in seconds, for reading the problem and translating it for the
+engine. The worker and its search end when standard input ends, so that no planner continues after the end of its
+caller.
 """
 
 from __future__ import annotations
@@ -37,43 +38,43 @@ from typing import Any, NoReturn
 _PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 
 Schedule = dict[str, list[tuple[int, float, float]]]
-"""An answer with a temporal plan: index, start and duration in seconds."""
+"""An answer with a temporal plan: index, start and duration of each action; times in seconds."""
 
 Answers = Iterator[list[int] | Schedule | None]
-"""An engine's answers; each is searched for on demand."""
+"""An iterator over the answers of an engine; the search for an answer begins when the answer is requested."""
 
 Request = Mapping[str, Any]
-"""A decoded problem with fact numbers, sufficient for most engines."""
+"""A decoded request; most engines work with the fact numbers."""
 
 Search = Callable[[Request], Answers]
-"""Translates a problem for the engine; the search begins with the first answer."""
+"""A function that translates a problem for the engine; the search begins with the first `next` of the iterator."""
 
 MEGABYTES = 2048
-"""Default memory limit of each process of a search."""
+"""The default memory limit of each process of a search, in megabytes."""
 
 
 def main() -> None:
-    """Serve until standard input ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the caller
+    """Handle requests until standard input ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller handles Ctrl-C
     name, megabytes = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else MEGABYTES
     out = _claim_stdout()
     _adopt_orphans()
     search = _loaded(name)
-    gc.freeze()  # all searches share the present objects
+    gc.freeze()  # forked searches share the existing objects
     _say(out, {"ready": True})
     for line in sys.stdin.buffer:
         _serve(line, search, out, megabytes)
 
 
 def _claim_stdout() -> int:
-    """Return the descriptor for answers; output of libraries goes to standard error instead."""
+    """Return the descriptor for answers, and redirect standard output of libraries to standard error."""
     out = os.dup(1)
     os.dup2(2, 1)
     return out
 
 
 def _adopt_orphans() -> None:
-    """Adopt processes that a search leaves behind (Linux); a container often has no init process that does."""
+    """Adopt orphaned processes of a search (Linux), since a container often lacks an init process that adopts them."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
@@ -85,9 +86,9 @@ def _say(out: int, said: dict[str, Any]) -> None:
 
 
 def _loaded(name: str) -> Search:
-    """Return the engine's search; if its import fails, one that reports the failure for each problem."""
+    """Return the engine's search function; if its import fails, a function that raises the error for each problem."""
     try:
-        import planning.strips  # noqa: F401, PLC0415  before the first fork, so that no search pays for it
+        import planning.strips  # noqa: F401, PLC0415  before the first fork, so that no search imports it
         from planning.engines.registry import engine  # noqa: PLC0415
 
         one = engine(name)
@@ -122,16 +123,16 @@ def _serve(line: bytes, search: Search, out: int, megabytes: int) -> None:
 
 
 def _in_group(child: int) -> None:
-    """Create the process group; parent and child both do, since either may be first."""
-    with contextlib.suppress(OSError):  # the child has done so and ended already
+    """Create the process group; parent and child both call this, since either process may run first."""
+    with contextlib.suppress(OSError):  # the child has created the group, or has ended
         os.setpgid(child, child)
 
 
 def _relay(heard: int, out: int, child: int) -> None:
-    """Relay the search's output until its end; kill it at the end of the worker's input."""
+    """Copy the output of the search to `out` until the search ends; kill the search if the worker's input ends."""
     poll = select.poll()
     poll.register(heard, select.POLLIN)
-    poll.register(0, 0)  # no request arrives meanwhile: only the hang-up counts
+    poll.register(0, 0)  # during a search no request arrives, so only a hang-up matters
     last = b"\n"
     while True:
         events = dict(poll.poll())
@@ -149,11 +150,11 @@ def _relay(heard: int, out: int, child: int) -> None:
 
 
 def _reaped(child: int) -> int:
-    """Return the exit status, negative for a signal, after killing the search's remaining processes."""
-    os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)  # while it is a zombie, its group's number is reserved
+    """Kill the remaining processes of the search, and return the exit status of the search, negative for a signal."""
+    os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)  # the zombie reserves the number of its process group
     _kill_group(child)
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    with contextlib.suppress(ChildProcessError):  # that was the last of the group
+    with contextlib.suppress(ChildProcessError):  # no process of the group is left
         while True:
             os.waitpid(-child, 0)
     return status
@@ -165,7 +166,7 @@ def _kill_group(group: int) -> None:
 
 
 def _search(line: bytes, search: Search, said: int, lifeline: int, megabytes: int) -> NoReturn:
-    """Run the search in the forked process and exit; it never returns to the parent's loop."""
+    """Run the search in the forked process and exit; never return to the loop of the parent."""
     try:
         _in_group(0)
         threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
@@ -177,7 +178,7 @@ def _search(line: bytes, search: Search, said: int, lifeline: int, megabytes: in
 
 
 def _end_with(lifeline: int) -> None:
-    """Kill this search if the worker dies before it could."""
+    """Kill this search if the worker dies before it can kill the search."""
     os.read(lifeline, 1)
     os.killpg(0, signal.SIGKILL)
 
@@ -185,12 +186,13 @@ def _end_with(lifeline: int) -> None:
 def _limit_memory(megabytes: int) -> None:
     """Limit the writable memory of each process of the search.
 
-    RLIMIT_DATA, unlike RLIMIT_AS, does not count reserved address space, of which Java takes many gigabytes. Linux (4.7
-    and later) enforces it, macOS does not.
+    RLIMIT_DATA, unlike RLIMIT_AS, does not count reserved address space, of which Java reserves many gigabytes. Linux
+    from version 4.7 enforces the limit; macOS does not.
     """
     allowed = megabytes << 20
     resource.setrlimit(resource.RLIMIT_DATA, (allowed, allowed))
-    # Half of the memory is Java's heap, so that Java reports its exhaustion; a crash of Java must leave no files.
+    # Java uses half of the memory as its heap, so that Java itself reports exhaustion. A crash of Java must leave no
+    # files.
     unwritten = "-XX:ErrorFile=/dev/null -XX:ReplayDataFile=/dev/null"
     os.environ["JAVA_TOOL_OPTIONS"] = f"-Xmx{max(16, megabytes // 2)}m {unwritten}"
 
@@ -205,8 +207,8 @@ def _answer(line: bytes, search: Search, said: int) -> None:
             _say(said, {**answer, "translated": translated})
     except MemoryError:
         _say(said, {"failed": "it ran out of memory"})
-    except Exception as error:  # noqa: BLE001  an engine may raise anything
-        from knowledge_base.errors import described  # noqa: PLC0415  a successful search does without
+    except Exception as error:  # noqa: BLE001  an engine may raise any error
+        from knowledge_base.errors import described  # noqa: PLC0415  a successful search does not need this import
 
         _say(said, {"failed": described(error)})
 
