@@ -1,1 +1,4 @@
-"""Runs a chart: events in, macrosteps, actions out to components; never computes and never blocks (S0.8)."""
+"""Sequencer: executes a chart by handling events, running macrosteps and sending actions to components (S0.8).
+
+The sequencer itself computes no result of a skill, and never blocks.
+"""

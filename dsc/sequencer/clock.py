@@ -1,6 +1,6 @@
-"""Time, injected: real seconds, or simulated ones that jump to the next timer.
+"""Clocks of a run, always injected: real seconds, or simulated seconds that jump to the next timer.
 
-In simulated time the whole asyncio loop runs on the simulated clock, so that a skill may sleep as in real time. A hold
+In simulated time, the whole asyncio loop runs on the simulated clock, so that a skill sleeps as in real time. A hold
 stops the clock during the wait for a real answer, e.g. of a planner in another process.
 """
 
@@ -19,16 +19,19 @@ from typing import Any, NamedTuple, TypeVar, TypeVarTuple, Unpack
 _Result = TypeVar("_Result")
 _Args = TypeVarTuple("_Args")
 _DIGITS = 9
-"""Decimal places of a second: calls that are due closer together are due at one moment, as in every asyncio loop."""
+"""Decimal places of a second to which scheduled times are rounded.
+
+Calls with equal rounded times are executed together, as in every asyncio loop.
+"""
 _FEW = 100
-"""Upper bound of cancelled calls that wait for their time, unless they are less than half of all."""
+"""Number of cancelled calls that may stay scheduled, unless they are less than half of all scheduled calls."""
 
 
 class LoopClock:
     """A `Clock` on the running asyncio loop's time, which is real or simulated.
 
     Args:
-        at: its first time, in seconds; a resumed run continues from there.
+        at: the clock's first time, in seconds; the clock of a resumed run continues from there.
     """
 
     def __init__(self, at: float = 0.0) -> None:
@@ -36,15 +39,15 @@ class LoopClock:
         self._start = self._time() - at
 
     def now(self) -> float:
-        """Seconds of run time."""
+        """Return the seconds of run time."""
         return self._time() - self._start
 
     async def sleep(self, seconds: float) -> None:
-        """Let `seconds` of run time pass."""
+        """Wait until `seconds` of run time have passed."""
         await asyncio.sleep(seconds)
 
     async def sleep_until(self, due: float) -> None:
-        """Let run time pass until `due`, if that is in the future."""
+        """Wait until second `due` of run time; return immediately if it is past."""
         passed = asyncio.Event()
         handle = self.call_at(due, passed.set)
         try:
@@ -53,25 +56,25 @@ class LoopClock:
             handle.cancel()
 
     def call_at(self, due: float, call: Callable[[], object]) -> asyncio.TimerHandle:
-        """Let the loop make a call at that run time, or soon if that is past."""
+        """Schedule a call for second `due` of run time, or for the next loop iteration if that is past."""
         return asyncio.get_running_loop().call_at(due + self._start, call)
 
     def timeout_at(self, due: float) -> asyncio.Timeout:
-        """Return a bound for the waits in a block: `TimeoutError` at that run time; `math.inf` means no bound."""
+        """Return a context manager that raises `TimeoutError` at second `due` of run time, or never for `math.inf`."""
         return asyncio.timeout_at(due + self._start if math.isfinite(due) else None)
 
     @property
     def simulated(self) -> bool:
-        """Whether time jumps instead of passing."""
+        """Whether time is simulated and jumps."""
         return isinstance(asyncio.get_running_loop(), SimulatedEventLoop)
 
     async def settled(self) -> None:
-        """Wait until the loop has no work at this moment of simulated time; in real time, for one turn."""
+        """Wait until the loop has no more work at the present simulated time; in real time, for one loop iteration."""
         loop = asyncio.get_running_loop()
         await (loop.settled() if isinstance(loop, SimulatedEventLoop) else asyncio.sleep(0))
 
     def hold(self) -> AbstractContextManager[None]:
-        """Stop simulated time inside the block; real time continues."""
+        """Return a context manager that stops simulated time; real time continues."""
         loop = asyncio.get_running_loop()
         return loop.hold() if isinstance(loop, SimulatedEventLoop) else _no_hold()
 
@@ -82,9 +85,10 @@ def _no_hold() -> Iterator[None]:
 
 
 class PastClock:
-    """An action's clock after a restart: it begins at the start of the action, and passes the past without waiting.
+    """The clock of an action after a restart; it begins at the start of the action.
 
-    Each task of an action passes through the past on its own.
+    Sleeps that end before the restart return immediately. Each task of an action passes the time before the restart
+    separately.
 
     Args:
         clock: run time.
@@ -97,34 +101,35 @@ class PastClock:
         self._own: ContextVar[float] = ContextVar("own", default=began)
 
     def now(self) -> float:
-        """Seconds of run time, as the action sees it."""
+        """Return the seconds of run time from the action's point of view."""
         own = self._own.get()
         return own if own < self._restart else self._clock.now()
 
     async def sleep(self, seconds: float) -> None:
-        """Let `seconds` of the action's time pass."""
+        """Wait until `seconds` of the action's time have passed."""
         due = self.now() + seconds
         self._own.set(due)
         await self._clock.sleep_until(due)
 
     def hold(self) -> AbstractContextManager[None]:
-        """Stop simulated time inside the block."""
+        """Return a context manager that stops simulated time."""
         return self._clock.hold()
 
 
 def released() -> AbstractContextManager[None]:
-    """Suspend one hold on simulated time inside the block: its owner waits in simulated time."""
+    """Return a context manager that suspends one hold on simulated time, while the hold's owner waits in that time."""
     loop = asyncio.get_running_loop()
     return loop.release() if isinstance(loop, SimulatedEventLoop) else _no_hold()
 
 
 class SimulatedEventLoop(asyncio.SelectorEventLoop):
-    """An asyncio loop whose time jumps to the next call that is due when no call is ready.
+    """An asyncio loop whose time jumps to the next scheduled call when no call is ready.
 
-    Calls that are due at one moment keep the order of their requests; the queue of asyncio leaves that open.
+    Calls with equal scheduled times are executed in the order of their requests; asyncio's own queue does not guarantee
+    that order.
 
     Args:
-        at: its first time, in simulated seconds.
+        at: the loop's first time, in simulated seconds.
     """
 
     def __init__(self, at: float = 0.0) -> None:
@@ -144,7 +149,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         self, when: float, callback: Callable[[Unpack[_Args]], object], *args: *_Args,
         context: Context | None = None,
     ) -> asyncio.TimerHandle:  # fmt: skip
-        """See `asyncio.loop.call_at`."""
+        """Schedule a call, see `asyncio.loop.call_at`."""
         context = context or copy_context()
         timer = asyncio.TimerHandle(when, callback, args, self, context)
         call = partial(_unless_cancelled, timer, callback, *args)
@@ -157,21 +162,21 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
 
     def _timer_handle_cancelled(self, handle: asyncio.TimerHandle) -> None:
         """Count a cancelled call, as asyncio requires; drop the cancelled calls when they are the majority."""
-        self._cancelled += handle.when() > self._simulated_now  # else it has left the queue
+        self._cancelled += handle.when() > self._simulated_now  # else the call has left the queue
         if self._cancelled > max(_FEW, len(self._due) // 2):
             self._due = [due for due in self._due if not due.timer.cancelled()]
             heapq.heapify(self._due)
             self._cancelled = 0
 
     async def settled(self) -> None:
-        """Wait until the loop has no work at this moment; time does not pass."""
+        """Wait until the loop has no more work at the present time; time does not advance."""
         waits = self.create_future()
         self._settling.append(waits)
         await waits
 
     @contextmanager
     def hold(self) -> Iterator[None]:
-        """Stop time inside the block; the loop waits for real input."""
+        """Stop simulated time inside the block; the loop waits for real input."""
         self._holds += 1
         try:
             yield
@@ -188,7 +193,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
             self._holds += 1
 
     def _go_on(self) -> bool:
-        """Let time jump, unless it is held, as no call is ready; return whether one is ready now."""
+        """Advance simulated time, unless it is held, as no call is ready; return whether a call is ready now."""
         settling, self._settling = self._settling, []
         for waits in settling:
             if not waits.done():
@@ -209,7 +214,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
 
 
 class _Due(NamedTuple):
-    """A future call, ordered by its moment and then by its unique number."""
+    """A scheduled call, ordered by its rounded time and then by its unique number."""
 
     moment: float
     number: int
@@ -219,13 +224,16 @@ class _Due(NamedTuple):
 
 
 def _unless_cancelled(timer: asyncio.TimerHandle, callback: Callable[[Unpack[_Args]], object], *args: *_Args) -> None:
-    """Make the call, unless another call of the same moment has cancelled it."""
+    """Execute the call, unless another call of equal time has cancelled it."""
     if not timer.cancelled():
         callback(*args)
 
 
 class _IdleSelector(selectors.DefaultSelector):
-    """Lets simulated time jump where the loop would wait; waits for real input if it cannot jump."""
+    """A selector that advances simulated time when the loop would wait.
+
+    If time cannot advance, it waits for real input.
+    """
 
     def __init__(self, go_on: Callable[[], bool]) -> None:
         super().__init__()
@@ -239,14 +247,15 @@ class _IdleSelector(selectors.DefaultSelector):
 
 
 def run_simulated(main: Coroutine[Any, Any, _Result], at: float = 0.0) -> _Result:
-    """Run a coroutine in simulated time that begins at `at`; a clock with the same `at` then shows the same times.
+    """Run a coroutine in simulated time that begins at `at`, and return its result.
 
-    Equal due times are compared in the loop's own time, which therefore must have no rounding error.
+    The loop compares scheduled times in its own time. With an equal `at`, a `LoopClock` shows these times without a
+    rounding error.
     """
     with asyncio.Runner(loop_factory=lambda: SimulatedEventLoop(at)) as runner:
         return runner.run(main)
 
 
 def run_real(main: Coroutine[Any, Any, _Result]) -> _Result:
-    """Run a coroutine in real time."""
+    """Run a coroutine in real time, and return its result."""
     return asyncio.run(main)

@@ -1,8 +1,8 @@
-"""Dispatcher executes actions on components and posts their answers as messages; no other part calls skills.
+"""The dispatcher: executes actions on components and posts their answers as messages; no other part calls skills.
 
-A skill is cancelled with the activation that started it (S0.15). A component takes earlier configuration before a
-skill begins. Unless it is `concurrent`, its cancelled skills clean up first. Arguments and answers are encoded, so
-that nothing is shared by accident.
+A skill is cancelled when the activation that started it ends (S0.15). Before a skill begins, its component has received
+all earlier parameters, modes and messages. Unless the component is `concurrent`, its cancelled skills clean up first.
+Arguments and answers are encoded, so that chart and component share no object by accident.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ from dsc.supervision.skill_dependencies import SkillDependencies
 from knowledge_base.errors import InputError, UnknownNameError, described
 
 DEFAULT_WITHIN = 300.0
-"""Seconds that a skill may take without `within` in its trigger: every wait has a bound."""
+"""Seconds after which a skill without `within` in its trigger is cancelled, so that every wait has a bound."""
 UNKNOWN_SKILL = SkillSignature("", "", {}, {}, {}, after_crash="repeat")
-"""The signature of a skill that the component lacks: its execution fails."""
+"""The signature of a skill that the component lacks; the skill's execution fails."""
 _MOST_FAULTS = 100
-"""Upper bound of the faults that the end of a run reports."""
+"""Upper bound of the number of faults that are reported at the end of a run."""
 
 
 class Dispatcher:
-    """Starts, configures and cancels.
+    """Executor of actions: starts and cancels skills, and sends commands to components.
 
     Args:
         components: the owners of the skills.
@@ -53,7 +53,7 @@ class Dispatcher:
     Attributes:
         activation: keeps required components alive and active.
         outbox: one-way outputs to components.
-        timers: timeouts, periods, delayed events and later input.
+        timers: timeouts, periods, delayed events and scheduled input from outside.
     """
 
     def __init__(
@@ -77,28 +77,28 @@ class Dispatcher:
         self.timers = Timers(clock, post)
 
     def deploy(self, component: Component) -> None:
-        """Add a component; it replaces one of the same name, and skills that need it begin."""
+        """Add a component, which replaces one with an equal name; skills that wait for it begin."""
         self.activation.deploy(component)
         self._wiring.deployed(component)
 
     def started(self) -> tuple[steps.Start, ...]:
-        """Return the skills that run, or have an answer that was not taken yet."""
+        """Return the starts of skills that are running, or whose final answer was not handled yet."""
         return tuple([one.start for one in self._running.values()])
 
     @property
     def in_use(self) -> frozenset[str]:
-        """Names of the components with running skills: the needs of the root in an activation tree."""
+        """Names of the components with running skills, which the root of the activation tree needs."""
         return frozenset(one.start.component for one in self._running.values())
 
     def _in_use(self) -> Iterable[str]:
-        """Return the components in use, and those with cancelled skills that clean up."""
+        """Return the components with running skills, and those with cancelled skills that clean up."""
         return (*self.in_use, *self._cleanups.pending)
 
     @property
     def waiting(self) -> bool:
         """Whether an answer or timeout is pending.
 
-        Periods do not count, as they are always pending. Skills without a bound do not count, as they may never end.
+        Periods do not count, as they are always pending. Skills without a deadline do not count, as they may never end.
         """
         return self.timers.waiting or any(math.isfinite(one.due) for one in self._running.values())
 
@@ -122,7 +122,7 @@ class Dispatcher:
             self.outbox.send(self.component(output.component), output)
             if isinstance(output, steps.SwitchMode):
                 self.activation.switched(output.component, output.mode)
-        # The rest are notes for the trace.
+        # Other outputs are notes, which only the trace records.
 
     @property
     def components(self) -> Mapping[str, Component]:
@@ -130,30 +130,33 @@ class Dispatcher:
         return self._components
 
     def component(self, name: str) -> Component:
-        """Return the component of that name; raise `UnknownNameError`."""
+        """Return the component of that name; raise `UnknownNameError` if it is missing."""
         if name not in self._components:
             raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
         return self._components[name]
 
     def memories(self) -> Iterator[tuple[str, Any]]:
-        """Yield the memories of components by their names; a component that fails keeps its last one."""
+        """Yield names and memories of components.
+
+        A component whose `remember` fails is skipped, and keeps its last memory.
+        """
         for component in self._components.values():
             if type(component).remember is not Component.remember:
                 try:
                     with contained():
                         memory = component.remember()
-                except Exception as error:  # noqa: BLE001  # the others remember
+                except Exception as error:  # noqa: BLE001  # the other components remember
                     self._fault(f"component '{component.name}' cannot return its memory: {described(error)}")
                 else:
                     yield component.name, memory
 
     def _fault(self, what: str) -> None:
-        """Report a fault at the end of the run, one time; at most the first `_MOST_FAULTS`."""
+        """Add a fault for the end of the run, one time; only the first `_MOST_FAULTS` faults are kept."""
         if what not in self._faults and len(self._faults) < _MOST_FAULTS:
             self._faults.append(what)
 
     def settle(self, start: steps.Start) -> None:
-        """Take the final answer of a skill; until then its component counts as in use."""
+        """End a skill whose final answer was handled; until then, its component counts as in use."""
         self._running.pop(start.action_id, None)
         if start.component in self.activation.concerned:
             self.activation.look()
@@ -164,13 +167,13 @@ class Dispatcher:
             task.add_done_callback(self._forget_tasks.discard)
 
     def report_taken(self, start: steps.Start) -> None:
-        """Take a report of a skill, so that there is room for another."""
+        """Count a report of a skill as handled, so that the skill may post another."""
         running = self._running.get(start.action_id)
         if running is not None and running.reports is not None:
             running.reports.taken()
 
     def dismiss(self, start: steps.Start) -> None:
-        """Stop a skill whose report was its failure; a later answer does not count."""
+        """Stop a skill that failed by an invalid report; its later answer is ignored."""
         running = self._running.get(start.action_id)
         if running is not None:
             running.answered = True
@@ -187,23 +190,23 @@ class Dispatcher:
         self._cleanups.add(start.component, stopped.task, stopped.given_up)
 
     def restore(self, component: str, effective: Sequence[steps.SetParameter | steps.SwitchMode]) -> None:
-        """Restore the effective settings of before a restart; raises `UnknownNameError`."""
+        """Restore a component's effective settings after a restart; raise `UnknownNameError` if it is not deployed."""
         self.outbox.restore(self.component(component), effective)
         for one in effective:
             if isinstance(one, steps.SwitchMode):
                 self.activation.switched(component, one.mode)
 
     def resume(self, start: steps.Start, interrupted: InterruptedSkill) -> None:
-        """Continue a skill that a restart interrupted; raises `UnknownNameError`."""
+        """Continue a skill that a restart interrupted; raise `UnknownNameError` if its component is missing."""
         self._start(start, interrupted)
 
     async def abandon(self, start: steps.Start) -> None:
-        """Let a component stop a skill that was cancelled just before a restart.
+        """Request that a component stops a skill that was cancelled just before a restart.
 
         If the skill had ended before, its answer is posted, as its observations are true.
 
         Raises:
-            InputError: the component failed to stop it.
+            InputError: the component failed to stop the skill.
         """
         component, action_id = self.component(start.component), self._part_of + start.action_id
         try:
@@ -218,10 +221,10 @@ class Dispatcher:
             self._post(SkillMessage(start, outcome, final=True, declared=signature.outcomes.get(outcome.event)))
 
     async def close(self) -> list[str]:
-        """Cancel skills and timers, and wait until skills have stopped and components have taken their outputs.
+        """Cancel skills and timers, and wait until skills have stopped and components have received their outputs.
 
         Returns:
-            Deliveries that failed without failing a skill, and the faults of the run.
+            Errors of deliveries that failed without failing a skill, and the faults of the run.
         """
         for activation in {start.activation for start in self.started()}:
             self._cancel(activation)
@@ -233,7 +236,7 @@ class Dispatcher:
                 task.cancel()
                 give_up(task)
             for task in stopped:
-                failure(task)  # marks it as retrieved; the skill was cancelled
+                failure(task)  # marks the error as retrieved; the skill was cancelled
         await self.activation.close()
         self._wiring.close()
         return [*self.outbox.failures(), *self._faults]
@@ -261,7 +264,7 @@ class Dispatcher:
                 raise
             outcome = failed
         running.answer(outcome)
-        running.task.remove_done_callback(running.ended)  # each takes a turn of the loop
+        running.task.remove_done_callback(running.ended)  # each callback costs a turn of the loop
 
     async def _outcome(
         self,
@@ -271,7 +274,7 @@ class Dispatcher:
         interrupted: InterruptedSkill | None,
     ) -> Outcome:
         start, signature = running.start, running.signature
-        taken = 0  # reports before the restart that are repeated
+        taken = 0  # reports from before the restart that the skill repeats
 
         def report(outcome: Outcome) -> None:
             nonlocal taken
@@ -294,11 +297,11 @@ class Dispatcher:
                 return validated(status.outcome, start, signature)
             if status is Status.UNKNOWN and signature.after_crash == "sense":
                 raise UncertainActionError(f"the run was interrupted, and the effect of {call.action_id} is unknown")
-            if status is Status.RUNNING or signature.pattern != "event":  # else it is activated again
+            if status is Status.RUNNING or signature.pattern != "event":  # else the event is activated again
                 taken = interrupted.reports
         work = component.execute(start.skill, call, encoded(start.arguments) if start.arguments else {})
         outcome = validated(await dependencies.carrying(work), start, signature)
-        # Its observations are true, however late they arrive.
+        # The observations are true, also if they arrive late.
         return replace(late(start, running.within), observed=outcome.observed) if running.is_late else outcome
 
     def _cancel(self, activation: int) -> None:

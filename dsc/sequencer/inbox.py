@@ -1,4 +1,4 @@
-"""Inbox holds messages until the sequencer takes them; timers post messages that are due later."""
+"""The inbox with messages that wait for the sequencer, and the timers that post scheduled messages."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from dsc.messages import LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.clock import LoopClock
 
 MOST_AT_ONCE = 10_000
-"""Upper bound of answers, timers and own events that a run takes at one moment of simulated time.
+"""Upper bound of answers, timers and own events that a run handles at one simulated time.
 
-A long plan of skills that take no time needs a few thousand.
+A long plan of skills without duration needs a few thousand such messages.
 """
 _SHOWN = 8
 """Number of events that the message about a livelock lists."""
@@ -23,10 +23,10 @@ _SHOWN = 8
 class Inbox:
     """Messages in the order of their arrival, for one reader.
 
-    An `asyncio.Queue` can do more (several readers, a bound, `join`), and takes twice the time.
+    An `asyncio.Queue` has more functions (several readers, a bound, `join`), and takes twice the time.
 
     Attributes:
-        waiting: the messages; the reader takes the first.
+        waiting: the messages; the reader removes the first one.
     """
 
     def __init__(self) -> None:
@@ -34,7 +34,7 @@ class Inbox:
         self._arrival: asyncio.Future[None] | None = None
 
     def put(self, message: Message) -> None:
-        """Add a message, from the loop's own thread."""
+        """Append a message; call it in the loop's own thread."""
         self.waiting.append(message)
         if self._arrival is not None and not self._arrival.done():
             self._arrival.set_result(None)
@@ -45,7 +45,7 @@ class Inbox:
         return self._arrival
 
     def rearrange(self, order: Callable[[Iterable[Message]], Iterable[Message]]) -> None:
-        """Put the waiting messages in another order."""
+        """Replace the waiting messages by the result of `order`."""
         self.waiting = deque(order(tuple(self.waiting)))
 
     def drop_answers(self, start: Start) -> None:
@@ -54,11 +54,11 @@ class Inbox:
 
 
 class Timers:
-    """Messages that are due later: timeouts and periods of states, delayed events, and input from outside.
+    """Scheduled messages: timeouts and periods of states, delayed events, and input from outside.
 
     Args:
         clock: run time.
-        post: receives each message when it is due.
+        post: receives each message at its scheduled time.
     """
 
     def __init__(self, clock: LoopClock, post: Callable[[TimerMessage | SendLater | LateMessage], None]) -> None:
@@ -69,21 +69,21 @@ class Timers:
 
     @property
     def waiting(self) -> bool:
-        """Whether a message is pending; periods, which are always pending, do not count."""
+        """Whether a message is scheduled; periods do not count, as they are always scheduled."""
         return any(not (isinstance(one, TimerMessage) and one.timer.event == EVERY) for one, _, _ in self)
 
     @property
     def periods(self) -> frozenset[tuple[int, int]]:
-        """Activation and number of every pending period."""
+        """Activation and number of every scheduled period."""
         timers = [one.timer for one, _, _ in self if isinstance(one, TimerMessage)]
         return frozenset((timer.activation, timer.index) for timer in timers if timer.event == EVERY)
 
     def __iter__(self) -> Iterator[tuple[TimerMessage | SendLater | LateMessage, float, asyncio.TimerHandle]]:
-        """Yield each pending message with the second of run time at which it is due, and its handle."""
+        """Iterate over scheduled messages, each with its second of run time and its handle."""
         return iter(self._pending.values())
 
     def schedule(self, message: TimerMessage | SendLater | LateMessage, due: float) -> None:
-        """Post the message at that second of run time, unless it is cancelled or revoked before."""
+        """Schedule the message for second `due` of run time; `cancel`, `revoke` and `close` prevent it."""
         number = self._last = self._last + 1
 
         def arrive() -> None:
@@ -97,12 +97,12 @@ class Timers:
         self._drop(lambda one: isinstance(one, TimerMessage) and one.timer.activation == activation)
 
     def revoke(self, revoke: Revoke) -> None:
-        """Cancel the events of that id."""
+        """Cancel the delayed events with the id and frame of `revoke`."""
         which = revoke.frame, revoke.id
         self._drop(lambda one: isinstance(one, SendLater) and (one.event.frame, one.id) == which)
 
     def close(self) -> None:
-        """Cancel all messages."""
+        """Cancel all scheduled messages."""
         self._drop(lambda _: True)
 
     def _drop(self, wanted: Callable[[Message], bool]) -> None:
@@ -113,9 +113,9 @@ class Timers:
 
 
 class LivelockGuard:
-    """Counts the messages that a run causes itself at one moment of simulated time.
+    """Counter of the messages that a run causes itself at one simulated time.
 
-    Real time always passes, and an operator can stop a robot in a livelock.
+    In real time, no guard is needed: time always advances, and an operator can stop a robot in a livelock.
     """
 
     def __init__(self, clock: LoopClock) -> None:

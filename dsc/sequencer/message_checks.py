@@ -26,18 +26,18 @@ from knowledge_base.language.evaluation.world import World
 from knowledge_base.store import KnowledgeBase
 
 Declared = Mapping[str, str | None]
-"""Names of attributes -> types; `None` accepts any type."""
+"""Types of attributes by name; `None` accepts any type."""
 
 
 def encoded(value: Any) -> Any:
-    """Copy plain data, so that nothing is shared by accident."""
+    """Return a copy of plain data, so that two owners share no object by accident."""
     if isinstance(value, dict) and not value:  # most skills have neither arguments nor attributes
         return {}
     return json.loads(json.dumps(value, allow_nan=False))
 
 
 def _copied(value: Any, name: str) -> Any:
-    """Copy plain data from outside; raise `InputError`."""
+    """Return a copy of plain data from outside; raise `InputError` for other data."""
     try:
         return encoded(value)
     except (TypeError, ValueError) as error:
@@ -48,20 +48,20 @@ def _copied(value: Any, name: str) -> Any:
 
 
 def broken(start: Start, reason: str) -> Outcome:
-    """Return the `skill_error` of a skill that broke a rule; the reason becomes one line."""
+    """Return the outcome `skill_error` of a skill that violated a rule, with the reason as one line."""
     skill = f"{start.component}.{start.skill}"
     return Outcome(SKILL_ERROR, {"skill": skill, "reason": f"{skill}: {' '.join(reason.split())}"})
 
 
 def late(start: Start, seconds: float, missing: str = "") -> Outcome:
-    """Return the `timed_out` of a skill; if a component was `missing`, the skill has not begun."""
+    """Return the outcome `timed_out` of a skill. A skill that waited for the component `missing` has not begun."""
     skill = f"{start.component}.{start.skill}"
     reason = f"{skill}: no outcome within {seconds:g} s" + (f", it waited for {missing}" if missing else "")
     return Outcome(TIMED_OUT, {"skill": skill, "seconds": seconds, "reason": reason})
 
 
 def validated(outcome: object, start: Start, signature: SkillSignature) -> Outcome:
-    """Return the outcome with encoded attributes, or a `skill_error` if it violates the signature."""
+    """Return the outcome with encoded attributes, or a `skill_error` if the outcome violates the signature."""
     try:
         return _conforming(outcome, signature.outcomes)
     except InputError as error:
@@ -98,8 +98,8 @@ def _plain(event: str, attributes: Mapping[str, Any], declared: Declared) -> dic
     """Return a copy of the attributes as plain data.
 
     Raises:
-        UnknownNameError: one is not declared.
-        InputError: one is missing, is of another type, or is not plain data.
+        UnknownNameError: an attribute is not declared.
+        InputError: an attribute is missing, has another type, or is not plain data.
     """
     for name in attributes:
         if name not in declared:
@@ -130,14 +130,14 @@ _FITS: Mapping[str | None, tuple[str, Callable[[object], bool]]] = {
     "text": ("text", _is_text),
     "symbol": ("a name", _is_text),
 }
-"""Types without objects, in words, with their tests."""
+"""Types of values that are not objects of the world, with a description and a test."""
 
 
 def validated_in_world(message: SkillMessage, knowledge: KnowledgeBase) -> SkillMessage:
-    """Return the message, or a `skill_error` if its outcome contradicts the schema or names unknown objects.
+    """Return the message, or a `skill_error` if its outcome contradicts the schema or refers to unknown objects.
 
     Args:
-        message: its outcome conforms to the skill's signature.
+        message: a message whose outcome conforms to the skill's signature.
         knowledge: the world before the observations of the outcome.
     """
     said = message.outcome
@@ -156,10 +156,10 @@ def validated_in_world(message: SkillMessage, knowledge: KnowledgeBase) -> Skill
 
 
 def _require_objects(event: str, attributes: Mapping[str, Any], declared: Declared, *worlds: World) -> None:
-    """Require that each attribute of an object type names an object of one of these worlds.
+    """Require that each attribute of an object type is the name of an object in one of these worlds.
 
     Raises:
-        InputError: it is not a name, there is no such object, or it is of another type.
+        InputError: the attribute is not a name, or there is no such object, or the object has another type.
     """
     schema = worlds[0].schema
     for name, wanted in declared.items():
@@ -183,7 +183,7 @@ def _require_objects(event: str, attributes: Mapping[str, Any], declared: Declar
 
 
 def require_parts(library: object, knowledge: object, clock: object, trace: object, store: object) -> None:
-    """Raise `InputError` unless a sequencer can use these parts; the last two may be missing."""
+    """Raise `InputError` unless a sequencer can use these parts; `trace` and `store` may be `None`."""
     require(library, Library, "the plots are given as a Library, made by Library(plots)")
     require(knowledge, KnowledgeBase, "the knowledge is a KnowledgeBase")
     require(clock, LoopClock, "the clock is a LoopClock, made inside the loop that runs the sequencer")
@@ -203,7 +203,7 @@ def checked_event(said: object) -> Event:
     """Return the event with copied attributes.
 
     Raises:
-        InputError: it is not an event, only the executive fires it, or an attribute is not plain data.
+        InputError: the value is not an event, only the executive fires the event, or an attribute is not plain data.
     """
     plain = isinstance(said, Event) and said.attributes is NO_ATTRIBUTES  # the common case
     if not isinstance(said, Event) or not (plain or isinstance(said.attributes, Mapping)):
@@ -218,7 +218,7 @@ def checked_event(said: object) -> Event:
 
 
 def checked_change(delta: Delta, author: str, knowledge: KnowledgeBase) -> KnowledgeMessage:
-    """Return a message for a change of knowledge that fits the schema; raise `InputError`."""
+    """Return the message for a change of knowledge; raise `InputError` if the change contradicts the schema."""
     require_delta(delta)
     require_text(author, "an author")
     knowledge.overlay().apply(delta)
@@ -228,11 +228,11 @@ def checked_change(delta: Delta, author: str, knowledge: KnowledgeBase) -> Knowl
 def checked_setting(
     owner: str, name: str, value: object, components: Mapping[str, Component], library: Library
 ) -> ParameterMessage:
-    """Return a message for an operator's setting of a parameter.
+    """Return the message for an operator's setting of a parameter.
 
     Raises:
         UnknownNameError: there is no such component or plot, or it declares no such parameter.
-        InputError: the value is out of range, breaks a relation, or operators may not set it.
+        InputError: the value is out of range or violates a relation, or operators may not set the parameter.
     """
     require_text(owner, "the name of a component or plot")
     require_text(name, "a parameter's name")
@@ -243,7 +243,7 @@ def checked_setting(
     else:
         valid = [*components, *(plot.name for plot in library)]
         raise UnknownNameError(f"there is no component or plot '{owner}'", found=owner, valid=valid)
-    assert value is None or isinstance(value, str | int | float | bool)  # noqa: S101  # every value of a range is one
+    assert value is None or isinstance(value, str | int | float | bool)  # noqa: S101  # as every value of a range is
     return ParameterMessage(owner, name, value, of_plot=owner not in components)
 
 
@@ -251,7 +251,7 @@ def checked_arguments(plot: ActionPlot, given: object) -> Mapping[str, Any]:
     """Return the validated arguments of a plot.
 
     Raises:
-        InputError: it is not a mapping, a value is not plain data, or a number or truth value is of another type.
+        InputError: `given` is not a mapping, a value is not plain data, or a number or truth value has another type.
     """
     if not isinstance(given, Mapping):
         raise InputError(f"arguments are a mapping of parameters' names to values, not {shown(given)}")

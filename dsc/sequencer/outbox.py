@@ -1,4 +1,4 @@
-"""Outbox delivers parameters, modes and messages to components, to each in the order of dispatch."""
+"""The outbox: delivers parameters, modes and messages to each component in the order of dispatch."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from dsc.sequencer.message_checks import encoded
 from knowledge_base.errors import described
 
 CLOSING = GRACE
-"""Seconds for components to take their last outputs, and for cancelled skills to stop."""
+"""Seconds for components to receive their last outputs, and for cancelled skills to stop."""
 _MOST_REFUSED = 1000
-"""Upper bound of remembered refusals; a run without a store never reads them."""
+"""Upper bound of the number of stored refusals; a run without a store never reads them."""
 
 
 class Outbox:
-    """One-way outputs that components have not taken yet, and those that they refused.
+    """One-way outputs that components have not received yet, and outputs that they refused.
 
     Attributes:
-        untaken: by component, the task that delivers the latest output; removed when a skill has waited for it.
+        untaken: by component, the task that delivers the latest output; removed when a skill has waited for the task.
     """
 
     def __init__(self) -> None:
@@ -36,11 +36,11 @@ class Outbox:
 
     @property
     def under_way(self) -> Collection[Told]:
-        """Outputs that were neither taken nor refused yet."""
+        """Outputs that were neither received nor refused yet."""
         return self._under_way.values()
 
     def refused(self) -> Collection[Told]:
-        """Outputs that components have refused since the last call."""
+        """Return the outputs that components have refused since the last call."""
         if not self._refused:  # the common case; each stored macrostep reads it
             return ()
         refused = tuple(self._refused)
@@ -48,11 +48,11 @@ class Outbox:
         return refused
 
     def send(self, component: Component, told: Told) -> None:
-        """Deliver an output after the earlier ones to the same component."""
+        """Deliver an output to the component, after all earlier outputs."""
         self._begin(component, (told,), lambda: _take(component, told))
 
     def restore(self, component: Component, effective: Sequence[SetParameter | SwitchMode]) -> None:
-        """Deliver the effective settings of before a restart: the parameters as one set, then the modes."""
+        """Deliver the settings that were effective before a restart: the parameters as one set, then the modes."""
         parameters = [one for one in effective if isinstance(one, SetParameter)]
         if parameters:
             values = {one.parameter: one.value for one in parameters}
@@ -81,15 +81,15 @@ class Outbox:
                 for number in numbers:
                     del self._under_way[number]
             why = None if before is None else failure(before)
-            if why is not None:  # the next skill fails with it
+            if why is not None:  # the next skill fails with this error
                 raise why
 
         self.untaken[component.name] = asyncio.get_running_loop().create_task(in_order())
 
     async def taken(self, component: Component) -> None:
-        """Wait until the component has taken its `untaken` outputs; raises its error, one time."""
+        """Wait until the component has received its `untaken` outputs; raise the error of a delivery, one time."""
         pending = self.untaken[component.name]
-        await asyncio.wait([pending])  # unlike `await pending`, this does not cancel it when a skill is cancelled
+        await asyncio.wait([pending])  # unlike `await pending`, keeps the delivery when a skill is cancelled
         if self.untaken.get(component.name) is pending:
             del self.untaken[component.name]
         why = failure(pending)
@@ -97,12 +97,12 @@ class Outbox:
             raise why
 
     async def all_taken(self) -> None:
-        """Wait until all components have taken or refused their outputs, for `CLOSING` seconds at most."""
+        """Wait until all components have received or refused their outputs, for `CLOSING` seconds at most."""
         if self.untaken:
             await asyncio.wait(self.untaken.values(), timeout=CLOSING)
 
     def tasks(self) -> Iterable[asyncio.Task[None]]:
-        """Return the deliveries to wait for at the end."""
+        """Return the deliveries that the end of a run waits for."""
         return self.untaken.values()
 
     def failures(self) -> Iterator[str]:
@@ -130,5 +130,5 @@ async def _restore_mode(component: Component, mode: str) -> None:
 
 
 def failure(task: asyncio.Task[None]) -> BaseException | None:
-    """Return the error of a task that is done, or `None`."""
+    """Return the error of a task that is done; `None` without an error or after a cancellation."""
     return None if task.cancelled() else task.exception()

@@ -1,7 +1,7 @@
-"""A plot as a skill: a component runs it, with separate components and a separate world model (S2.6, S0.9).
+"""Plots as skills: a component runs a plot, with separate components and a separate world model (S2.6, S0.9).
 
-Prefer `use` for a plot in the same run: it sees the same knowledge, and its states are part of the chart. As a skill, a
-plot is closed: its data are its arguments, outcomes and outputs. Therefore another process can host it.
+In one run, prefer `use`: the plot then shares the knowledge, and its states are part of the chart. A plot as a skill is
+closed: its only data are its arguments, outcomes and outputs. Therefore another process can host it.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 
 COMPLETED = "completed"
-"""The outcome of a plot with outputs, which are its attributes, or of one that emits no event at its end."""
+"""The outcome of a plot with outputs, which are its attributes, and of a plot that emits no event at its end."""
 
 
 class PlotComponent(Component):
     """A component whose skills are plots.
 
     Args:
-        name: its name in charts.
+        name: the component's name in charts.
         library: the plots; each is a skill, with its events and `completed` as outcomes.
         components: the components that the plots use.
-        knowledge: makes the world model for one execution; by default an empty one.
-        after_crash: the treatment of an interrupted plot. A repeated one starts again, and so do its actions, with the
-            same ids while its choices are the same.
+        knowledge: returns the world model for one execution; by default an empty one.
+        after_crash: the treatment of an interrupted plot. A repeated plot starts again, and repeats its actions. The
+            actions have their former ids if the plot chooses the same ones.
     """
 
     def __init__(
@@ -53,16 +53,18 @@ class PlotComponent(Component):
         self._signatures = {plot.name: _signature(self.name, plot, after_crash) for plot in library}
 
     def skills(self) -> dict[str, SkillSignature]:
-        """Return a signature for each plot."""
+        """Return a signature for each plot, by name."""
         return dict(self._signatures)
 
     async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-        """Run the plot to its end and report the events that it emits before. A cancelled plot exits its states.
+        """Run the plot to its end, and return its outcome; events that it emits earlier become reports.
+
+        A cancelled plot exits its states.
 
         Raises:
             UnknownNameError: there is no such plot.
             InputError: an argument is missing or unknown.
-            RuntimeError: it ended before its final state.
+            RuntimeError: the plot ended before its final state.
         """
         if skill_name not in self._signatures:
             message = f"component '{self.name}' has no skill '{skill_name}'"

@@ -1,4 +1,4 @@
-"""Reactor: a message changes machine and knowledge, and its macrostep is recorded; nothing leaves from here."""
+"""The reactor: applies each message to machine and knowledge, and records its macrostep; it dispatches nothing."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 
 MOST_CANCELLED = 1_000
-"""Upper bound of cancelled skills with a known cause, for the trace of their late observations."""
+"""Upper bound of the number of cancelled skills whose cause is kept, for the trace of late observations."""
 CHART = "chart"
 """Author of the changes that a plot makes with `tell`."""
 StepListener = Callable[[Step], None]
-"""Called with each macrostep; must not block."""
+"""Function that is called with each macrostep; it must not block."""
 
 
 class Reactor:
-    """Executes one macrostep for each message, in a live run as in the replay of a recorded one.
+    """Executor of one macrostep for each message, in a live run and in the replay of a recorded run.
 
     Attributes:
         machine: the chart's state.
         emitted: outcome events of the plot so far.
-        problem: the reason to end the run, or the error of its last step.
-        in_vain: periods without any effect since the last other message.
+        problem: the reason to end the run, or the error of its last step; `None` without either.
+        in_vain: activation and number of periods without any effect since the last other message.
         settings: an operator's settings of plots, by plot and parameter.
-        caused_by: numbers of the records about started skills that may still answer, by action id; of cancelled ones
-            the latest `MOST_CANCELLED`.
-        listeners: called with each macrostep, before its actions leave.
+        caused_by: by action id, the number of the trace record about the start of a skill that may still answer. Of
+            cancelled skills, only the latest `MOST_CANCELLED` are kept.
+        listeners: functions that are called with each macrostep, before its actions are dispatched.
     """
 
     def __init__(self, library: Library, knowledge: KnowledgeBase, trace: Trace) -> None:
@@ -74,7 +74,12 @@ class Reactor:
         self.tracer.known_plots.update(record.data["hash"] for record in kept.records if record.type == "plot")
 
     def start(self, plot: str, arguments: Mapping[str, Any], serials: int = 0) -> tuple[Output, ...]:
-        """Enter the plot; return the outputs. `serials` is the last serial number given out before.
+        """Enter the plot, and return its outputs.
+
+        Args:
+            plot: the plot's name.
+            arguments: values of the plot's parameters.
+            serials: the last serial number that earlier runs have used.
 
         Raises:
             InputError: the plot is unknown, or a parameter is missing or unknown.
@@ -92,7 +97,7 @@ class Reactor:
             return ()
 
     def react(self, message: Message) -> tuple[Output, ...]:
-        """Let the machine take the message; return the outputs."""
+        """Execute the macrostep for a message, and return its outputs; an error sets `problem` instead."""
         try:
             event = self._received(message)
             before = self.machine.state
@@ -112,7 +117,7 @@ class Reactor:
         return output
 
     def leave(self) -> tuple[Output, ...]:
-        """Leave the active states at the end of a run: exit actions stop the components; return the outputs."""
+        """Exit the active states at the end of a run, and return the outputs of exit actions, which stop components."""
         if self.machine.state.root is None:
             return ()
         try:
@@ -122,7 +127,7 @@ class Reactor:
             return ()
 
     def _received(self, message: Message) -> Event | None:
-        """Apply the observations of a message; return its event for the machine, if any."""
+        """Apply the observations of a message; return its event for the machine, or `None`."""
         if isinstance(message, LateMessage):
             message = message.message
         if isinstance(message, KnowledgeMessage):
@@ -154,7 +159,7 @@ class Reactor:
         self.trace.cause = None
         timer = message.timer
         event = Event(timer.event, to=timer.activation, exact=True, number=timer.index)
-        if timer.event != EVERY:  # most periods have no effect; of the others, the step is recorded
+        if timer.event != EVERY:  # most periods have no effect; for the others, the trace records the step
             self.trace.cause = self.tracer.event(event, "timer")
         return event
 
@@ -182,7 +187,7 @@ class Reactor:
             self.knowledge.apply(delta, author)
 
     def _commit(self, step: Step) -> tuple[Output, ...]:
-        """Record the step and apply its changes of knowledge; afterwards its actions may leave."""
+        """Record the step and apply its changes of knowledge; return its outputs, which may then be dispatched."""
         if self.listeners:
             with contained():
                 for listener in self.listeners:
@@ -206,7 +211,7 @@ class Reactor:
         return step.output
 
     def _forget_causes(self, cancelled: Iterable[str]) -> None:
-        """Forget the causes of skills some time after their cancellation: until then they may still observe."""
+        """Forget the causes of skills that were cancelled long ago; until then, the skills may still observe."""
         self._cancelled.extend(cancelled)
         while len(self._cancelled) > MOST_CANCELLED:
             self.caused_by.pop(self._cancelled.popleft(), None)
@@ -218,7 +223,7 @@ class Reactor:
             self.in_vain.add((message.timer.activation, message.timer.index))
 
     def _unhandled(self, message: Message, event: Event) -> None:
-        """End the run if an active state ignores its own skill's answer, as it would wait without end."""
+        """End the run if an active state ignores its skill's final answer, as the state would wait without end."""
         if not isinstance(message, SkillMessage) or not message.final or event.to is None:
             return
         if self.machine.state.has_activation(event.to):
@@ -228,6 +233,6 @@ class Reactor:
 
 
 def _is_vain(step: Step) -> bool:
-    """Return whether the only output is the next period; in the same state and world, that never changes."""
+    """Return whether a step only scheduled the next period; with equal state and world, later periods do that too."""
     only_timers = all(isinstance(output, StartTimer) for output in step.output)
     return only_timers and not step.knowledge and not step.emitted

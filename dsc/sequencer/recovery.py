@@ -1,4 +1,4 @@
-"""Recovery after a restart: re-arms every pending action, timer and scheduled input of an interrupted run."""
+"""Recovery after a restart: reschedules every pending action, timer and scheduled input of an interrupted run."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ def require_components(kept: Kept, dispatcher: Dispatcher) -> None:
 
 
 async def recover(kept: Kept, dispatcher: Dispatcher) -> None:
-    """Restore components, and re-arm the pending actions, timers and inputs.
+    """Restore components, and continue the pending actions, timers and inputs.
 
-    Outputs of the last macrostep may never have left, so they leave (again) after everything else is restored.
+    The outputs of the last macrostep may never have reached the components. So they are dispatched (again) after
+    everything else is restored.
 
     Raises:
-        InputError: a component cannot recall its data or stop a cancelled skill, or one is not deployed.
+        InputError: a component cannot recall its data or stop a cancelled skill, or a component is not deployed.
     """
     for name, memory in kept.memory.items():
         try:
@@ -46,13 +47,13 @@ async def recover(kept: Kept, dispatcher: Dispatcher) -> None:
     await dispatcher.outbox.all_taken()
     for one in others:
         _rearm(one, dispatcher)
-    await asyncio.sleep(0)  # until these have begun
+    await asyncio.sleep(0)  # until the restored items have begun
     for one in pending[len(older) :]:
         _rearm(one, dispatcher)
 
 
 def _divided(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | SwitchMode]], list[Pending]]:
-    """The effective settings by component, and the other pending outputs."""
+    """Return the effective settings by component, and the other pending outputs."""
     effective: dict[str, list[SetParameter | SwitchMode]] = {}
     others = []
     for one in older:

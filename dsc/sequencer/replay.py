@@ -1,4 +1,4 @@
-"""Replay of a kept run: its messages go through a new reactor, and the results are compared."""
+"""Replay of a kept run: a new reactor handles the run's messages, and the results are compared."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ class Divergence:
     Attributes:
         step: number of the macrostep.
         what: name of the result.
-        recorded, replayed: the result in the run and in the replay.
+        recorded: the result in the run.
+        replayed: the result in the replay.
     """
 
     step: int
@@ -37,13 +38,19 @@ class Divergence:
     replayed: str
 
     def __str__(self) -> str:
-        """One line."""
+        """One line for people."""
         return f"step {self.step}: {self.what} was: {self.recorded}; now: {self.replayed}"
 
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """Result of a replay: the number of equal macrosteps, and the divergence that ends it, if any."""
+    """The result of a replay.
+
+    Attributes:
+        run: number of the run.
+        steps: the number of macrosteps with equal results.
+        divergence: the first difference, which ends the replay; `None` without a difference.
+    """
 
     run: int
     steps: int
@@ -57,13 +64,13 @@ def replay(
 
     Args:
         path: the store, which is only read.
-        run: its number; the last one by default.
-        library: plots to replay it with; by default those that it began with.
-        schema: an extension of the store's, where conditions use predicates that Python computes.
+        run: the run's number; by default the last run.
+        library: plots for the replay; by default those with which the run began.
+        schema: an extension of the store's schema. Conditions need it if they use predicates that Python computes.
 
     Raises:
         StoreError: the store cannot be read, or has no such run.
-        HistoryError: the knowledge at the start of the run is forgotten.
+        HistoryError: the store no longer has the knowledge at the start of the run.
     """
     path = Path(path)
     with archive(path) as runs:
@@ -80,7 +87,7 @@ def replay(
 
 
 class _ReplayedRun:
-    """A reactor without inbox and dispatcher; its actions are only noted."""
+    """A reactor without inbox and dispatcher; its actions are only recorded."""
 
     def __init__(self, runs: RunArchive, row: RunRow, past: Archive, library: Library) -> None:
         self._runs = runs
@@ -92,7 +99,7 @@ class _ReplayedRun:
         self._started: dict[str, Start] = {}
 
     def take(self, step: StepRow) -> Divergence | None:
-        """Repeat one macrostep; return its first result that differs."""
+        """Repeat one macrostep; return its first result that differs, or `None`."""
         for change in self._past.changes(self._knowledge.version, step.before):  # of other authors
             self._knowledge.apply(change.delta, change.author)
         action_id = step.message.get("action")

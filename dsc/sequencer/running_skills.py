@@ -1,4 +1,4 @@
-"""Running skills: their answers, their time limits, and the clean-up of cancelled ones."""
+"""Running skills: their answers, their deadlines, and the clean-up of cancelled skills."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from knowledge_base.errors import described
 
 @dataclass(frozen=True, slots=True)
 class InterruptedSkill:
-    """The record of an action from before the restart.
+    """An action that was started before the restart.
 
     Attributes:
-        began: second of run time at which it was started.
-        reports: the number of its intermediate events that were taken.
+        began: second of run time at which the action was started.
+        reports: the number of the action's reports that were handled.
     """
 
     began: float
@@ -33,23 +33,25 @@ class InterruptedSkill:
 
 
 class RunningSkill:
-    """A skill that runs: posts its reports and, one time, its end.
+    """A skill during its execution; it posts its reports and, one time, its end.
 
-    A single timer bounds it. The timer cancels the task at the second `due`, and abandons it after `GRACE` more.
+    A single timer bounds the execution. The timer cancels the task at second `due`, and abandons the task after `GRACE`
+    further seconds.
 
     Args:
-        start, signature: of the skill.
-        within: seconds that it may take.
-        due: second of run time at which they are over; `math.inf` means never.
-        clock: tells the time.
-        post: receives its messages.
+        start: the start of the skill.
+        signature: the skill's signature.
+        within: maximum duration, in seconds.
+        due: second of run time at which the duration is over; `math.inf` means never.
+        clock: run time.
+        post: receives the messages of the skill.
         fault: receives a fault of the run.
 
     Attributes:
-        task: its execution.
-        reports: its intermediate events.
-        stopped: whether the chart has cancelled it.
-        answered: whether its end was posted.
+        task: the execution.
+        reports: the reports; `None` before the first.
+        stopped: whether the chart has cancelled the skill.
+        answered: whether the end was posted.
     """
 
     task: asyncio.Task[None]
@@ -91,7 +93,7 @@ class RunningSkill:
         self._post(SkillMessage(self.start, report, failed, goes_on=failed, conflated=conflated, declared=declared))
 
     def answer(self, outcome: Outcome) -> None:
-        """Post the end, one time; the time limit ends only after that."""
+        """Post the end, one time; then stop the timer of the deadline."""
         if not self.answered:
             if self.reports is not None:
                 self.reports.flush()
@@ -101,15 +103,15 @@ class RunningSkill:
             self.end_limit()
 
     def ended(self, task: asyncio.Task[None]) -> None:
-        """Answer for a task that has ended without an answer: the skill has failed, unless it was stopped."""
+        """Post a failure for a task that has ended without an answer, unless the skill was stopped."""
         why = asyncio.CancelledError("its task was cancelled") if task.cancelled() else task.exception()
         if why is not None and not self.stopped:
             self.answer(broken(self.start, described(why)))
 
     def failed(self, error: BaseException, missing: str) -> Outcome | None:
-        """Return the outcome of a skill that raised; `None` if its task was cancelled from outside."""
+        """Return the outcome of a skill that raised an error; `None` if its task was cancelled from outside."""
         cancelled = issubclass(type(error), asyncio.CancelledError)
-        if cancelled and self._expired and self.task.uncancel() <= 0:  # the limit alone has cancelled it
+        if cancelled and self._expired and self.task.uncancel() <= 0:  # only the deadline has cancelled it
             return late(self.start, self.within, missing)
         if not is_own(error, self.task):
             return None
@@ -123,16 +125,19 @@ class RunningSkill:
 
     @property
     def is_late(self) -> bool:
-        """Whether the time is over. A task that blocks its loop is late without notice, except in simulated time."""
+        """Whether the deadline has passed.
+
+        In real time, a task that blocks the loop is late although no timer could fire.
+        """
         return self._expired or (not self._clock.simulated and self._clock.now() > self.due)
 
     def begin_limit(self) -> None:
-        """Cancel the task at its due second."""
+        """Schedule the cancellation of the task at second `due`."""
         if math.isfinite(self.due):
             self._timer = self._clock.call_at(self.due, self._expire)
 
     def end_limit(self) -> None:
-        """Stop the timer: the task has ended, or its clean-up is bounded elsewhere."""
+        """Stop the timer: the task has ended, or `PendingCleanups` bounds its clean-up."""
         if self._timer is not None:
             self._timer.cancel()
 
@@ -149,7 +154,7 @@ class RunningSkill:
         self._abandon()
 
     def _abandon(self) -> None:
-        """Answer for a task that ignored its time limit, so that the chart need not wait for it."""
+        """Post `timed_out` for a task that ignored its deadline, so that the chart need not wait for the task."""
         if not self.answered:
             self.given_up()
             self.answer(late(self.start, self.within))
@@ -161,13 +166,15 @@ class RunningSkill:
 
 
 class PendingCleanups:
-    """Cancelled tasks until they have stopped; a task that ignores its cancellation is abandoned after `GRACE` seconds.
+    """Cancelled tasks until they have stopped.
+
+    A task that ignores its cancellation is abandoned after `GRACE` seconds.
 
     Args:
-        say: receives the component of a task that has stopped, or was abandoned.
+        say: receives the component's name when one of its tasks has stopped or was abandoned.
 
     Attributes:
-        pending: components with cancelled tasks that have not stopped.
+        pending: by component, the cancelled tasks that have not stopped.
     """
 
     def __init__(self, say: Callable[[str], None]) -> None:
@@ -175,7 +182,7 @@ class PendingCleanups:
         self.pending: dict[str, dict[asyncio.Task[None], asyncio.Future[None]]] = {}
 
     def add(self, component: str, task: asyncio.Task[None], say: Callable[[], None]) -> None:
-        """Bound a cancelled task of a component; call `say` if it is abandoned."""
+        """Add a cancelled task of a component; call `say` if the task is abandoned."""
         over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         of_component = self.pending.setdefault(component, {})
         of_component[task] = over
@@ -200,5 +207,5 @@ class PendingCleanups:
             await asyncio.wait(ending.values())
 
     def tasks(self) -> Iterable[asyncio.Task[None]]:
-        """The tasks that have not stopped."""
+        """Return the tasks that have not stopped."""
         return [task for of_component in self.pending.values() for task in of_component]

@@ -1,4 +1,4 @@
-"""The sequencer: takes events one by one, lets the machine run to completion, commits, then dispatches."""
+"""The sequencer: handles events one by one; each runs the machine to completion, is committed, then dispatched."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 
 _MOST_GROUPED = 100
-"""Macrosteps that may share a commit."""
+"""Maximum number of macrosteps that share one commit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +35,9 @@ class RunEnd:
     """The end of a run.
 
     Attributes:
-        finished: the plot reached its final state.
+        finished: whether the plot reached its final state.
         emitted: outcome events of the plot, in order.
-        problem: the reason of an end elsewhere, or the error of its last step; else `None`.
+        problem: the reason if the run ended before the final state, or the error of its last step; else `None`.
     """
 
     finished: bool
@@ -46,27 +46,32 @@ class RunEnd:
 
     @property
     def reached(self) -> bool:
-        """Whether it finished, and none of its goals ended with `no_plan` or `gave_up`."""
+        """Whether the run finished, and none of its goals ended with `no_plan` or `gave_up`."""
         return self.finished and not any(event.name in {NO_PLAN, GAVE_UP} for event in self.emitted)
 
 
 class Sequencer:
-    """Runs one plot to its end.
+    """Executor of one plot, from its start to its end.
 
     Args:
-        library: all plots that may be used.
-        knowledge: the world model; changed only by the plot's `tell`s and by what components observe.
-        components: the skills, by the names the plots use.
-        clock: run time; must be made inside the loop that runs the sequencer.
-        trace: records everything; a fresh one by default.
-        open_ended: whether events may come from outside while nothing is pending; if not, such a run ends with a
-            problem.
-        store: keeps the run, so that it can resume after a crash; its knowledge is `knowledge`.
-        part_of: a prefix of the action ids that components receive; an id of the run of which this one is a part.
+        library: all plots that the run may use.
+        knowledge: the world model. Only the plot's `tell`s, observations of components, and changes from outside modify
+            it.
+        components: the components, whose names plots use.
+        clock: run time; create it inside the loop that runs the sequencer.
+        trace: receives all records; by default a new one.
+        open_ended: whether the run waits for events from outside while no skill, timer or event is pending. Otherwise,
+            such a run ends with a problem.
+        store: keeps the run, so that it can resume after a crash; it must belong to `knowledge`.
+        part_of: a prefix of the action ids that components receive: an id from the run of which this run is a part.
 
     Attributes:
-        library, knowledge, clock, trace, store: as given.
-        dispatcher: carries actions to components.
+        library: all plots that the run may use.
+        knowledge: the world model.
+        clock: run time.
+        trace: the trace of the run.
+        store: the run store, or `None`.
+        dispatcher: sends actions to components.
     """
 
     def __init__(
@@ -102,19 +107,19 @@ class Sequencer:
         return self._reactor.machine
 
     def listen(self, listener: StepListener) -> None:
-        """Call `listener` with every later macrostep, before its actions leave."""
+        """Call `listener` with every later macrostep, before the macrostep's actions are dispatched."""
         self._reactor.listeners.append(listener)
 
     def wait_before_events(self, wait: Callable[[], Awaitable[None]]) -> None:
-        """Await `wait` before each event: a breakpoint holds a run so."""
+        """Await `wait()` before each event; a breakpoint pauses a run in this manner."""
         self._before_events.append(wait)
 
     def rearrange(self, order: Callable[[Iterable[Message]], Iterable[Message]]) -> None:
-        """Put the waiting messages in another order; for tests."""
+        """Replace the waiting messages by the result of `order`; for tests."""
         self._inbox.rearrange(order)
 
     def working_for(self, action_id: str) -> frozenset[str]:
-        """Return the names of the components with skills inside the state that started `action_id`."""
+        """Return the names of the components with running skills inside the state that started `action_id`."""
         started = self.dispatcher.started()
         owner = next((start.activation for start in started if start.action_id == action_id), None)
         inside = frozenset() if owner is None else self.machine.state.activations_inside(owner)
@@ -134,13 +139,13 @@ class Sequencer:
         }
 
     def post(self, event: Event, *, after: float = 0.0) -> None:
-        """Post an event from outside, e.g. an operator's `stop`; from the loop's own thread.
+        """Post an event from outside, e.g. an operator's `stop`; call it in the loop's own thread.
 
-        A store keeps a delayed event from now on, and any other from its macrostep on.
+        A store keeps a delayed event from this call on, and an immediate event from its macrostep on.
 
         Args:
-            event: its name and attributes.
-            after: seconds until it arrives; meanwhile the run has no deadlock.
+            event: the event's name and attributes.
+            after: seconds until the event arrives; until then, the run does not count as a deadlock.
 
         Raises:
             InputError: only the executive itself fires the event, e.g. `done`, or an attribute is not plain data.
@@ -149,11 +154,11 @@ class Sequencer:
         self._hand_in(message_checks.checked_event(event), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
-        """Post a change of knowledge from outside; from the loop's own thread.
+        """Post a change of knowledge from outside; call it in the loop's own thread.
 
         Args:
             delta: the change.
-            author: its author.
+            author: the change's author.
             after: as for `post`.
 
         Raises:
@@ -163,27 +168,27 @@ class Sequencer:
         self._hand_in(message_checks.checked_change(delta, author, self.knowledge), after)
 
     def set_parameter(self, owner: str, name: str, value: object, *, after: float = 0.0) -> None:
-        """Post an operator's setting of a parameter; from the loop's own thread.
+        """Post an operator's setting of a parameter; call it in the loop's own thread.
 
-        A component takes it before its next skill begins. A plot uses it at later entries without another value for
-        it. A store keeps both.
+        A component receives the value before its next skill begins. A plot uses the value at later entries that set no
+        other value. A store keeps both kinds of settings.
 
         Args:
             owner: the component, or the plot, that has the parameter.
-            name: of the parameter.
-            value: within its range; of a component, `None` resets it.
+            name: the parameter's name.
+            value: a value within the parameter's range; `None` resets a component's parameter.
             after: as for `post`.
 
         Raises:
             UnknownNameError: there is no such component or plot, or it declares no such parameter.
-            InputError: the value is out of range, breaks a relation, or operators may not set it.
+            InputError: the value is out of range or violates a relation, or operators may not set the parameter.
             StoreError: the store cannot be written.
         """
         setting = message_checks.checked_setting(owner, name, value, self.dispatcher.components, self.library)
         self._hand_in(setting, after)
 
     async def run(self, plot: str, arguments: Mapping[str, Any] | None = None) -> RunEnd:
-        """Run the plot until it ends, or until a deadlock.
+        """Run the plot until it ends, or until a deadlock; return the end of the run.
 
         Raises:
             InputError: the plot is unknown, or a parameter is missing or unknown.
@@ -197,21 +202,21 @@ class Sequencer:
         return await self._until_end(begin)
 
     async def resume(self, kept: Kept) -> RunEnd:
-        """Continue a run after its last macrostep.
+        """Continue a run after its last macrostep, and return the end of the run.
 
         Args:
-            kept: the run from the store; clock and trace continue from it.
+            kept: the run from the store; clock and trace must continue from its time and its last record.
 
         Raises:
             StoreError: the store cannot be written.
-            UnknownNameError: a component that the run needs is not deployed; nothing has happened.
+            UnknownNameError: a component that the run needs is not deployed; the run is unchanged.
         """
         require_components(kept, self.dispatcher)
         return await self._until_end(lambda: self._recover(kept))
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
         reactor, machine, inbox = self._reactor, self._reactor.machine, self._inbox
-        # The tracer subscribes before skills do: consequences of a change are recorded after it.
+        # The tracer subscribes before skills do, so that consequences of a change are recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
         livelock = LivelockGuard(self.clock) if self.clock.simulated else None
         try:
@@ -229,7 +234,7 @@ class Sequencer:
                     reactor.problem = problem
                     break
                 self._take(message)
-        except asyncio.CancelledError:  # cancelled from outside; a crash does not get here
+        except asyncio.CancelledError:  # cancelled from outside; after a crash, this handler does not run
             reactor.problem = reactor.problem or "it was cancelled"
             self._leave()
             self._keep_end()
@@ -303,7 +308,8 @@ class Sequencer:
     def _may_group(self, message: Message, output: Collection[Output]) -> bool:
         """Return whether the next macrostep may share the commit of this one.
 
-        It may not if an output leaves between them. Each answer of a component has a separate commit.
+        It may not if this macrostep has outputs, as they are dispatched after its commit. Each answer of a component
+        has a separate commit.
         """
         waiting = self._inbox.waiting
         if output or self._before_events or not waiting:
@@ -318,7 +324,10 @@ class Sequencer:
         return output
 
     def _leave(self) -> None:
-        """Dispatch nothing that could not be committed: another process owns the run of a lost store."""
+        """Exit the active states, and dispatch the outputs of exit actions after their commit.
+
+        With a lost store, nothing is dispatched, as another process owns the run.
+        """
         if self.store is None:
             output = self._reactor.leave()
         elif self.store.lost or not self.store.begun or self.machine.state.root is None:
@@ -358,7 +367,10 @@ class Sequencer:
         self.dispatcher.timers.schedule(late, due)
 
     def _is_deadlock(self) -> bool:
-        """Return whether no message can come: periods that all have changed nothing will never change anything."""
+        """Return whether no further message can arrive.
+
+        Periods that have all changed nothing will never change anything.
+        """
         if self._open_ended or self.dispatcher.waiting:
             return False
         return self.dispatcher.timers.periods <= self._reactor.in_vain

@@ -1,4 +1,4 @@
-"""Steps, decisions, changes and actions as records of the trace."""
+"""Trace records of steps, decisions, changes and actions."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from knowledge_base.store import KnowledgeBase
 
 
 class StepTracer:
-    """Records the sequencer's events, steps and actions in a trace.
+    """Recorder of the sequencer's events, steps and actions in a trace.
 
     Attributes:
-        known_plots: digests of the plots that the trace has in full.
+        known_plots: digests of the plots whose full text the trace already has.
     """
 
     def __init__(self, trace: Trace) -> None:
@@ -29,7 +29,7 @@ class StepTracer:
         self._at_work: dict[int, dict[str, str]] = {}  # activation -> action id -> skill
 
     def world(self, knowledge: KnowledgeBase) -> None:
-        """Record the world at the start, unless the trace has no listener; later records are changes of it."""
+        """Record the world at the start, unless the trace has no listener; later records are changes of this world."""
         if self._trace.heard:
             known = {"schema": schema_form(knowledge.schema), **world_form(knowledge.snapshot())}
             self._trace.record("world", version=knowledge.version, **known)
@@ -38,10 +38,10 @@ class StepTracer:
         """Record an incoming event; return the number of the record.
 
         Args:
-            event: with the chart's name for it.
+            event: the event, by its name in the chart.
             source: the skill, `timer` or `outside`.
-            original: the skill's own name for it.
-            conflated: the number of older reports that it replaces.
+            original: the skill's own name for the event.
+            conflated: the number of older reports that the event replaces.
         """
         if not self._trace.heard:
             return self._trace.record("event")
@@ -54,21 +54,24 @@ class StepTracer:
         return self._trace.record("event", **data)
 
     def begun(self, start: steps.Start) -> str:
-        """Note a skill that was started, here or before a crash; return its name with its component's."""
+        """Register a skill that was started, here or before a crash; return its name as `component.skill`."""
         skill = f"{start.component}.{start.skill}"
         self._at_work.setdefault(start.activation, {})[start.action_id] = skill
         return skill
 
     def answered(self, start: steps.Start) -> None:
-        """Note the end of a skill, which cannot be cancelled afterwards."""
+        """Register the end of a skill, after which the skill cannot be cancelled."""
         self._at_work.get(start.activation, {}).pop(start.action_id, None)
 
     def step(self, step: steps.Step) -> int | None:
-        """Record a macrostep with microsteps: new plots before it, the rules that answered after it."""
+        """Record a macrostep that has microsteps; return the number of the record, or `None` without microsteps.
+
+        New plots are recorded before the macrostep, and the rules that handled a failure after it.
+        """
         if not step.microsteps:
             return None
         said: dict[str, Any] = {}
-        if self._trace.heard:  # texts of plots and microsteps take a while
+        if self._trace.heard:  # the texts of plots and microsteps take long to create
             self._plots(step)
             said["microsteps"] = [_micro(micro) for micro in step.microsteps]
             if variables := self._changed_variables(step):
@@ -99,7 +102,7 @@ class StepTracer:
             )
 
     def knowledge(self, change: Change) -> None:
-        """Record a committed change of the knowledge base; without another cause, it becomes the cause."""
+        """Record a committed change of the knowledge base. Without another cause, the change becomes the cause."""
         if not (change.delta and self._trace.heard):
             return
         said = delta_form(change.delta)
@@ -123,7 +126,7 @@ class StepTracer:
         return skills
 
     def told(self, output: steps.Output) -> None:
-        """Record a one-way action or a note; timers have no record."""
+        """Record a one-way action or a note; other outputs, e.g. timers, have no record."""
         match output:
             case steps.SetParameter(component, parameter, value):
                 self._trace.record("action", action="set", port=f"{component}.{parameter}", value=value)
@@ -180,7 +183,7 @@ def _inside(frame: FrameState, path: str) -> Iterator[tuple[str, FrameState]]:
 
 
 def _news(before: FrameState | None, frame: FrameState) -> dict[str, Any]:
-    """Return the new and changed values of a plot; in another instance of it, all values are new."""
+    """Return the new and changed values of a plot; in a new instance of the plot, all values are new."""
     known = before.variables if before is not None and before.serial == frame.serial else {}
     return {
         name: _told_once(value) for name, value in frame.variables.items() if name not in known or known[name] != value
@@ -188,6 +191,6 @@ def _news(before: FrameState | None, frame: FrameState) -> dict[str, Any]:
 
 
 def _told_once(value: Any) -> Any:
-    """Replace a plot that an event carries by its name: another record has its text when it is bound."""
+    """Replace a plot that is an event's attribute by its name, as the record of its binding has the text."""
     is_plot = isinstance(value, dict) and {"plot", "states"} <= value.keys()
     return {"plot": value["plot"]} if is_plot else value
