@@ -93,8 +93,8 @@ class KnowledgeBase(View):
             new: require that the file does not exist yet.
 
         Raises:
-            StoreError: the file cannot be read or written, is not a store, or has another writer. The error is also raised
-                for a foreign file with the name of a sidecar file. All files stay unchanged.
+            StoreError: the file cannot be read or written, is not a store, or has another writer. The error is also
+                raised for a foreign file with the name of a sidecar file. All files stay unchanged.
             SchemaMismatchError: `schema` does not extend the schema of the file.
             InputError: no schema is available, or the arguments contradict each other.
         """

@@ -1,1 +1,1 @@
-"""Conditions that are installed and watched: evaluated when something changes, where it changes (S2.4)."""
+"""Installed conditions and watches: a change evaluates only the conditions that it can affect (S2.4)."""

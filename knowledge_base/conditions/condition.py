@@ -1,4 +1,4 @@
-"""An installed condition: its truth at every version, and the notifications when it changes."""
+"""Installed condition: its truth at every version, and the notifications about changes of its truth."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from knowledge_base.facts import Value
 
 @dataclass(frozen=True, slots=True)
 class Firing:
-    """A firing of a condition, or the end of its truth, as listeners receive it.
+    """One firing of a condition, or its change to false, as listeners receive it.
 
     Attributes:
-        condition: the condition.
-        number: the number of its firings so far.
-        version: the version of the knowledge base.
-        truth: whether it is true; false only for listeners that receive falls.
-        witness: values of its free variables that made it true then; `None` when it is not.
+        condition: the condition that fired or became false.
+        number: the number of firings of the condition so far.
+        version: the version of the knowledge base at the firing.
+        truth: whether the condition is true; false only for listeners that subscribe with `falls`.
+        witness: values of the free variables that made the condition true at this version; `None` when it is false.
     """
 
     condition: Condition
@@ -47,15 +47,15 @@ class _Listening:
 
 
 class Condition:
-    """A condition that the knowledge base keeps evaluated; made by `KnowledgeBase.install`.
+    """A condition that the knowledge base evaluates at every version; `KnowledgeBase.install` creates it.
 
-    Any thread may use it. As a context manager it is cancelled at the end of the block.
+    Any thread may use the condition. A `with` block cancels the condition at its end.
 
     Attributes:
-        text: the condition with its parameters filled in, for messages.
-        number: its number in the order of installation, which is the order of firing within a version.
-        truth: whether it is true at the latest version; a cancelled condition keeps its last truth.
-        version: the version that last changed its truth or its witness.
+        text: the condition with the values of its parameters, for messages.
+        number: the number in the order of installation; within a version, conditions fire in this order.
+        truth: whether the condition is true at the latest version; a cancelled condition keeps its last truth.
+        version: the latest version that changed the truth or the witness.
     """
 
     def __init__(
@@ -92,31 +92,38 @@ class Condition:
 
     @property
     def witness(self) -> dict[str, Value] | None:
-        """Values of its free variables that make it true (`{}` if it has none); `None` when it is false."""
+        """Values of the free variables that make the condition true; `None` when it is false.
+
+        The mapping is empty if the condition has no free variables.
+        """
         found = self._witness
         return None if found is None else dict(zip(self._names, found, strict=True))
 
     @property
     def error(self) -> InputError | None:
-        """The error that prevents its evaluation at present, e.g. a division by zero; it then counts as false."""
+        """The error that prevents the evaluation at present, e.g. a division by zero.
+
+        The condition is then false. `None` without an error.
+        """
         with self._notifier.lock:
             return next((e for row in self.rows if (e := row.error) is not None), None)
 
     @property
     def fired(self) -> int:
-        """Number of its firings that were delivered."""
+        """Number of delivered firings."""
         return 0 if self._last is None else self._last.number
 
     @property
     def cancelled(self) -> bool:
-        """Whether it is no longer installed."""
+        """Whether the condition is no longer installed."""
         return not self._installed
 
     def subscribe(self, listener: FiringListener, *, falls: bool = False) -> Callable[[], None]:
-        """Call `listener` at every firing from now on, with `falls` also when it becomes false.
+        """Call `listener` at every later firing, and with `falls` also when the condition becomes false.
 
-        Calls follow the commit, outside the lock, in commit order and, within a version, in the order of installation.
-        `KnowledgeBase.subscribe` describes errors of listeners. The function returned ends the subscription.
+        The calls follow the commit, after the lock is released. Their order is the commit order and, within a version,
+        the order of installation. `KnowledgeBase.subscribe` describes the handling of errors. The returned function
+        ends the subscription.
         """
         with self._notifier.lock:
             key = next(self._keys)
@@ -130,10 +137,12 @@ class Condition:
         return unsubscribe
 
     async def wait(self, after: int | None = None) -> Firing:
-        """Return the next firing; with `after`, the last one if its number is greater.
+        """Wait for the next firing and return it.
+
+        With `after`, immediately return the last firing if its number is greater than `after`.
 
         Raises:
-            ConditionCancelledError: it is cancelled, before or during the wait.
+            ConditionCancelledError: the condition is cancelled before or during the wait.
         """
         with self._guard:
             if after is not None and self._last is not None and self._last.number > after:
@@ -148,7 +157,7 @@ class Condition:
                 self._waiters.leave(future)
 
     def cancel(self) -> None:
-        """Remove it and drop its undelivered notifications; cancelling it again has no effect."""
+        """Remove the condition and discard its undelivered notifications; a second call has no effect."""
         self._silent = True
         with self._notifier.lock:
             self._uninstall()
@@ -167,15 +176,18 @@ class Condition:
     ) -> None:
         self.cancel()
 
-    # --- under the lock
+    # --- called under the lock
 
     def begin(self) -> None:
-        """Start the hold time of a condition that is true when it is installed."""
+        """Start the hold time if the condition is true at its installation."""
         if self.truth:
             self._hold()
 
     def judge(self, version: int, changed: Container[ConditionRow]) -> None:
-        """Compare its truth with the one before `version`, which `changed` the witnesses of at least one row."""
+        """Compare the present truth with the truth before `version`, and fire if necessary.
+
+        `changed` contains the rows with changed witnesses, among them at least one row of this condition.
+        """
         rise, stay = self.rows
         was, self.truth = self.truth, rise.truth or (self.truth and stay.truth)
         if not (self.truth or was):
@@ -200,7 +212,7 @@ class Condition:
             self._installed = False
             self._remove(self)
 
-    # --- firing: decided under the lock, delivered in order when it is released
+    # --- firing: determined under the lock, delivered in order after its release
 
     def _fire(self) -> None:
         self._told_true = True

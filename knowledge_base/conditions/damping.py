@@ -1,4 +1,4 @@
-"""Terms on which a condition fires: edge or each, once, hold time by an injected clock, hysteresis."""
+"""Terms on which a condition fires: edge or each, once, a hold time measured by an injected clock, hysteresis."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FIRE: tuple[Fire, ...] = ("edge", "each")
 
 
 class Timer(Protocol):
-    """A call that is due later."""
+    """A scheduled call that has not been made yet."""
 
     def cancel(self) -> object:
         """Cancel the call."""
@@ -35,22 +35,22 @@ class Timer(Protocol):
 
 
 class TimerClock(Protocol):
-    """Gives the time and calls back; any thread that commits a change uses both."""
+    """A clock that schedules calls; every thread that commits a change may use it."""
 
     def now(self) -> float:
-        """Seconds from some fixed moment."""
+        """Return the time in seconds since a fixed time."""
         ...
 
     def call_later(self, delay_s: float, callback: Callable[[], None]) -> Timer:
-        """Call `callback` once after that time."""
+        """Call `callback` once, after `delay_s` seconds."""
         ...
 
 
 class Hold:
-    """A timer that runs while a condition is true.
+    """A timer for the time during which a condition is true.
 
-    `due` is computed when the truth changes, under the lock; `start` and `stop` follow outside the lock, in commit
-    order.
+    `due` is computed under the lock when the truth changes. `start` and `stop` are called after the lock is released,
+    in commit order.
     """
 
     def __init__(self, clock: TimerClock, seconds: float) -> None:
@@ -59,11 +59,11 @@ class Hold:
         self._timer: Timer | None = None
 
     def due(self) -> float:
-        """Return the time at which a condition that becomes true now fires."""
+        """Return the time at which a condition fires that becomes true now."""
         return self._clock.now() + self._seconds
 
     def start(self, due: float, over: Callable[[], None]) -> None:
-        """Call `over` at that time."""
+        """Schedule the call of `over` at the time `due`."""
         self._timer = self._clock.call_later(max(0.0, due - self._clock.now()), over)
 
     def stop(self) -> None:
@@ -83,10 +83,10 @@ class Terms:
 
 
 def terms(fire: Fire, *, hold_s: float, once: bool, clock: TimerClock | None) -> Terms:
-    """Return the terms on which a condition fires, checked; see `KnowledgeBase.install`.
+    """Return the checked terms on which a condition fires; see `KnowledgeBase.install`.
 
     Raises:
-        InputError: an unknown way to fire, a time that is negative or not finite, or one without a clock.
+        InputError: an unknown value of `fire`; a hold time that is negative, not finite, or without a clock.
     """
     if fire not in FIRE:
         message = f"a condition fires at an 'edge' or at 'each' change, not {shown(fire)}"
@@ -104,13 +104,13 @@ _UP, _DOWN = (">", ">="), ("<", "<=")
 
 
 def relaxed(e: Expression, margin: float) -> Expression:
-    """Return `e` with the bound of each comparison moved by `margin`, so that it is true more easily.
+    """Return `e` with the bound of each comparison moved by `margin`, so that the condition is true more easily.
 
-    `(> (temperature ?t) 60)` becomes `(> (temperature ?t) (- 60 margin))`; under `not` bounds move the other way.
-    `=` and `!=` stay.
+    `(> (temperature ?t) 60)` becomes `(> (temperature ?t) (- 60 margin))`; under `not`, bounds move in the other
+    direction. `=` and `!=` are unchanged.
 
     Raises:
-        InputError: the margin is not a positive number, or no comparison has a bound.
+        InputError: the margin is not a positive number, or the condition has no comparison with `<`, `<=`, `>` or `>=`.
     """
     if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0 < margin < math.inf:
         raise InputError(f"hysteresis is a positive number, not {margin!r}")
@@ -121,7 +121,7 @@ def relaxed(e: Expression, margin: float) -> Expression:
 
 
 def _relaxed(e: Expression, margin: float) -> Expression:
-    """Return `e` made easier by a positive margin, harder by a negative one."""
+    """Return `e` with each bound moved: a positive margin makes `e` easier to satisfy, a negative margin harder."""
     match e:
         case Comparison(operator, _, right) if operator in (*_UP, *_DOWN):
             eased = -margin if operator in _UP else margin

@@ -1,7 +1,7 @@
-"""All installed conditions of a knowledge base, found by the facts, values and types that a change touches.
+"""All installed conditions of a knowledge base, indexed by the facts, values and types that they read.
 
-Every commit passes here under the lock, so that each version is evaluated exactly. `AlphaIndex` finds the conditions
-that a changed fact, value or type can affect; no other condition is evaluated.
+Every commit is evaluated here under the lock, so that each version is evaluated exactly. `AlphaIndex` finds the
+conditions that a changed fact, value or type can affect; no other condition is evaluated.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from knowledge_base.world.state import WorldState
 MORE, LESS = 1, -1
 
 Event = tuple[Kind, str, Args, int]
-"""One fact, value or type that a change makes different: its name, arguments, and `MORE`, `LESS` or `BOTH`."""
+"""One fact, value or type that a change affects: kind, name, arguments, and `MORE`, `LESS` or `BOTH`."""
 
 
 class Installed:
-    """The joins of a knowledge base's conditions by shape; to be used under its lock."""
+    """The joins of all installed conditions, by shape; a caller must hold the lock of the knowledge base."""
 
     def __init__(self, world: WorldState, notifier: Notifier) -> None:
         self._world = world
@@ -39,10 +39,10 @@ class Installed:
         self._numbers = 0
 
     def install(self, e: Expression, params: Mapping[str, Value], terms: Terms, hysteresis: float | None) -> Condition:
-        """Keep a checked condition evaluated.
+        """Install a checked condition and return it.
 
         Raises:
-            InputError: there is a hysteresis, but no comparison.
+            InputError: `hysteresis` is given, but the condition has no comparison.
         """
         eased = e if hysteresis is None else relaxed(e, hysteresis)
         found = lifted(e, params, self._schema)
@@ -59,11 +59,11 @@ class Installed:
         return condition
 
     def conditions(self) -> list[Condition]:
-        """Return the conditions in the order of installation."""
+        """Return the installed conditions in the order of installation."""
         return sorted({c for several in self._conditions.values() for c in several}, key=lambda c: c.number)
 
     def departures(self, effective: Delta) -> list[Event]:
-        """Return the types and values that go with removed things; to be called before the change is made."""
+        """Return the types and values that the removal of objects ends; must be called before the change is applied."""
         gone = set(effective.removed_nodes)
         if not (gone and self._joins):
             return []
@@ -75,7 +75,7 @@ class Installed:
         ]
 
     def commit(self, effective: Delta, departures: list[Event]) -> None:
-        """Evaluate the change that was made in the world, and queue the notifications."""
+        """Evaluate the conditions after a change of the world, and queue the notifications."""
         if not self._joins:
             return
         events = departures
@@ -91,11 +91,11 @@ class Installed:
         self._evaluate(events)
 
     def refreshed(self, fluent: Fact) -> None:
-        """Evaluate a fluent with another value that a source feeds, without a version."""
+        """Evaluate the conditions that read a fluent whose source has a new value; the version stays the same."""
         self._evaluate([("said", fluent.predicate, fluent.args, BOTH)])
 
     def _evaluate(self, events: list[Event]) -> None:
-        """Bring all rows up to date with the events, then the conditions of the changed rows."""
+        """Update all rows that the events affect, then the conditions of the changed rows."""
         self._changed.clear()
         reached: list[tuple[AlphaIndex, Args, int]] = []
         suspects: dict[tuple[ConditionRow, Args], None] = {}
@@ -114,7 +114,7 @@ class Installed:
             row.relation.renew(row)
         for readers, args, sign in reached:
             for trigger, rows in readers.made(args, sign):
-                if rows:  # an earlier event may have closed them
+                if rows:  # an earlier event may have closed the rows
                     trigger.relation.make(trigger, args, rows)
         touched: dict[Condition, None] = {}
         for row in self._changed:
@@ -123,7 +123,7 @@ class Installed:
             condition.judge(self._notifier.version, self._changed)
 
     def _remove(self, condition: Condition) -> None:
-        """Forget a condition, and the rows that it alone has."""
+        """Remove a condition, and the rows that no other condition uses."""
         for row in dict.fromkeys(condition.rows):
             conditions = self._conditions[row]
             del conditions[condition]

@@ -1,4 +1,4 @@
-"""Join of the installed conditions of one shape, kept up to date by changes (Rete, Forgy 1982)."""
+"""Join of the installed conditions of one shape, updated by each change (Rete, Forgy 1982)."""
 
 from __future__ import annotations
 
@@ -20,25 +20,28 @@ from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import FactIndex, WorldState
 
 ROWS = "installed rows"
-"""Name of the open rows as a predicate; it has a blank, so that no text can declare or contain it."""
+"""Name of the predicate for open rows.
+
+The name contains a blank, so that no text can declare or contain the predicate.
+"""
 
 Positions = tuple[int, ...]
 Picked = object
-"""The values at some positions: one unchanged, several as a tuple."""
+"""The values at some positions: one value itself, several values as a tuple."""
 Picker = Callable[[Args], Picked]
 
 
 class ConditionRow:
-    """All installed conditions of one shape with the same values.
+    """All installed conditions of one shape with equal values.
 
     Attributes:
-        relation: the join of that shape.
+        relation: the join of the shape.
         key: the values of the shape's parameters.
-        bindings: the same, by name.
-        witnesses: values of the shape's answers that make it true: one is kept, or all (`wants_all`).
-        wants_all: whether each change of the set of witnesses counts.
-        is_listed: whether changes find it among the open rows.
-        error: the error that leaves it without a truth value, if any.
+        bindings: the values of the shape's parameters, by name.
+        witnesses: values of the shape's answers that make the condition true; only one of them without `wants_all`.
+        wants_all: whether the row keeps all witnesses, because each change of their set can fire.
+        is_listed: whether the alpha index contains the row as an open row.
+        error: the error that prevents the evaluation of the row, or `None`.
     """
 
     __slots__ = ("bindings", "error", "is_listed", "key", "relation", "wants_all", "witnesses")
@@ -54,25 +57,25 @@ class ConditionRow:
 
     @property
     def truth(self) -> bool:
-        """Whether there is a witness."""
+        """Whether the row has a witness."""
         return bool(self.witnesses)
 
     @property
     def is_open(self) -> bool:
-        """Whether another witness would make a difference."""
+        """Whether another witness would change the row."""
         return self.wants_all or not self.witnesses
 
     @property
     def witness(self) -> Args | None:
-        """Values of the shape's answers that make it true."""
+        """Values of the shape's answers that make the condition true; `None` when it is false."""
         return next(iter(self.witnesses), None)
 
 
 class AlphaIndex:
-    """The rows that read the same predicate, function or type, by polarity and by their values at some positions.
+    """The rows that read one predicate, function or type, by polarity and by their values at some positions.
 
     Attributes:
-        failing: rows without a truth value, because of an error; every change tries them again.
+        failing: rows whose evaluation raised an error; every change evaluates them again.
     """
 
     def __init__(self) -> None:
@@ -81,19 +84,19 @@ class AlphaIndex:
         self._open: dict[tuple[int, Positions], tuple[Picker, _Open]] = {}
 
     def __bool__(self) -> bool:
-        """Whether a change can reach any row."""
+        """Return whether a change can affect any row."""
         return bool(self.failing) or any(found for _, found in (*self._relying.values(), *self._open.values()))
 
     def relying_at(self, polarity: int, positions: Positions) -> _Relying:
-        """Return the place for witnesses that depend on facts with certain values at these positions."""
+        """Return the index of the witnesses that depend on facts, by the facts' values at these positions."""
         return self._relying.setdefault((polarity, positions), (_picker(positions), {}))[1]
 
     def open_at(self, polarity: int, positions: Positions) -> _Open:
-        """Return the place for open rows with parameters at these positions."""
+        """Return the index of the open rows with parameters at these positions, by the values of the parameters."""
         return self._open.setdefault((polarity, positions), (_picker(positions), {}))[1]
 
     def broken(self, args: Args, sign: int) -> list[tuple[ConditionRow, Args]]:
-        """Return the rows with the witnesses that a change may end."""
+        """Return the rows with the witnesses that a change may make invalid."""
         found: list[tuple[ConditionRow, Args]] = []
         for (polarity, _), (pick, relying) in self._relying.items():
             if relying and sign * polarity <= 0:
@@ -101,7 +104,7 @@ class AlphaIndex:
         return found
 
     def made(self, args: Args, sign: int) -> list[tuple[DeltaJoin, dict[ConditionRow, None]]]:
-        """Return the open rows that may get a witness, by delta join."""
+        """Return the open rows for which a change may create a witness, by delta join."""
         found: list[tuple[DeltaJoin, dict[ConditionRow, None]]] = []
         for (polarity, _), (pick, rows) in self._open.items():
             if rows and sign * polarity >= 0:
@@ -110,14 +113,14 @@ class AlphaIndex:
 
 
 class DeltaJoin:
-    """An occurrence in a shape; it puts the rows and witnesses of the shape into the alpha index.
+    """An occurrence in a shape; adds the rows and witnesses of the shape to the alpha index.
 
     Attributes:
         relation: the join of the shape.
-        readers: the index of the name that it reads.
-        covers: whether a change determines all parameters.
-        finds: whether a change determines some of the answers.
-        leaves_open: whether some of them stay undetermined.
+        readers: the index of the predicate, function or type that the occurrence reads.
+        covers: whether a change determines all parameters of the shape.
+        finds: whether a change determines some answers of the shape.
+        leaves_open: whether a change leaves some answers undetermined.
     """
 
     def __init__(self, occurrence: Occurrence, relation: Join, readers: AlphaIndex) -> None:
@@ -138,7 +141,10 @@ class DeltaJoin:
         self._known = _picker(tuple(column for _, column in params))
 
     def bindings(self, args: Args) -> dict[str, Value] | None:
-        """Return the values of the parameters and answers that a change determines; `None` if it does not fit."""
+        """Return the parameters and answers that a change determines.
+
+        Return `None` if the arguments of the change do not match the occurrence.
+        """
         found: dict[str, Value] = {}
         for one, other in self._occurrence.equal:
             if args[one] != args[other]:
@@ -148,7 +154,7 @@ class DeltaJoin:
         return found
 
     def settles(self, bindings: Bindings) -> bool:
-        """Whether the part of the condition that a change alone determines is false, as for most changes."""
+        """Return whether the part of the condition that a change alone determines is false, as for most changes."""
         if self._settled is None:
             return False
         try:
@@ -157,11 +163,11 @@ class DeltaJoin:
             return False
 
     def lean(self, row: ConditionRow, witness: Args) -> None:
-        """Keep the witness where a change of its facts finds it."""
+        """Add the witness to the index, by the facts that it depends on."""
         self._relying.setdefault(self._relied_on((*row.key, *witness)), {})[row, witness] = None
 
     def let_go(self, row: ConditionRow, witness: Args) -> None:
-        """Forget the witness."""
+        """Remove the witness from the index."""
         values = self._relied_on((*row.key, *witness))
         leaning = self._relying.get(values)
         if leaning is not None:  # two occurrences may depend on the same fact
@@ -170,11 +176,11 @@ class DeltaJoin:
                 del self._relying[values]
 
     def open(self, row: ConditionRow) -> None:
-        """Keep the row where a change that gives it a witness finds it."""
+        """Add the open row to the index, by the changes that can create a witness for the row."""
         self._open.setdefault(self._known(row.key), {}).setdefault(self, {})[row] = None
 
     def close(self, row: ConditionRow) -> None:
-        """Forget the open row."""
+        """Remove the row from the index of open rows."""
         values = self._known(row.key)
         rows = self._open[values][self]
         del rows[row]
@@ -185,9 +191,9 @@ class DeltaJoin:
 
     @cached_property
     def _settled(self) -> Test | None:
-        """The part of the condition that a change determines alone, if there is one."""
+        """The test of the conjuncts that a change alone determines; `None` without such conjuncts."""
         names = {position: name for name, position in self._occurrence.bound}
-        changed = Atom(self._occurrence.name, tuple(Variable(names[i]) for i in sorted(names)))  # true by the change
+        changed = Atom(self._occurrence.name, tuple(Variable(names[i]) for i in sorted(names)))  # true after the change
         known = frozenset(names.values())
         rest = (part for part in conjuncts(self.relation.shape.body) if part != changed)
         parts = tuple(part for part in rest if free_variables(part) <= known)
@@ -195,13 +201,16 @@ class DeltaJoin:
 
     @cached_property
     def search(self) -> Search:
-        """Completes the values of a change and of a row to witnesses."""
+        """The search that completes the values of a change and of a row to witnesses."""
         bound = frozenset(self.relation.shape.params).union(name for name, _ in self._occurrence.bound)
         return compile_query(self.relation.shape.body, self.relation.world.schema, bound)
 
     @cached_property
     def join(self) -> Search:
-        """Completes the values of a change to open rows with witnesses, on the world with the open rows."""
+        """The search that completes the values of a change to open rows with witnesses.
+
+        The search reads the world with the open rows as facts.
+        """
         shape, schema = self.relation.shape, self.relation.world.schema
         row = Atom(ROWS, tuple(map(Variable, shape.params)))
         bound = frozenset(name for name, _ in self._occurrence.bound)
@@ -209,13 +218,13 @@ class DeltaJoin:
 
 
 class Join:
-    """A shape with its rows.
+    """A shape with its rows; the rows are updated after each change.
 
     Args:
         shape: the conditions without their values.
-        world: their world; a change is made there before the join receives it.
-        readers: finds the index of the name that an occurrence reads.
-        changed: receives the rows with other witnesses than before.
+        world: the world of the conditions; each change is applied to the world before the join processes the change.
+        readers: returns the alpha index for an occurrence.
+        changed: receives the rows whose witnesses have changed.
     """
 
     def __init__(
@@ -238,7 +247,7 @@ class Join:
         self._changed = changed
 
     def row(self, key: Args) -> ConditionRow:
-        """Return the row for these values, evaluated when it is new."""
+        """Return the row for these values; a new row is evaluated immediately."""
         row = self.rows.get(key)
         if row is None:
             row = self.rows[key] = ConditionRow(self, key)
@@ -246,13 +255,13 @@ class Join:
         return row
 
     def want_all(self, row: ConditionRow) -> None:
-        """Keep all witnesses of the row from now on."""
+        """Keep all witnesses of the row, not only one, from now on."""
         if not row.wants_all:
             row.wants_all = True
             self.renew(row)
 
     def drop(self, row: ConditionRow) -> None:
-        """Forget the row."""
+        """Remove the row."""
         for witness in tuple(row.witnesses):
             self._remove(row, witness)
         self._repair(row)
@@ -260,7 +269,7 @@ class Join:
         del self.rows[row.key]
 
     def loses(self, row: ConditionRow, witness: Args) -> bool:
-        """Drop the witness if it is no longer one; return whether the row needs a search then."""
+        """Remove the witness if it is no longer valid; return whether the row then needs a new search."""
         try:
             if self._test(self.world, {**row.bindings, **dict(zip(self.shape.answers, witness, strict=True))}):
                 return False
@@ -270,7 +279,7 @@ class Join:
         return not row.witnesses and not row.wants_all
 
     def make(self, trigger: DeltaJoin, args: Args, rows: dict[ConditionRow, None]) -> None:
-        """Find the witnesses that a change makes for open rows that agree with it in their parameters."""
+        """Add the witnesses that a change creates, for the open rows with matching parameters."""
         bindings = trigger.bindings(args)
         is_simple = len(rows) == 1 and not trigger.leaves_open
         if bindings is None or (not is_simple and trigger.settles(bindings)):
@@ -282,7 +291,7 @@ class Join:
             else:
                 for found in list(trigger.join(self._world_with_rows, bindings)):
                     self._add(self.rows[tuple([found[name] for name in self.shape.params])], self._witness(found))
-        except InputError:  # some row cannot be computed; the evaluation of each decides which
+        except InputError:  # a row cannot be evaluated; find it by evaluating each
             for row in tuple(rows):
                 self.renew(row)
 
@@ -301,7 +310,7 @@ class Join:
         self._list(row, is_open=row.is_open)
 
     def _complete(self, row: ConditionRow, trigger: DeltaJoin, bindings: Bindings) -> None:
-        """Find the witnesses of the row that the change makes."""
+        """Add the witnesses that the change creates for the row."""
         together = {**row.bindings, **bindings}
         if not trigger.leaves_open:
             if self._test(self.world, together):
@@ -336,7 +345,7 @@ class Join:
         self._list(row, is_open=row.is_open)
 
     def _list(self, row: ConditionRow, *, is_open: bool) -> None:
-        """Put an open row where changes find it; remove a closed row from there."""
+        """Add an open row to the index of open rows, or remove a closed row from it."""
         if row.is_listed is is_open:
             return
         row.is_listed = is_open
@@ -363,18 +372,21 @@ class Join:
 
 
 _Relying = dict[Picked, dict[tuple[ConditionRow, Args], None]]
-"""Rows and witnesses by the values that the facts they depend on have."""
+"""Rows and witnesses, by the values of the facts that they depend on."""
 _Open = dict[Picked, dict[DeltaJoin, dict[ConditionRow, None]]]
 """Open rows by the values of their parameters, and by the delta join that finds their witnesses."""
 
 
 def _picker(positions: Positions) -> Picker:
-    """Return a function that takes the values at these positions."""
+    """Return a function that returns the values at these positions."""
     return itemgetter(*positions) if positions else itemgetter(slice(0))
 
 
 @lru_cache(maxsize=64)
 def _schema_with_rows(schema: Schema, params: tuple[str, ...]) -> Schema:
-    """Return `schema` with the open rows declared; most shapes have equal names of parameters."""
+    """Return `schema` with the open rows declared.
+
+    Results are cached, as most shapes have parameters with equal names.
+    """
     rows = Signature(ROWS, tuple(map(TypedVariable, params)))
     return replace(schema, predicates={**schema.predicates, ROWS: rows})

@@ -1,4 +1,4 @@
-"""Notifications of commits: to listeners outside the lock and in commit order, and to coroutines that wait."""
+"""Notifications of commits: calls of listeners after the lock is released, and results for waiting coroutines."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _T = TypeVar("_T")
 
 
 class Notifier:
-    """A queue of calls that one thread at a time makes.
+    """A queue of calls that only one thread at a time makes.
 
-    A listener may commit changes itself; their notifications follow the current one. A thread that commits while
-    another one delivers leaves its notifications to that thread.
+    A listener may itself commit changes; their notifications follow the current notification. If another thread is
+    delivering, a committing thread leaves its notifications to that thread.
 
     Attributes:
         lock: lock of the world.
         version: version of the latest change.
-        quiet: whether nothing is delivered; set by a thread that is alone, for the block of its transaction.
-        queue: appends a call; to be used under the lock.
+        quiet: whether delivery is suspended; the thread of an open transaction sets this attribute.
+        queue: appends a call; the caller must hold the lock.
     """
 
     def __init__(self, lock: ReadWriteLock, version: int = 0) -> None:
@@ -42,7 +42,7 @@ class Notifier:
         self._deliverer: object | None = None
 
     def subscribe(self, listener: Listener) -> Callable[[], None]:
-        """Call `listener` with every later change; return a function that ends that."""
+        """Call `listener` with every later change; return a function that ends the subscription."""
         with self.lock:
             key = next(self._keys)
             self._listeners[key] = listener
@@ -54,16 +54,16 @@ class Notifier:
         return unsubscribe
 
     def add(self, change: Change) -> None:
-        """Queue a change for the present listeners; to be called under the lock."""
+        """Queue a change for the present listeners; the caller must hold the lock."""
         self.version = change.version
         for listener in self._listeners.values():
             self._waiting.append(partial(listener, change))
 
     def deliver(self) -> None:
-        """Make the queued calls; to be called without the lock.
+        """Make the queued calls; the caller must not hold the lock.
 
         Raises:
-            ExceptionGroup: listeners failed; all others were called nevertheless.
+            ExceptionGroup: at least one listener raised an exception; all other listeners were called nevertheless.
         """
         if not self._waiting:  # another thread delivers its own calls
             return
@@ -72,11 +72,11 @@ class Notifier:
             while (call := self._next(me)) is not None:
                 try:
                     call()
-                except Exception as error:  # noqa: BLE001  one listener must not silence the others
+                except Exception as error:  # noqa: BLE001  a failing listener must not prevent the calls of the others
                     errors.append(error)
-                except (SystemExit, GeneratorExit) as error:  # neither may end the program
+                except (SystemExit, GeneratorExit) as error:  # a listener must not end the program
                     errors.append(RuntimeError(described(error)))
-        except BaseException:  # after an interrupt another thread must be able to deliver
+        except BaseException:  # after an interrupt, another thread must be able to deliver
             if self._deliverer is me:
                 self._deliverer = None
             raise
@@ -84,7 +84,7 @@ class Notifier:
             raise ExceptionGroup("listeners to the knowledge base failed", errors)
 
     def _next(self, deliverer: object) -> Callable[[], None] | None:
-        """Return the next call, if this deliverer may make it."""
+        """Return the next call, or `None` if the queue is empty or another thread delivers."""
         with self.lock:
             if self._deliverer is None and not self.quiet:
                 self._deliverer = deliverer
@@ -103,26 +103,26 @@ class Waiters(Generic[_T]):
         self._waiting: dict[Future[_T], AbstractEventLoop] = {}
 
     def join(self) -> Future[_T]:
-        """Return a future of the running loop that the next `answer` completes."""
+        """Return a future of the running event loop; the next call of `answer` completes the future."""
         loop = get_running_loop()
         future: Future[_T] = loop.create_future()
         self._waiting[future] = loop
         return future
 
     def leave(self, future: Future[_T]) -> None:
-        """Forget the future."""
+        """Remove the future."""
         self._waiting.pop(future, None)
 
     def answer(self, result: _T | Exception) -> None:
-        """Complete all futures with a value or an exception."""
+        """Complete all futures with a value or an exception, and remove them."""
         waiting, self._waiting = self._waiting, {}
         for future, loop in waiting.items():
-            with suppress(RuntimeError):  # the loop is closed, and with it the coroutine
+            with suppress(RuntimeError):  # the event loop is closed, and so is the coroutine
                 loop.call_soon_threadsafe(_complete, future, result)
 
 
 def _complete(future: Future[_T], result: _T | Exception) -> None:
-    if future.done():  # its task was cancelled
+    if future.done():  # the task of the future was cancelled
         return
     if isinstance(result, Exception):
         future.set_exception(result)

@@ -1,7 +1,7 @@
-"""Shape of a condition: its text without values, so that conditions that differ only in these share work.
+"""Shape of a condition: its text without values; conditions that differ only in their values share one join.
 
-`(on ?x table7)` and `(on ?y ?t)` with `t = shelf` both have the shape `(on ?A ?P)` and are the rows `(table7)` and
-`(shelf)` of one join. The occurrences of a shape are the places where a change can make a difference.
+`(on ?x table7)` and `(on ?y ?t)` with `t = shelf` both have the shape `(on ?A ?P)`. They are the rows `(table7)` and
+`(shelf)` of one join. The occurrences of a shape are the places where a change can affect the condition.
 """
 
 from __future__ import annotations
@@ -34,22 +34,25 @@ from knowledge_base.world.schema import Schema
 
 Args = tuple[Value, ...]
 Kind = Literal["said", "type"]
-"""Facts and values (`said`), whose names differ, or the types of things (`type`)."""
+"""Facts and values (`said`), whose names are distinct, or the types of objects (`type`)."""
 
 BOTH = 0
-"""Polarity of values and of the inputs of computed predicates: any change can make a condition true or false."""
+"""Polarity of values and of the inputs of computed predicates.
+
+Any change of them can make a condition true or false.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A condition with parameters.
+    """A condition whose values are replaced by parameters.
 
     Attributes:
         body: the condition.
-        params: its free variables that stand for values of the text.
-        answers: its other free variables; their values are a witness.
+        params: the free variables that replace values of the text.
+        answers: the other free variables; their values are a witness.
 
-    All variables have names that no text can contain, numbered by their order.
+    All variables have generated names that no text can contain, numbered by their order.
     """
 
     body: Expression
@@ -59,12 +62,12 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Lifted:
-    """A condition as a shape with its own values and names.
+    """A condition as a shape with the values and names of this condition.
 
     Attributes:
-        shape: the part that it shares with others.
+        shape: the part that this condition shares with others.
         key: the values of the shape's parameters.
-        names: its own names of the shape's answers.
+        names: the names that this condition has for the shape's answers.
     """
 
     shape: Shape
@@ -73,9 +76,9 @@ class Lifted:
 
 
 def lifted(e: Expression, params: Mapping[str, Value], schema: Schema) -> Lifted:
-    """Return the shape of `e` with `params` filled in.
+    """Return the shape of `e`, with its values and names, after the substitution of `params`.
 
-    The variables of an outermost `exists` become answers, so that its witness is known.
+    The variables of an outermost `exists` become answers, so that their values are part of the witness.
     """
     lifting = _Lifting()
     body = lifting.expression(_opened(substitute(e, params), schema), {})
@@ -104,9 +107,9 @@ def _range(variable: TypedVariable) -> Expression:
 
 
 class _Lifting:
-    """Replaces each value by one variable, and gives common names to the variables of the text.
+    """Replacement of each value by a variable, and of each variable of the text by a common name.
 
-    Truth values stay: as keys they would equal 0 and 1.
+    Truth values are not replaced: as dictionary keys they would equal 0 and 1.
     """
 
     def __init__(self) -> None:
@@ -153,11 +156,11 @@ class Occurrence:
     """One place in a condition that reads a predicate, function or type.
 
     Attributes:
-        kind: the kind of the name.
-        name: its name.
-        polarity: 1 if more of it can only make the condition true, -1 if only false, else `BOTH`.
-        bound: the condition's free variables among the arguments, with the first position of each.
-        equal: pairs of positions that hold the same variable.
+        kind: the kind of `name`.
+        name: name of the predicate, function or type.
+        polarity: 1 if additional facts can only make the condition true; -1 if only false; else `BOTH`.
+        bound: the free variables of the condition among the arguments, each with its first position.
+        equal: pairs of argument positions with the same variable.
     """
 
     kind: Kind
@@ -168,7 +171,7 @@ class Occurrence:
 
 
 def occurrences(e: Expression, schema: Schema) -> tuple[Occurrence, ...]:
-    """Return all places in `e` that read the world, each once, in order."""
+    """Return all places in `e` that read the world, in order, without duplicates."""
     return tuple(dict.fromkeys(_Walk(schema).expression(e, 1, frozenset())))
 
 

@@ -1,4 +1,4 @@
-"""Watches: the committed changes that touch a pattern such as `(on ?o table)`, as an asynchronous iterator."""
+"""Watches: the committed changes that match a pattern such as `(on ?o table)`, as an asynchronous iterator."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.schema import Schema
 
 Touches = Callable[[Change], bool]
-"""Tells whether a change touches a pattern."""
+"""A function that returns whether a change matches a pattern."""
 
 
 @dataclass(frozen=True, slots=True)
 class Missed:
-    """A gap of a watch with a slow reader: the changes after version `since` up to `until`.
+    """A gap in a watch with a slow reader: the changes after version `since` up to and including `until`.
 
     Attributes:
-        since: the latest version up to which the reader has all changes.
-        until: the latest version in the gap; the next item follows it.
+        since: the latest version up to which the reader has received all changes.
+        until: the latest version in the gap; the next item is after this version.
     """
 
     since: int
@@ -36,13 +36,13 @@ class Missed:
 
 
 class Watch:
-    """An asynchronous iterator over the changes after a version; see `KnowledgeBase.watch`.
+    """An asynchronous iterator over later changes; see `KnowledgeBase.watch`.
 
-    One or several tasks of any event loop may read it. It ends when it is closed; as a context manager it is closed at
-    the end of the block.
+    One or several tasks of any event loop may read the watch. `close` ends the iteration, and so does the end of a
+    `with` block.
 
     Raises:
-        InputError: the limit is not a number of changes, or the pattern is not a pattern.
+        InputError: `limit` is not a positive whole number, or `pattern` is not a pattern.
     """
 
     def __init__(
@@ -61,11 +61,11 @@ class Watch:
         self._unsubscribe: Callable[[], None] | None = None
 
     def follow(self, unsubscribe: Callable[[], None]) -> None:
-        """Let `close` call `unsubscribe`, which ends the notifications."""
+        """Store `unsubscribe`, which `close` calls to end the notifications."""
         self._unsubscribe = unsubscribe
 
     def hear(self, change: Change) -> None:
-        """Receive a change; the knowledge base calls it, from any thread."""
+        """Queue a change for the readers if it matches; the knowledge base calls this method from any thread."""
         if self._touches is not None and not self._touches(change):
             return
         with self._guard:
@@ -78,7 +78,7 @@ class Watch:
             self._waiters.answer(None)
 
     def close(self) -> None:
-        """End the watch and the loops of its readers."""
+        """End the watch and the iterations of its readers."""
         if self._unsubscribe is not None:
             self._unsubscribe()
         with self._guard:
@@ -91,7 +91,7 @@ class Watch:
         return self
 
     async def __anext__(self) -> Change | Missed:
-        """The next change that touches the pattern, or a gap."""
+        """Return the next change that matches the pattern, or a gap (`Missed`)."""
         while True:
             with self._guard:
                 if (item := self._take()) is not None:
@@ -133,14 +133,15 @@ def _touching(pattern: str | Expression, params: Mapping[str, Value], schema: Sc
 
 
 def touches(pattern: Expression, params: Mapping[str, Value], schema: Schema) -> Touches:
-    """Return a function that tells whether a change touches `pattern`: a predicate, function or type with arguments.
+    """Return a function that returns whether a change matches `pattern`.
 
-    A variable without a value in `params` stands for any value, the same at each place. Removed things touch the
-    functions that may have had a value about them.
+    A pattern is a predicate, function or type with arguments. A variable without a value in `params` matches any value,
+    but the same value at each of its places. The removal of an object matches the functions that may have had a value
+    for that object.
 
     Raises:
-        InputError: the pattern is something else.
-        UnknownNameError: there is no predicate, function or type of that name.
+        InputError: `pattern` is not a pattern.
+        UnknownNameError: no predicate, function or type has that name.
         SchemaError: a wrong number of arguments.
     """
     if not isinstance(pattern, Atom) or not all(isinstance(a, Variable | Constant) for a in pattern.args):
@@ -164,7 +165,7 @@ def touches(pattern: Expression, params: Mapping[str, Value], schema: Schema) ->
 
 
 class _Fits:
-    """Whether arguments agree with a pattern's."""
+    """Test whether arguments match the arguments of a pattern."""
 
     def __init__(self, pattern: Atom, params: Mapping[str, Value]) -> None:
         first: dict[str, int] = {}
@@ -189,7 +190,10 @@ class _Fits:
 
 
 def _typed(delta: Delta, name: str, schema: Schema, fits: _Fits) -> bool:
-    """Whether the change touches the type; the type of a removed thing is unknown."""
+    """Return whether the change matches the type.
+
+    The removal of an object matches every type, as the type of the object is unknown.
+    """
     return any(schema.is_a(own, name) and fits((thing,)) for thing, own in delta.nodes.items()) or any(
         fits((thing,)) for thing in delta.removed_nodes
     )

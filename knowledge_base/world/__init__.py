@@ -1,1 +1,1 @@
-"""A world in memory: its schema, its state, and pending changes on top of it."""
+"""A world in memory: its schema, its state, and pending changes on top of the state."""

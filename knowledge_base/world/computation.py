@@ -1,7 +1,7 @@
 """Computed predicates: Python functions of facts and values, e.g. `(near ?a ?b)` of two positions.
 
-A computed predicate declares the facts and values that it reads. An installed condition is evaluated again when one of
-them changes, and only then.
+A computed predicate declares the facts and values that it reads. Only a change of these inputs evaluates an installed
+condition with the predicate again.
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ from knowledge_base.language.syntax.text import parse_term, to_text
 from knowledge_base.pddl.domain_text import parse_declaration
 
 MOST_NESTED = 8
-"""Most computed predicates that read one through the other; each multiplies the cost of the first."""
+"""Maximum nesting of computed predicates that read each other.
+
+Each level multiplies the cost of an evaluation.
+"""
 
 _Inputs = ParamSpec("_Inputs")
 _SOURCE = "@computed"
@@ -27,17 +30,17 @@ _SOURCE = "@computed"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Computed(Generic[_Inputs]):
-    """A predicate with its truth from a function of inputs; made by `computed`.
+    """A predicate whose truth a function computes from inputs; the decorator `computed` creates it.
 
-    It can be called like the function. A read such as `(clean ?a)` is a function's value until a schema resolves it as
-    a predicate.
+    A caller may call it like the function. A read such as `(clean ?a)` denotes the value of a function until a schema
+    resolves it as a predicate.
 
     Attributes:
-        name: the predicate's name.
-        parameters: its parameters.
-        reads: its inputs, over the parameters.
-        function: takes their values in order and returns the truth.
-        place: the place of its declaration.
+        name: name of the predicate.
+        parameters: parameters of the predicate.
+        reads: the inputs, as terms and atoms over the parameters.
+        function: receives the values of the inputs in order and returns the truth.
+        place: the place of the declaration.
     """
 
     name: str
@@ -47,24 +50,24 @@ class Computed(Generic[_Inputs]):
     place: Place | None = field(default=None, repr=False)
 
     def __call__(self, *args: _Inputs.args, **kwargs: _Inputs.kwargs) -> bool:
-        """Call the function."""
+        """Call the function with the values of its inputs."""
         return self.function(*args, **kwargs)
 
     def inputs(self, args: tuple[Term, ...]) -> tuple[Read, ...]:
-        """Return its inputs for the arguments `args`."""
+        """Return the inputs for the arguments `args`."""
         given = {p.name: arg for p, arg in zip(self.parameters, args, strict=True)}
         return tuple(substitute(read, given) for read in self.reads)
 
     def resolved(self, predicates: Callable[[str, int], bool]) -> Computed[_Inputs]:
-        """Return the same with resolved reads.
+        """Return this computed predicate with reads that are resolved as functions or predicates.
 
         Args:
-            predicates: tells whether a name with a number of arguments is a predicate or type.
+            predicates: returns whether a name with a number of arguments is a predicate or type.
         """
         return replace(self, reads=tuple(_resolved(read, predicates) for read in self.reads))
 
     def refused(self, place: Place | None = None) -> SchemaError:
-        """Return the error for asserting, retracting or watching it."""
+        """Return the error for asserting, retracting or watching the computed predicate."""
         inputs = ", ".join(map(to_text, self.reads)) or "nothing"
         return SchemaError(
             f"'{self.name}' is computed and has no facts; tell and watch its inputs: {inputs}",
@@ -72,15 +75,15 @@ class Computed(Generic[_Inputs]):
         )
 
     def judge(self, values: Sequence[object]) -> bool:
-        """Return its truth for these inputs.
+        """Return the truth of the predicate for these input values.
 
         Raises:
-            InputError: the function raised an exception, or did not return a truth value.
+            InputError: the function raised an exception, or did not return `True` or `False`.
         """
         function: Callable[..., object] = self.function
         try:
             truth = function(*values)
-        except (Exception, SystemExit, GeneratorExit) as error:  # none of them may end the program
+        except (Exception, SystemExit, GeneratorExit) as error:  # user code must not end the program
             raise InputError(described(error)) from error
         if type(truth) is not bool:
             raise InputError(f"true or false is expected, and its function gave {text_of(truth, repr)}")
@@ -88,18 +91,18 @@ class Computed(Generic[_Inputs]):
 
 
 def computed(declaration: str, *, reads: Sequence[str] = ()) -> Callable[[Callable[_Inputs, bool]], Computed[_Inputs]]:
-    """Make a function a predicate; `Schema.with_computed` declares it.
+    """Return a decorator that makes a function a computed predicate; `Schema.with_computed` declares it.
 
-    The function must depend on its inputs alone; other changes have no effect on conditions.
+    The result of the function must depend only on its inputs; no other change evaluates conditions again.
 
     Args:
-        declaration: the predicate as PDDL declares it: `(near ?a ?b - thing)`.
-        reads: for each argument of the function a term, e.g. `(x ?a)` for its value, or an atom, e.g. `(clean ?a)` for
-            its truth. Their variables are the predicate's parameters.
+        declaration: the predicate in PDDL's notation: `(near ?a ?b - thing)`.
+        reads: one input for each argument of the function: a term, e.g. `(x ?a)`, for its value, or an atom, e.g.
+            `(clean ?a)`, for its truth. The variables must be parameters of the predicate.
 
     Raises:
         ParseError: the declaration cannot be parsed, or a read is neither a term nor an atom.
-        SchemaError: a read has another variable, or the function takes another number of arguments.
+        SchemaError: a read contains another variable, or the function has another number of arguments.
     """
     declared = parse_declaration(declaration, _SOURCE)
     parsed = tuple(parse_term(read, _SOURCE) for read in reads)
@@ -123,10 +126,10 @@ def computed(declaration: str, *, reads: Sequence[str] = ()) -> Callable[[Callab
 
 
 def in_reading_order(known: Mapping[str, Computed[Any]]) -> list[Computed[Any]]:
-    """Return all of them, each after those that it reads.
+    """Return all computed predicates in an order in which each follows the predicates that it reads.
 
     Raises:
-        SchemaError: they read each other in a cycle, or more than `MOST_NESTED` one through the other.
+        SchemaError: the predicates read each other in a cycle, or the nesting exceeds `MOST_NESTED`.
     """
     read = {
         name: [r.predicate for r in of.reads if isinstance(r, Atom) and r.predicate in known]
@@ -149,7 +152,7 @@ def in_reading_order(known: Mapping[str, Computed[Any]]) -> list[Computed[Any]]:
 def _takes(function: Callable[..., object], count: int) -> bool:
     try:
         signature = inspect.signature(function)
-    except ValueError:  # a function in C without a signature
+    except ValueError:  # a C function without a signature
         return True
     try:
         signature.bind(*range(count))

@@ -1,10 +1,11 @@
 """World graph: the world model as a networkx graph, for readers and graph algorithms.
 
-Things are nodes with a `type`. A fact about two things is an arc from the first to the second, with the predicate as
-key. A fact about one thing is an arc from it to itself (S4.4). A fluent of one or two things is such an arc too, with
-its content as `value` (S4.3: symbolic or geometric content). Other facts and fluents are nodes: the `Fact` itself, with
-its name as `relation` (and its `value`). An arc leads to each thing in it, with the position as key. A fluent that a
-source feeds has its reference as `source` (S4.9).
+Each object is a node with a `type`. A fact about two objects is an arc from the first to the second object, with the
+predicate as key. A fact about one object is an arc from the object to itself (S4.4). A fluent of one or two objects is
+also such an arc, with its content as `value` (S4.3: symbolic or geometric content). Each other fact or fluent is a
+node: the `Fact` itself, with its name as `relation`, and for a fluent its `value`. An arc leads from this node to each
+object in the fact, with the argument position as key. A fluent with a bound source has the reference of the source as
+`source` (S4.9).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Graph: TypeAlias = "nx.MultiDiGraph[Any]"
 
 
 class WorldGraph:
-    """Keeps the graph in step with committed changes."""
+    """The graph of a world, updated by each committed change."""
 
     def __init__(self, state: WorldState) -> None:
         declared = {**state.schema.predicates, **state.schema.functions}
@@ -30,13 +31,13 @@ class WorldGraph:
         self._things = {name: _thing_positions(signature) for name, signature in declared.items()}
         self._graph: Graph = nx.MultiDiGraph()
         self.view: Graph = self._graph.copy(as_view=True)
-        """The graph, live and read-only."""
+        """The graph as a read-only view that shows later changes."""
         self.commit(Delta(nodes=state.nodes, added=tuple(state.facts), values=state.values))
         for fluent, reference in state.references.items():
             self.feed(fluent, reference, state.value(fluent.predicate, fluent.args))
 
     def commit(self, effective: Delta) -> None:
-        """Apply an effective change."""
+        """Apply an effective change to the graph."""
         for fact in effective.removed:
             self._remove(fact)
         for name in effective.removed_nodes:
@@ -49,11 +50,11 @@ class WorldGraph:
             self._put(fluent, {"value": content})
 
     def feed(self, fluent: Fact, reference: str, content: Content) -> None:
-        """Set the latest value of a fluent that a source feeds."""
+        """Set the latest value of a fluent that is bound to a source."""
         self._put(fluent, {"value": content, "source": reference})
 
     def unfeed(self, fluent: Fact, kept: Content | None) -> None:
-        """Remove the source of a fluent; `kept` is the value that was set, if there is one."""
+        """Remove the source of a fluent; `kept` is the value that a change has set, if any."""
         self._remove(fluent)
         if kept is not None:
             self._put(fluent, {"value": kept})

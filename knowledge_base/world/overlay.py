@@ -1,4 +1,4 @@
-"""Pending changes on top of a world, and the checks that a change passes before it is applied."""
+"""Pending changes on top of a world, and the checks of a change before its application."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _Key = tuple[str, tuple[Value, ...]]
 
 
 class Overlay:
-    """A `World` with pending changes: a transaction's view, or a step of a plan on trial.
+    """A `World` with pending changes, e.g. in a transaction or for a simulated plan step.
 
-    The base must not change in what the overlay touches while the overlay is in use.
+    While the overlay is in use, the facts and values of the base that the overlay changes must stay unchanged.
 
     Args:
-        base: the world below the changes, which stays unchanged.
-        added: facts that are true here from the beginning.
+        base: the world below the changes; the overlay never changes it.
+        added: facts that are true in the overlay from the beginning.
 
     Attributes:
         schema: the declarations of the base.
@@ -51,10 +51,10 @@ class Overlay:
         )
 
     def apply(self, delta: Delta) -> None:
-        """Change the view, as a whole or, with an error, not at all.
+        """Apply a change to the overlay as a whole, or raise an error without effect.
 
         Raises:
-            InputError: an undeclared or unknown name, a wrong type or number of arguments.
+            InputError: an undeclared or unknown name, a wrong type or a wrong number of arguments.
         """
         check_delta(delta, self)
         for name in delta.removed_nodes:
@@ -74,42 +74,45 @@ class Overlay:
             self._set(fluent, content)
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
-        """Whether the fact is true with the changes."""
+        """Return whether the fact is true after the pending changes."""
         if self._added.holds(predicate, args):
             return True
         return self._base.holds(predicate, args) and Fact(predicate, args) not in self._removed
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> list[tuple[Value, ...]]:
-        """The arguments of all facts that agree with `pattern`; those of the base come first."""
+        """Return the arguments of all facts that match `pattern`; facts of the base come first."""
         kept = list(self._base.match(predicate, pattern))
         if self._removed:
             kept = [args for args in kept if Fact(predicate, args) not in self._removed]
         return [*kept, *self._added.match(predicate, pattern)]
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
-        """An upper bound of the number of matching facts; a base without `estimate` counts as empty."""
+        """Return an upper bound of the number of matching facts.
+
+        A base without `estimate` adds 0.
+        """
         below = getattr(self._base, "estimate", None)
         own = self._added.estimate(predicate, pattern)
         return own + below(predicate, pattern) if below else own
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """Value of the function with the changes."""
+        """Return the value of the function after the pending changes."""
         pending = self._values.get(Fact(function, args))
         return self._base_value(Fact(function, args)) if pending is None else pending
 
     def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
-        """Reference of the source that feeds the function, if the base has one."""
+        """Return the reference of the source that is bound to the function, or `None`."""
         below = getattr(self._base, "reference", None)
         begins_anew = self._gone and not self._gone.keys().isdisjoint(args)
         return below(function, args) if below and not begins_anew else None
 
     def objects(self, type_name: str) -> list[str]:
-        """The things of that type or a subtype; those of the base come first."""
+        """Return the objects of that type and its subtypes; objects of the base come first."""
         kept = [name for name in self._base.objects(type_name) if name not in self._gone]
         return kept + [name for name, own in self._nodes.items() if self.schema.is_a(own, type_name)]
 
     def type_of(self, name: str) -> str | None:
-        """The thing's type; `None` if there is no such thing."""
+        """Return the type of the object; `None` if the object is unknown."""
         if name in self._nodes:
             return self._nodes[name]
         return None if name in self._gone else self._base.type_of(name)
@@ -119,7 +122,7 @@ class Overlay:
         return self.schema.unset(fluent.predicate) if begins_anew else self._base.value(fluent.predicate, fluent.args)
 
     def _add(self, fact: Fact) -> None:
-        if self._gone and not self._gone.keys().isdisjoint(fact.args):  # it was removed with its thing
+        if self._gone and not self._gone.keys().isdisjoint(fact.args):  # the removal of the object removed the fact too
             self._added.add(fact)
         elif fact in self._removed:
             del self._removed[fact]
@@ -155,7 +158,7 @@ class Overlay:
 
 
 def rivals(fact: Fact, world: World) -> Iterator[Fact]:
-    """The true facts that differ from `fact` only in the last argument."""
+    """Return the true facts that differ from `fact` only in the last argument."""
     found = world.match(fact.predicate, (*fact.args[:-1], None))
     return (Fact(fact.predicate, args) for args in list(found) if args != fact.args)
 
@@ -164,7 +167,8 @@ def require_single(delta: Delta, world: World) -> None:
     """Raise an error if `delta`, applied to `world`, makes two facts true that exclude each other.
 
     Raises:
-        SchemaError: two replacements of the same, or two facts of a functional predicate; both are named.
+        SchemaError: two replacements or two facts of a functional predicate differ only in the last argument. The
+            message contains both facts.
     """
     replaced = _grouped(delta.replaced)
     for facts in replaced.values():
@@ -197,13 +201,13 @@ def check_delta(delta: Delta, world: World) -> None:
     """Raise an error unless `delta` can be applied to `world`.
 
     Raises:
-        UnknownNameError: an undeclared type, predicate or function, or an unknown thing.
-        SchemaError: wrong arguments, a second type of a thing, a second fact of a functional predicate, or a value that
-            a source feeds.
-        InputError: a number that is not finite, or a new thing with a name that PDDL cannot spell.
+        UnknownNameError: an undeclared type, predicate or function, or an unknown object.
+        SchemaError: wrong arguments, a second type of an object, or a second fact of a functional predicate. The error
+            is also raised for a new value of a function that is bound to a source.
+        InputError: a number that is not finite, or a new object with a name that PDDL cannot spell.
     """
     schema, admission = world.schema, _Admission(delta, world)
-    # Facts may be removed together with the things they are about.
+    # One change may remove facts together with their objects.
     before = _Admission(replace(delta, removed_nodes=()), world) if delta.removed_nodes else admission
     reference = getattr(world, "reference", None)
     for name, type_name in delta.nodes.items():
@@ -216,7 +220,7 @@ def check_delta(delta: Delta, world: World) -> None:
         admission.fact(fluent, schema.function(fluent.predicate))
         require_content(content, schema.result(fluent.predicate), fluent)
         if delta.removed_nodes and not set(delta.removed_nodes).isdisjoint(fluent.args):
-            continue  # the new thing has no source
+            continue  # the new object has no source
         if reference is not None and (source := reference(fluent.predicate, fluent.args)) is not None:
             raise SchemaError(f"{fluent} is fed by '{source}' and cannot be set")
     for name in delta.removed_nodes:
@@ -229,11 +233,11 @@ def check_delta(delta: Delta, world: World) -> None:
 
 
 def check_fluent(fluent: Fact, world: World) -> None:
-    """Raise an error unless the function is declared and takes these arguments.
+    """Raise an error unless the function is declared and accepts these arguments.
 
     Raises:
-        UnknownNameError: an undeclared function, or an unknown thing.
-        SchemaError: a wrong number of arguments, a wrong type.
+        UnknownNameError: an undeclared function, or an unknown object.
+        SchemaError: a wrong number of arguments, or a wrong type.
     """
     _Admission(Delta(), world).fact(fluent, world.schema.function(fluent.predicate))
 
@@ -247,7 +251,7 @@ def _require_replaceable(fact: Fact, schema: Vocabulary) -> None:
 
 
 class _Admission:
-    """Checks the parts of a change against the things of a world and of the change itself."""
+    """Check of the parts of a change against the objects of a world and of the change itself."""
 
     def __init__(self, delta: Delta, world: World) -> None:
         self.delta = delta
@@ -260,7 +264,7 @@ class _Admission:
             raise InputError(f"a thing's name is text that is not empty, not {name!r}")
         self.schema.require_type(type_name)
         known = None if name in self.delta.removed_nodes else self.world.type_of(name)
-        if known is None and not is_name(name):  # stores of older versions may have such names
+        if known is None and not is_name(name):  # stores of older versions may contain such names
             meant = nearest_name(name)
             raise InputError(
                 f"{shortened(repr(name), MAX_NAME)} cannot be the name of a thing: {A_NAME_IS}",
@@ -278,7 +282,7 @@ class _Admission:
                 self.other_argument(value, known, parameter, fact)
 
     def other_argument(self, value: Value, known: str | None, parameter: TypedVariable, fact: Fact) -> None:
-        """Check an argument that is not a thing of the right type: a value, or a mistake."""
+        """Check an argument that is not an object of the right type: it is a value or a mistake."""
         wanted = parameter.types or (ROOT_TYPE,)
         if value_fits(value, wanted):
             what = f"the argument '?{parameter.name}' of {fact.predicate}"

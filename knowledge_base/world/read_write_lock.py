@@ -1,8 +1,8 @@
-"""Read-write lock: questions and changes take turns in order of arrival, and an interrupt never leaves it taken.
+"""Read-write lock: admits queries and changes in the order of arrival; an interrupt always releases the lock.
 
-Python raises an interrupt (`KeyboardInterrupt`) as it enters a function, begins a loop again, or returns from a call.
-So each `__exit__` is the method of Python's own lock: one call into C, which no interrupt precedes. A gate is a queue,
-because a queue may be opened twice.
+Python raises an interrupt (`KeyboardInterrupt`) on the entry to a function, at each iteration of a loop, or on the
+return from a call. Each `__exit__` is therefore the method of Python's own lock: one call into C, which no interrupt
+precedes. A gate is a queue, because a gate may be opened twice.
 """
 
 from __future__ import annotations
@@ -19,38 +19,42 @@ from typing import Protocol
 from knowledge_base.errors import ConflictError
 
 PATIENCE_S = 0.0005
-"""Time in which the first in line lets others go first: several changes, and several handovers of the lock."""
+"""Time in seconds for which the first waiting thread lets other threads take the lock first.
+
+This time is long enough for several changes and several handovers of the lock.
+"""
 
 
 class Enter(Protocol):
-    """A context manager's `__enter__` as a value."""
+    """Type of a context manager's `__enter__`."""
 
     def __call__(self) -> None:
-        """Take the lock."""
+        """Acquire the lock."""
 
 
 class Exit(Protocol):
-    """A context manager's `__exit__` as a value."""
+    """Type of a context manager's `__exit__`."""
 
     def __call__(
         self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None, /
     ) -> None:
-        """Give the lock back."""
+        """Release the lock."""
 
 
 class FairLock:
-    """Re-entrant lock, taken in order of arrival; used as a context manager.
+    """Re-entrant lock that admits threads in order of arrival; used as a context manager.
 
-    A thread that finds the lock free goes first while the first in line has patience; then all join the line at its
-    end. A handover costs more than most of the work under the lock.
+    A thread that finds the lock free acquires it immediately until the patience of the first waiting thread ends. After
+    that time, each new thread joins the line at its end. A handover between threads costs more than most of the work
+    under the lock.
 
     Args:
-        patience_s: time in which the first in line lets others go first, in seconds.
+        patience_s: time in seconds for which the first waiting thread lets other threads acquire the lock first.
 
     Attributes:
-        held: tells whether this thread has the lock.
-        release: gives the lock back, once.
-        marked: set by the thread that has the lock; cleared when a thread takes it from free.
+        held: returns whether this thread has acquired the lock.
+        release: releases the lock once.
+        marked: set by the thread that has the lock; cleared when a thread acquires the free lock.
     """
 
     __slots__ = ("__exit__", "_acquire", "_due", "_gates", "_patience_s", "held", "marked", "release")
@@ -64,40 +68,40 @@ class FairLock:
         self.__exit__ = lock.__exit__
         self._acquire = lock.acquire
         self._patience_s = patience_s
-        self._gates: deque[SimpleQueue[None]] = deque()  # that of the first is open
-        self._due = 0.0  # when the patience of the first is over
+        self._gates: deque[SimpleQueue[None]] = deque()  # only the gate of the first thread is open
+        self._due = 0.0  # end of the first thread's patience
         self.marked = False
 
     @property
     def length(self) -> int:
-        """Number of threads in line."""
+        """Number of waiting threads."""
         return len(self._gates)
 
     def __enter__(self) -> None:
         marked_here = self.marked and self.held()
         may_go = not self._gates or self.held() or monotonic() < self._due
         try:
-            if not (may_go and self._acquire(False)):  # noqa: FBT003  the keyword would double the cost of a question
+            if not (may_go and self._acquire(False)):  # noqa: FBT003  the keyword would double the cost of a query
                 self._wait()
         except BaseException:
             self.let_go()
             raise
-        if not marked_here:  # no calls from here on: they could be interrupted
+        if not marked_here:  # no calls after this line: an interrupt could come before them
             self.marked = False
 
     def let_go(self) -> None:
-        """Give back the lock that an interrupted call may have taken."""
+        """Release the lock if an interrupted call has acquired it."""
         try:
             self.release()
-        except RuntimeError:  # the interrupt came before the call took it
+        except RuntimeError:  # the interrupt came before the lock was acquired
             return
 
     def take_if_free(self) -> bool:
-        """Take the lock unless another thread has it or waits in line; return whether this thread has it now."""
-        return not self._gates and self._acquire(False)  # noqa: FBT003  as above
+        """Acquire the lock unless another thread has it or waits; return whether this thread has acquired it."""
+        return not self._gates and self._acquire(False)  # noqa: FBT003  see `__enter__`
 
     def _wait(self) -> None:
-        """Wait in line and take the lock; the end of the wait opens the next gate."""
+        """Wait in line and acquire the lock; then open the gate of the next thread."""
         gate: SimpleQueue[None] = SimpleQueue()
         try:
             try:
@@ -112,23 +116,25 @@ class FairLock:
         finally:
             try:
                 self._gates[0].put(None)
-            except IndexError:  # the line is empty
+            except IndexError:  # no thread waits
                 pass
             else:
                 self._due = monotonic() + self._patience_s
 
 
 class ReadWriteLock:
-    """Lock of a world: `with lock` to ask, `with lock.changing()` to change, `with lock.alone()` to prepare a change.
+    """Lock of a world, with three modes.
 
-    A thread that is *alone* leaves the lock to questions. Another thread that wants to change something then waits
-    apart, in order of arrival, and goes before each later one.
+    `with lock` admits queries, `with lock.changing()` a change, and `with lock.alone()` the preparation of a change.
 
-    Each of the three may be entered again; a thread that changes something or is alone may enter all. A thread that
-    only asks cannot change anything: its wait would keep out the thread that is alone.
+    While a thread is *alone*, other threads may query. A thread that wants to change the world then waits in a separate
+    line, in order of arrival, and precedes every later thread.
+
+    Each mode is re-entrant; a thread that is changing the world or is alone may enter all modes. A thread that only
+    queries must not change the world: its wait would block the thread that is alone.
 
     Args:
-        patience_s: time in which the first in line lets others go first, in seconds.
+        patience_s: time in seconds for which the first waiting thread lets other threads acquire the lock first.
     """
 
     __slots__ = ("__enter__", "__exit__", "_alone", "_as_alone", "_as_changing", "_lock")
@@ -137,8 +143,8 @@ class ReadWriteLock:
     __exit__: Exit
 
     def __init__(self, patience_s: float = PATIENCE_S) -> None:
-        self._lock = FairLock(patience_s)  # marked by a thread that changes something
-        self._alone = FairLock(patience_s)  # had by a thread that is alone, or waits apart and is next
+        self._lock = FairLock(patience_s)  # marked by a thread that changes the world
+        self._alone = FairLock(patience_s)  # acquired by the thread that is alone, or is the next to be
         self.__enter__ = self._lock.__enter__
         self.__exit__ = self._lock.__exit__
         self._as_changing = _Passage(self._begin_changing, self._lock.__exit__)
@@ -146,22 +152,24 @@ class ReadWriteLock:
 
     @property
     def waiting(self) -> tuple[int, int]:
-        """Number of threads in line, and of threads that wait apart."""
+        """Number of threads in the line, and of threads in the separate line."""
         return self._lock.length, self._alone.length
 
     def changing(self) -> AbstractContextManager[None]:
-        """No other thread asks or changes anything.
+        """Return a context manager that excludes all other threads.
 
         Raises:
-            ConflictError: on entering, this thread is inside a question.
+            ConflictError: on entry to the block, this thread is evaluating a query.
         """
         return self._as_changing
 
     def alone(self) -> AbstractContextManager[None]:
-        """No other thread changes anything; other threads may ask, unless this one changes something already.
+        """Return a context manager that excludes changes of other threads.
+
+        Other threads may query, unless this thread is changing the world already.
 
         Raises:
-            ConflictError: on entering, this thread is inside a question.
+            ConflictError: on entry to the block, this thread is evaluating a query.
         """
         return self._as_changing if self._lock.marked and self._lock.held() else self._as_alone
 
@@ -185,7 +193,7 @@ class ReadWriteLock:
                 if not may_change:
                     self._alone.let_go()
             raise
-        self._lock.marked = True  # no calls from here on: they could be interrupted
+        self._lock.marked = True  # no calls after this line: an interrupt could come before them
 
     def _begin_alone(self) -> None:
         if self._may_change():
@@ -204,7 +212,7 @@ class ReadWriteLock:
             raise
 
     def _may_change(self) -> bool:
-        """Whether this thread is alone or changes something already."""
+        """Return whether this thread is alone or is changing the world already."""
         if self._alone.held():
             return True
         if not self._lock.held():
@@ -215,7 +223,7 @@ class ReadWriteLock:
 
 
 class _Passage:
-    """A context manager made of two functions; the second may be one of C's."""
+    """A context manager that consists of two functions; the second may be a C function."""
 
     __slots__ = ("__enter__", "__exit__")
 

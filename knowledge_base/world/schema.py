@@ -1,4 +1,4 @@
-"""Schema of a world: types, constants, predicates and functions, from a PDDL domain."""
+"""Schema of a world: types, constants, predicates and functions of a PDDL domain."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from knowledge_base.world.computation import Computed, in_reading_order
 
 MAX_TYPES = 10_000
 MAX_TYPE_DEPTH = 100
-"""Levels of types below `object`: every type knows all those above it."""
+"""Maximum depth of types below `object`: every type stores all its ancestors."""
 
 Declared = tuple[str, Place | None]
-"""A declaration as written, and where."""
+"""A declaration as written, and its place."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,17 +29,17 @@ class Schema:
     """The declarations of a world; every instance is consistent. Equality is identity.
 
     Attributes:
-        types: each type's parent; `object` is always there and has none.
-        constants: things that every world of this schema has, with their types.
-        predicates: by name.
-        functions: by name; one without a result is numeric.
-        places: where types and constants are declared, for messages.
-        functional: the predicates whose last argument the others settle, see `with_functional`.
-        computed: predicates that are computed, by name; no world and no store holds them.
+        types: name to parent of each type; `object` is always present and has no parent.
+        constants: objects that every world of this schema contains, with their types.
+        predicates: signatures of the predicates, by name.
+        functions: signatures of the functions, by name; the default type of a value is `number`.
+        places: places of the declarations of types and constants, for messages.
+        functional: predicates whose last argument depends on the other arguments, see `with_functional`.
+        computed: computed predicates, by name; no world or store contains facts of them.
 
     Raises:
-        SchemaError: an unknown parent, parameter or constant type, a cycle of types, one name used twice, or
-            a computed predicate that cannot read what it declares.
+        SchemaError: a declared type, parameter or constant refers to an unknown type; types form a cycle; or a name is
+            used twice. The error is also raised for a computed predicate with invalid reads.
     """
 
     types: Mapping[str, str | None] = field(default_factory=dict)
@@ -78,28 +78,28 @@ class Schema:
 
     @classmethod
     def from_pddl(cls, path: str | Path) -> Schema:
-        """The schema of a PDDL domain file.
+        """Return the schema of a PDDL domain file.
 
         Raises:
-            InputError: the file cannot be read or does not declare a consistent schema.
+            InputError: the file cannot be read, or does not declare a consistent schema.
         """
         return cls.from_text(read_domain(Path(path)))
 
     @classmethod
     def parse(cls, text: str, source: str | None = None) -> Schema:
-        """The schema of a PDDL domain given as text.
+        """Return the schema of a PDDL domain given as text.
 
         Raises:
-            InputError: the text is not a domain or does not declare a consistent schema.
+            InputError: the text is not a domain, or does not declare a consistent schema.
         """
         return cls.from_text(parse_domain(text, source))
 
     @classmethod
     def from_text(cls, domain: DomainText) -> Schema:
-        """The schema that a domain's declarations make.
+        """Return the schema with the declarations of a parsed domain.
 
         Raises:
-            SchemaError: two declarations contradict each other; both places are named.
+            SchemaError: two declarations contradict each other; the message contains both places.
         """
         types = typed_names((*domain.types, *domain.implied_types()), "type")
         constants = typed_names(domain.constants, "constant")
@@ -112,21 +112,21 @@ class Schema:
         )
 
     def with_functional(self, *predicates: str) -> Schema:
-        """This schema, in which two facts of these predicates cannot differ in nothing but the last argument.
+        """Return this schema with functional predicates: two true facts never differ only in the last argument.
 
-        `schema.with_functional("robot-at", "at")`: a robot, and a thing, is at one place at a time.
+        With `schema.with_functional("robot-at", "at")`, each robot and each object is at one place at a time.
 
         Raises:
-            UnknownNameError: there is no such predicate.
-            SchemaError: it has no arguments.
+            UnknownNameError: a predicate is not declared.
+            SchemaError: a predicate has no arguments.
         """
         return replace(self, functional=self.functional.union(predicates))
 
     def merged(self, other: Schema) -> Schema:
-        """Everything that one of the two declares.
+        """Return a schema with the declarations of both schemas.
 
         Raises:
-            SchemaError: they declare one name differently.
+            SchemaError: the schemas declare a name differently.
         """
         for kind, mine, theirs in (
             ("type", self.types, other.types),
@@ -149,12 +149,12 @@ class Schema:
         ).with_computed(*self.computed.values(), *other.computed.values())
 
     def with_computed(self, *predicates: Computed[Any]) -> Schema:
-        """The schema with these predicates too; one that it has already is fine.
+        """Return this schema with more computed predicates; a predicate that is declared already has no effect.
 
         Raises:
-            UnknownNameError: one reads a function, predicate or type that is not declared.
-            SchemaError: its name is in use, its reads do not fit its parameters' types, or computed predicates read
-                each other in a cycle or too deep.
+            UnknownNameError: a predicate reads a function, predicate or type that is not declared.
+            SchemaError: a name is in use, or reads do not match the types of the parameters. The error is also raised
+                if computed predicates read each other in a cycle or too deeply.
         """
         known = dict(self.computed)
         for one in predicates:
@@ -164,15 +164,21 @@ class Schema:
         return replace(self, computed=known)
 
     def is_a(self, type_name: str, ancestor: str) -> bool:
-        """Whether everything of type `type_name` is of type `ancestor`; a type is its own ancestor."""
+        """Return whether `ancestor` is `type_name` or one of its ancestors."""
         return ancestor in self._ancestors.get(type_name, ()) or (type_name == ancestor and type_name in VALUE_TYPES)
 
     def fits(self, type_name: str, wanted: Iterable[str]) -> bool:
-        """Whether `type_name` is one of the `wanted` types; none wanted means any object."""
+        """Return whether `type_name` is one of the `wanted` types or their subtypes.
+
+        An empty `wanted` accepts any object.
+        """
         return type_name in self.fitting(tuple(wanted))
 
     def fitting(self, wanted: tuple[str, ...]) -> frozenset[str]:
-        """Return all types that fit the `wanted` ones; computed once, since each argument of a change needs it."""
+        """Return all types that match the `wanted` types.
+
+        The result is cached, since each argument of a change needs it.
+        """
         found = self._fitting.get(wanted)
         if found is None:
             all_types = (*self.types, *VALUE_TYPES)
@@ -181,42 +187,42 @@ class Schema:
         return found
 
     def subtypes(self, type_name: str) -> tuple[str, ...]:
-        """`type_name` and all types below it, in the order declared."""
+        """Return `type_name` and all types below it, in the order of their declaration."""
         return tuple(t for t in self.types if self.is_a(t, type_name))
 
     def ancestors(self, type_name: str) -> tuple[str, ...]:
-        """`type_name` and all types above it, up to `object`.
+        """Return `type_name` and all types above it, up to `object`.
 
         Raises:
-            UnknownNameError: there is no such type.
+            UnknownNameError: the type is not declared.
         """
         self.require_type(type_name)
         return self._ancestors[type_name]
 
     def require_type(self, name: str, place: Place | None = None) -> None:
-        """Raise `UnknownNameError` unless `name` is a type of things."""
+        """Raise `UnknownNameError` unless `name` is a type of objects."""
         if name not in self.types:
             raise UnknownNameError(f"there is no type '{name}'", place=place, found=name, valid=self.types)
 
     def require_argument_type(self, name: str, place: Place | None = None) -> None:
-        """Raise `UnknownNameError` unless `name` is a type of things or of values."""
+        """Raise `UnknownNameError` unless `name` is a type of objects or of values."""
         if name not in VALUE_TYPES:
             self.require_type(name, place)
 
     def is_type(self, name: str, arity: int) -> bool:
-        """Whether an atom of that name and number of arguments tests a type.
+        """Return whether an atom with that name and number of arguments tests a type.
 
-        Where a predicate of one argument has a type's name, the atom is the predicate's, as in PDDL, which keeps
-        the two apart.
+        If a predicate with one argument has the name of a type, the atom denotes the predicate. PDDL likewise
+        distinguishes the names of types and predicates.
         """
         return arity == 1 and name in self.types and name not in self.predicates
 
     def predicate(self, name: str, place: Place | None = None) -> Signature:
-        """The predicate of that name, which may be a computed one.
+        """Return the predicate of that name, which may be a computed predicate.
 
         Raises:
-            UnknownNameError: there is none; predicates, types and keywords are suggested.
-            SchemaError: it is a function.
+            UnknownNameError: the predicate is not declared; the message suggests predicates, types and keywords.
+            SchemaError: a function or a type has that name.
         """
         found = self.predicates.get(name)
         if found is not None:
@@ -234,11 +240,11 @@ class Schema:
         return Signature(of.name, of.parameters, place=of.place)
 
     def told(self, name: str, place: Place | None = None) -> Signature:
-        """Return the predicate of that name, which must have facts.
+        """Return the predicate of that name, which must not be a computed predicate.
 
         Raises:
-            UnknownNameError: there is none.
-            SchemaError: it is computed.
+            UnknownNameError: the predicate is not declared.
+            SchemaError: the predicate is computed.
         """
         found = self.predicates.get(name)
         if found is not None:
@@ -248,10 +254,10 @@ class Schema:
         return self.predicate(name, place)
 
     def function(self, name: str, place: Place | None = None) -> Signature:
-        """The function of that name.
+        """Return the function of that name.
 
         Raises:
-            UnknownNameError: there is none.
+            UnknownNameError: the function is not declared.
         """
         found = self.functions.get(name)
         if found is None:
@@ -259,11 +265,11 @@ class Schema:
         return found
 
     def result(self, function: str, place: Place | None = None) -> str:
-        """Return the type of the function's values; raises `UnknownNameError` as `function`."""
+        """Return the type of the function's values; errors as for `function`."""
         return self.function(function, place).result or "number"
 
     def unset(self, function: str) -> Content:
-        """Return the value of the function until it is set; raises `UnknownNameError` as `function`."""
+        """Return the value of the function before the first assignment; errors as for `function`."""
         found = self._unset.get(function)
         return UNSET[self.result(function)] if found is None else found
 
@@ -308,7 +314,7 @@ class Schema:
             check_reads(of, self)
 
     def _is_asked(self, name: str, arity: int) -> bool:
-        """Whether the name is a predicate or a type, not a function."""
+        """Return whether the name denotes a predicate or a type, not a function."""
         return name in self.predicates or name in self.computed or (arity == 1 and name in self.types)
 
     def _check_types(self) -> None:
@@ -351,10 +357,12 @@ def _twice(kind: str, name: str, first: Declared, second: Declared) -> SchemaErr
 
 
 def typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
-    """Return the names that one file declares, each with its one type; another type replaces `object`.
+    """Return the names that one file declares, each with its single type.
+
+    A second declaration with another type replaces the type `object`.
 
     Raises:
-        SchemaError: a name has two types; both places are named.
+        SchemaError: a name has two types; the message contains both places.
     """
     found: dict[str, TypedName] = {}
     for name, types, place in names:
@@ -362,7 +370,7 @@ def typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
             raise SchemaError(f"the {kind} '{name}' can have only one type", place=place)
         declared = TypedName(name, types or (ROOT_TYPE,), place)
         first = found.setdefault(name, declared)
-        if first.types == (ROOT_TYPE,):  # every thing is an object
+        if first.types == (ROOT_TYPE,):  # every object has the type `object`
             found[name] = declared
         elif declared.types not in (first.types, (ROOT_TYPE,)):
             before = f"{name} - {first.types[0]}", first.place
@@ -371,10 +379,12 @@ def typed_names(names: Iterable[TypedName], kind: str) -> dict[str, TypedName]:
 
 
 def agreed_names(files: Iterable[Iterable[TypedName]], kind: str) -> tuple[TypedName, ...]:
-    """Return the names that several files declare; here `object` is a type like any other.
+    """Return the names that several files declare.
+
+    Unlike in `typed_names`, `object` differs from every other type.
 
     Raises:
-        SchemaError: two files, or one, give a name different types; both places are named.
+        SchemaError: a name has different types; the message contains both places.
     """
     found: dict[str, TypedName] = {}
     for names in files:

@@ -15,10 +15,12 @@ from knowledge_base.world.state import WorldState
 def require_extension(written: Schema, given: Schema, place: Place | None = None) -> None:
     """Raise an error unless `given` has every declaration of `written`, unchanged.
 
-    It may have more types, constants, predicates, functions and functional predicates, and other names of parameters.
+    `given` may have more types, constants, predicates, functions and functional predicates. The names of parameters may
+    differ.
 
     Raises:
-        SchemaMismatchError: each difference is named, with the nearest name of `given` for a missing one.
+        SchemaMismatchError: `given` is not an extension. The error lists all differences, with the nearest name of
+            `given` for a missing name.
     """
     foreign = _declared(written).isdisjoint(_declared(given))
     found = [
@@ -41,10 +43,10 @@ def _declared(schema: Schema) -> set[str]:
 
 
 def require_functional(state: WorldState, place: Place | None = None) -> None:
-    """Raise an error if two facts exclude each other by a predicate that the extended schema made functional.
+    """Raise an error if two facts exclude each other under a predicate that the extended schema declares functional.
 
     Raises:
-        SchemaMismatchError: the two facts are named.
+        SchemaMismatchError: two facts exclude each other; the message contains both.
     """
     try:
         require_single(Delta(added=tuple(state.facts)), state)
@@ -56,7 +58,7 @@ def missing_constants(state: WorldState, place: Place | None = None) -> Delta:
     """Return the change that adds the constants of the extended schema.
 
     Raises:
-        SchemaMismatchError: the world has a thing of that name and another type.
+        SchemaMismatchError: the world has an object with the name of a constant, but another type.
     """
     known, constants = state.nodes, state.schema.constants
     wrong = [
@@ -81,7 +83,7 @@ def _differences(
 
 
 def _shapes(signatures: Mapping[str, Signature]) -> dict[str, str | None]:
-    """Return the meaning of each declaration as text: types of its arguments, and of a function's content."""
+    """Return each signature as text: the types of the arguments, and of the function's value."""
     return {
         name: " ".join([name, *("/".join(p.types or (ROOT_TYPE,)) for p in signature.parameters)])
         + ("" if signature.result in (None, "number") else f" - {signature.result}")

@@ -1,4 +1,4 @@
-"""A state of the world in memory: things with their types, indexed facts, and values of functions."""
+"""State of a world in memory: objects with their types, indexed facts, and values of functions."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ Args = tuple[Value, ...]
 
 
 class FactIndex:
-    """A set of facts in order of insertion, indexed per predicate and argument position.
+    """A set of facts in order of insertion, indexed by predicate and argument position.
 
-    Dicts with `None` represent ordered sets. A fact with one argument has no list for it.
+    Dictionaries with the value `None` represent ordered sets. Facts with one argument are not in the argument index.
     """
 
     def __init__(self) -> None:
@@ -25,34 +25,34 @@ class FactIndex:
         return self.holds(fact.predicate, fact.args)
 
     def __iter__(self) -> Iterator[Fact]:
-        """All facts, predicate by predicate."""
+        """Return an iterator over all facts, grouped by predicate."""
         return chain.from_iterable(map(dict.values, self._by_predicate.values()))
 
     def __len__(self) -> int:
         return sum(map(len, self._by_predicate.values()))
 
     def holds(self, predicate: str, args: Args) -> bool:
-        """Whether the fact is in the set."""
+        """Return whether the fact is in the set."""
         known = self._by_predicate.get(predicate)
         return known is not None and args in known
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[Args]:
-        """The arguments that agree with `pattern` (`None` is open), in order of insertion.
+        """Return the arguments that match `pattern`, in order of insertion; `None` matches every argument.
 
-        The iterator filters the shortest list of facts with one of the bound arguments; the set must not change before
-        its end.
+        The iterator filters the shortest list of facts with one of the given arguments. The set must not change before
+        the end of the iteration.
         """
         listed = self._listed(predicate, pattern)
         exact = len(pattern) < 3 or pattern.count(None) >= len(pattern) - 1
         return listed if exact else _agreeing(listed, pattern)
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
-        """At most how many facts agree with `pattern`, without looking through them."""
+        """Return an upper bound of the number of facts that match `pattern`, without reading them."""
         return len(self._listed(predicate, pattern))
 
     def _listed(self, predicate: str, pattern: tuple[Value | None, ...]) -> Collection[Args]:
-        """The shortest list that has all facts which agree with `pattern`."""
-        if len(pattern) == 2:  # queries for the arcs from or to a thing are the most frequent
+        """Return the shortest list that contains all facts which match `pattern`."""
+        if len(pattern) == 2:  # the most frequent pattern: arcs from or to an object
             start, end = pattern
             if start is None and end is not None:
                 return self._by_argument.get((predicate, 1, end), ())
@@ -69,7 +69,7 @@ class FactIndex:
         return shortest
 
     def add(self, fact: Fact) -> None:
-        """Put the fact at the end, unless it is there."""
+        """Append the fact, unless the set contains it already."""
         predicate, args = fact.predicate, fact.args
         known = self._by_predicate.get(predicate)
         if known is None:
@@ -88,13 +88,13 @@ class FactIndex:
                 listed[args] = None
 
     def discard(self, fact: Fact) -> None:
-        """Take the fact out, if it is there."""
+        """Remove the fact if the set contains it."""
         predicate, args = fact.predicate, fact.args
         known = self._by_predicate.get(predicate)
         if known is None or args not in known:
             return
         del known[args]
-        if not known:  # so that the order of predicates depends on the facts alone
+        if not known:  # the order of predicates must depend on the facts alone
             del self._by_predicate[predicate]
         if len(args) == 1:
             return
@@ -106,7 +106,7 @@ class FactIndex:
                 del self._by_argument[key]
 
     def copy(self) -> FactIndex:
-        """An independent set with the same facts in the same order."""
+        """Return an independent set with the same facts in the same order."""
         twin = FactIndex()
         twin._by_predicate = {predicate: known.copy() for predicate, known in self._by_predicate.items()}
         twin._by_argument = {key: listed.copy() for key, listed in self._by_argument.items()}
@@ -119,14 +119,14 @@ def _agreeing(facts: Iterable[Args], pattern: tuple[Value | None, ...]) -> Itera
 
 
 class WorldState:
-    """A `World` in memory. A new one has the schema's constants, and no facts and values.
+    """A `World` in memory; a new state contains only the constants of the schema.
 
-    Sources may feed functions (`sources`): questions read their latest values like any other. `values`, copies and
-    commits do not have them.
+    A function may be bound to a source (`sources`); `value` then returns the latest value of the source. `values`,
+    copies and commits do not contain these latest values.
 
     Attributes:
-        schema: its declarations.
-        facts: all facts; it also answers `holds`, `match` and `estimate`.
+        schema: the declarations of the world.
+        facts: all facts; `holds`, `match` and `estimate` are its methods.
     """
 
     def __init__(self, schema: Schema) -> None:
@@ -144,9 +144,11 @@ class WorldState:
     def of(
         cls, schema: Schema, nodes: Mapping[str, str], facts: Iterable[Fact], values: Mapping[Fact, Content]
     ) -> WorldState:
-        """The state with exactly these things (constants too), facts and values, which fit the schema.
+        """Return the state with exactly these objects, facts and values, which must match the schema.
 
-        Their order is the order of insertion.
+        `nodes` must contain the constants too.
+
+        The order of the arguments is the order of insertion.
         """
         state = cls(schema)
         state._types = {}
@@ -159,29 +161,29 @@ class WorldState:
         return state
 
     def __len__(self) -> int:
-        """Number of things, facts and values."""
+        """Return the number of objects, facts and values."""
         return len(self._types) + len(self.facts) + len(self._values)
 
     @property
     def nodes(self) -> Mapping[str, str]:
-        """All things with their types, in order of insertion."""
+        """All objects with their types, in order of insertion."""
         return self._types
 
     @property
     def values(self) -> Mapping[Fact, Content]:
-        """Values that functions were set to."""
+        """Values that changes have set, by function and arguments."""
         return self._values
 
     @property
     def references(self) -> Mapping[Fact, str]:
-        """The fluents that sources feed, each with the reference of its source."""
+        """The fluents with a bound source, each with the reference of the source."""
         return self._references
 
     def value(self, function: str, args: Args) -> Content:
-        """Value of the function; until it is set, the one of its type in `UNSET`.
+        """Return the value of the function; before the first assignment the value in `UNSET` for its type.
 
         Raises:
-            UnknownNameError: there is no such function.
+            UnknownNameError: the function is not declared.
         """
         fluent = Fact(function, args)
         found = self._latest.get(fluent) if self._latest else None
@@ -190,16 +192,16 @@ class WorldState:
         return self.schema.unset(function) if found is None else found
 
     def reference(self, function: str, args: Args) -> str | None:
-        """Reference of the source that feeds the function, if there is one."""
+        """Return the reference of the source that is bound to the function, or `None`."""
         return self._references.get(Fact(function, args)) if self._references else None
 
     def values_about(self, things: Collection[str]) -> list[Fact]:
-        """The fluents with one of these things in them that were set or fed."""
+        """Return the fluents with a set or latest value that have one of these objects as an argument."""
         fluents = {**self._values, **self._latest} if self._latest else self._values
         return [f for f in fluents if any(arg in things for arg in f.args)]
 
     def bind(self, fluent: Fact, reference: str) -> None:
-        """Let a source feed the fluent, which keeps its value until the first time."""
+        """Bind a source to the fluent, which keeps its value until the first update."""
         self._references[fluent] = reference
 
     def feed(self, fluent: Fact, content: Content) -> None:
@@ -207,26 +209,26 @@ class WorldState:
         self._latest[fluent] = content
 
     def unbind(self, fluent: Fact) -> None:
-        """Forget the source of the fluent and its latest value."""
+        """Remove the source of the fluent and its latest value."""
         del self._references[fluent]
         self._latest.pop(fluent, None)
 
     def objects(self, type_name: str) -> list[str]:
-        """The things of that type or a subtype.
+        """Return the objects of that type and its subtypes.
 
         Raises:
-            UnknownNameError: there is no such type.
+            UnknownNameError: the type is not declared.
         """
         if type_name not in self._members:
             self.schema.require_type(type_name)
         return list(self._members[type_name])
 
     def type_of(self, name: str) -> str | None:
-        """The thing's type; `None` if there is no such thing."""
+        """Return the type of the object; `None` if the object is unknown."""
         return self._types.get(name)
 
     def commit(self, effective: Delta) -> None:
-        """Make a change that an `Overlay` on this very state gives as its `delta`."""
+        """Apply an effective change, i.e. the `delta` of an `Overlay` on this state."""
         for name in effective.removed_nodes:
             self._remove_node(name)
         for name, type_name in effective.nodes.items():
@@ -238,7 +240,7 @@ class WorldState:
         self._values.update(effective.values)
 
     def copy(self, *, fed: bool = False) -> WorldState:
-        """An independent equal state without sources; with `fed`, their latest values are set in it."""
+        """Return an independent equal state without sources; with `fed`, the latest values are set as values."""
         twin = WorldState(self.schema)
         twin._index(self.facts.copy())
         twin._values = {**self._values, **self._latest} if fed else self._values.copy()
@@ -256,7 +258,7 @@ class WorldState:
             self._members[ancestor][name] = None
 
     def _remove_node(self, name: str) -> None:
-        """Remove the thing and its values; the change lists its facts itself."""
+        """Remove the object and its values; the change itself lists the facts to remove."""
         for ancestor in self.schema.ancestors(self._types.pop(name)):
             del self._members[ancestor][name]
         self._values = {f: v for f, v in self._values.items() if name not in f.args}
