@@ -1,1 +1,1 @@
-"""Supervision keeps the components alive and active that skills need: registry, activation tree, supervisors."""
+"""Supervision: keeps components alive and active while skills need them (registry, activation tree, supervisors)."""

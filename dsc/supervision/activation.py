@@ -13,23 +13,24 @@ from dsc.supervision.component_registry import ComponentRegistry
 from knowledge_base.errors import InputError, described
 
 PAUSE = 1.0
-"""Seconds before a failed component is restarted; doubled after each failure."""
+"""Seconds before a failed component is restarted; the pause doubles after each failure."""
 LONGEST = 30.0
-"""The most seconds between two attempts."""
+"""Maximum number of seconds between two attempts to start a component."""
 
 
 class ComponentActivation(Announcer):
-    """Gives each required component a supervisor, and releases the others; announces changes of components.
+    """The activation tree of a run: a supervisor for each required component.
 
-    A component without resources and without needs takes part only if another one needs it.
+    It releases the supervisors of other components, and announces changes of components. A component without resources
+    and without needs only participates if another component needs it.
 
     Args:
         registry: the deployed components.
-        used: names of the components whose skills run or clean up.
+        used: returns the names of the components whose skills run or clean up.
 
     Attributes:
-        registry: as given.
-        concerned: names of the components that take part.
+        registry: the deployed components.
+        concerned: names of the components that participate.
     """
 
     def __init__(self, registry: ComponentRegistry, used: Callable[[], Iterable[str]]) -> None:
@@ -51,7 +52,7 @@ class ComponentActivation(Announcer):
         return frozenset(supervisor.name for supervisor in self._supervisors.values() if supervisor.on)
 
     def deploy(self, component: Component) -> None:
-        """Add a component to the registry; it replaces one of the same name."""
+        """Add a component to the registry; it replaces a component with an equal name."""
         before = self.registry.components.get(component.name, component)
         if before is not component:
             before.life.leave(self.look)
@@ -70,18 +71,18 @@ class ComponentActivation(Announcer):
             self.concerned.discard(component.name)
 
     def changed(self, name: str) -> None:
-        """A component is in use from now on, or no longer."""
+        """Update the supervisors after a change in the use of component `name`."""
         if name in self.concerned:
             self.look()
 
     def look(self) -> None:
-        """Start and stop supervisors soon, one time for all changes of a moment."""
+        """Schedule an update of the supervisors; all changes until the update share it."""
         if not self._looking and not self._closed:
             self._looking = True
             asyncio.get_running_loop().call_soon(self._supervise)
 
     def switched(self, name: str, mode: str) -> None:
-        """Note the mode into which a state switches a component."""
+        """Store that a state has switched a component to a mode."""
         if mode in {NEUTRAL, Life.SHUTDOWN}:
             self._in_mode.pop(name, None)
         elif mode != Life.INIT:
@@ -89,13 +90,13 @@ class ComponentActivation(Announcer):
         self.changed(name)
 
     async def close(self) -> None:
-        """Release all supervisors, and wait for them within bounds."""
+        """Release all supervisors, and wait until they have ended, for `2 * GRACE` seconds at most."""
         self._closed = True
         for component in self.registry.components.values():
             component.life.leave(self.look)
         self._keep_only({})
         if self._released:
-            _, others = await asyncio.wait(self._released.values(), timeout=2 * GRACE)  # one after the other
+            _, others = await asyncio.wait(self._released.values(), timeout=2 * GRACE)  # for two components in sequence
             for task in others:
                 task.cancel()
                 give_up(task)
@@ -103,23 +104,23 @@ class ComponentActivation(Announcer):
     # -- for skills and supervisors ---------------------------------------------------------------------------
 
     def supervisor(self, component: Component) -> Supervisor:
-        """The supervisor of a component in use; the components that it needs have theirs from now on."""
+        """Return the supervisor of a component in use; the components that it needs have supervisors afterwards."""
         if self._looking or component.name not in self._supervisors:
             self._supervise()
         return self._supervisors[component.name]
 
     def supervisors_of(self, component: Component) -> Iterator[Supervisor]:
-        """The supervisors of the components that one needs in its mode, dependencies first; then its own.
+        """Yield the supervisors of the components that `component` needs in its mode, dependencies first; then its own.
 
         Raises:
-            InputError: components need each other in a cycle, or the hook `needed` of one fails.
+            InputError: components need each other in a cycle, or the hook `needed` of a component fails.
         """
         for name in self._closure(component.name, {}, ()):
             if name in self._supervisors:
                 yield self._supervisors[name]
 
     def needed(self, component: Component | None) -> tuple[str, ...]:
-        """Names of the components that one needs in its mode; raises `InputError` if its hook fails."""
+        """Return the names of components that `component` needs in its mode; raise `InputError` if its hook fails."""
         try:
             with contained():
                 return () if component is None else tuple(component.needed())
@@ -128,7 +129,7 @@ class ComponentActivation(Announcer):
             raise InputError(f"`needed` of component '{name}' has failed: {described(error)}") from error
 
     def announce(self) -> None:
-        """A component has changed: update the supervisors, then call the listeners."""
+        """Update the supervisors after a change of a component, then call the listeners."""
         self.look()
         super().announce()
 
@@ -146,10 +147,10 @@ class ComponentActivation(Announcer):
         self._keep_only(required)
 
     def _require(self, name: str, needing: Component | None, required: dict[str, Component | None]) -> None:
-        """Add a component with the one that needs it, then its own dependencies."""
+        """Add a component together with the component that needs it, then the component's own dependencies."""
         if name not in required:
             required[name] = needing
-            with suppress(InputError):  # the component's skill fails with it
+            with suppress(InputError):  # the skill of the component fails with this error
                 component = self.registry.known(name)
                 for other in self.needed(component):
                     self._require(other, component, required)
@@ -183,19 +184,19 @@ class ComponentActivation(Announcer):
 
 
 class Supervisor:
-    """Keeps one component alive and active until it is released; restarts it after a crash (S2.12).
+    """The task that keeps one component alive and active until its release, and restarts it after a crash (S2.12).
 
     Args:
-        name: of the component.
-        needing: the component that needs it, if any.
-        activation: announces its changes.
-        after: the task of an earlier supervisor.
+        name: the component's name.
+        needing: the component that needs it; `None` if a skill does.
+        activation: the activation tree, which announces changes of the component.
+        after: the task of an earlier supervisor of the component, or `None`.
 
     Attributes:
-        name: of the component.
+        name: the component's name.
         task: runs until the component is inactive again.
-        failures: the number of failed attempts to start or activate it.
-        problem: the error of the search for it, or of its needs.
+        failures: the number of failed attempts to start or activate the component.
+        problem: the error in the search for the component, or in its hook `needed`; else `None`.
     """
 
     def __init__(
@@ -214,18 +215,18 @@ class Supervisor:
         self.task = asyncio.get_running_loop().create_task(self._run(after))
 
     def release(self, after: Collection[asyncio.Task[None]]) -> None:
-        """End supervision: the component becomes inactive, after those that have needed it."""
+        """End supervision: the component becomes inactive, after the tasks `after` of components that needed it."""
         self._before_end = after
         self.task.cancel()
 
     @property
     def on(self) -> bool:
-        """Whether it is alive and active."""
+        """Whether the component is alive and active."""
         return self._on and self._component is not None and self._component.life.state is Life.ALIVE
 
     @property
     def lost(self) -> bool:
-        """Whether it has failed, was shut down, or has gone back to Init."""
+        """Whether the component has failed, was shut down, or has returned to Init."""
         life = None if self._component is None else self._component.life.state
         return life in {Life.FATAL_ERROR, Life.SHUTDOWN} or (life is Life.INIT and self._was_active)
 
@@ -234,7 +235,7 @@ class Supervisor:
             if after is not None:
                 await asyncio.wait([after], timeout=GRACE)
             await self._supervise()
-        except Exception as error:  # noqa: BLE001  # an error of `reach` or `needed`; skills that need it raise it
+        except Exception as error:  # noqa: BLE001  # an error of `reach` or `needed`, which dependent skills raise
             self.problem = error
             self._activation.announce()
         finally:
@@ -251,7 +252,7 @@ class Supervisor:
             pause = PAUSE if lasted > PAUSE else await _rested(component, pause)
 
     async def _once(self, component: Component) -> float:
-        """Start and activate it; return the seconds for which it was active."""
+        """Start and activate the component; return the seconds for which it was active."""
         await component.life.come_alive(component.start)
         if component.life.state is Life.ALIVE:
             self._activated = True
@@ -286,9 +287,9 @@ class Supervisor:
 
 
 async def _rested(component: Component, pause: float) -> float:
-    """Wait before a failed component restarts, unless it recovers earlier; return the next pause.
+    """Wait before a failed component restarts, unless it recovers earlier; return the length of the next pause.
 
-    A component in Shutdown stays there until it is switched to `init`.
+    A component in Shutdown stays in Shutdown until a `switch` to `init`.
     """
     before = component.life.state
     with suppress(TimeoutError):

@@ -1,4 +1,4 @@
-"""Registry of the deployed components, and of those reached elsewhere because one of these needs them (S2.12)."""
+"""Registry of the deployed components, and of components in other processes that deployed ones need (S2.12)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ class NotAliveError(Exception):
 
 
 class ComponentRegistry:
-    """The deployed components, and those that were reached elsewhere.
+    """The deployed components, and the components that were reached in other processes.
 
     Attributes:
-        components: the deployed ones, by name.
+        components: the deployed components, by name.
     """
 
     def __init__(self, components: MutableMapping[str, Component]) -> None:
@@ -27,16 +27,23 @@ class ComponentRegistry:
         self._deployed = asyncio.Event()
 
     def deploy(self, component: Component) -> None:
-        """Add a component, maybe late; it replaces one of the same name."""
+        """Add a component, also during a run; it replaces a component with an equal name."""
         self.components[component.name] = component
         self._deployed.set()
 
     def known(self, name: str) -> Component | None:
-        """The component of that name, if it is here or has been reached."""
+        """Return the component of that name if it is deployed or has been reached, else `None`."""
         return self.components.get(name) or self._reached.get(name)
 
     async def find(self, name: str, needing: Component | None) -> Component:
-        """The component of that name: deployed here, maybe late, or reached by the component that needs it."""
+        """Return the component of that name.
+
+        If the component is unknown, wait until it is deployed, or until component `needing` has reached it in another
+        process.
+
+        Raises:
+            KeyError: the component is unknown, and `needing` is `None`.
+        """
         found = self.known(name)
         if found is not None or needing is None:
             return found or self.components[name]
@@ -57,7 +64,7 @@ class ComponentRegistry:
             await self._deployed.wait()
 
     def state_of(self, name: str) -> str:
-        """The state of a component, in words."""
+        """Return the state of a component as text for a message."""
         component = self.known(name)
         if component is None:
             return str(UnknownNameError(f"component '{name}', which is not there", found=name, valid=self.components))

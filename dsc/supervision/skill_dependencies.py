@@ -1,4 +1,4 @@
-"""Dependencies of one skill: its component, and the components that this needs, while the skill runs (S2.12)."""
+"""Dependencies of a running skill: its component, and the components that this component needs (S2.12)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _Result = TypeVar("_Result")
 
 
 class SkillDependencies:
-    """Waits for the dependencies of a skill, and watches them while it runs.
+    """Access of one skill to its dependencies: waits until they are active, and watches them while the skill runs.
 
     Attributes:
-        concerned: whether the skill's component takes part in activation; if not, only its own life counts.
+        concerned: whether the skill's component participates in activation; if not, only its own life cycle matters.
     """
 
     def __init__(self, activation: ComponentActivation, component: Component) -> None:
@@ -31,9 +31,9 @@ class SkillDependencies:
 
     @property
     def missing(self) -> str:
-        """The dependency that the skill waits for, in words; else empty."""
+        """The dependency that the skill waits for, as text; empty if it waits for none."""
         if self._waits:
-            with suppress(InputError):  # then that is the reason
+            with suppress(InputError):  # then that error is the reason
                 name = next((one.name for one in self._activation.supervisors_of(self._component) if not one.on), "")
                 return name and self._activation.registry.state_of(name)
         return ""
@@ -45,7 +45,7 @@ class SkillDependencies:
 
         Raises:
             NotAliveError: the component itself cannot start, or is in Shutdown.
-            InputError: components need each other in a cycle, or the hook `needed` of one fails.
+            InputError: components need each other in a cycle, or the hook `needed` of a component fails.
         """
         if self.concerned:
             await self._supervised()
@@ -70,10 +70,10 @@ class SkillDependencies:
         self._waits = False
 
     async def carrying(self, work: Awaitable[_Result]) -> _Result:
-        """Await the skill's work while the component and its dependencies in any mode are alive.
+        """Await the skill's work while its component and the dependencies in any mode are alive; return the result.
 
         Raises:
-            NotAliveError: one of them is lost; the work was cancelled.
+            NotAliveError: the component or a dependency is lost; the work was cancelled.
         """
         me = asyncio.current_task()
         lost: list[str] = []
@@ -106,6 +106,6 @@ class SkillDependencies:
             return self._component.name
         if not self.concerned:
             return None
-        with suppress(InputError):  # it fails the next skill
+        with suppress(InputError):  # the error fails the next skill
             return next((one.name for one in self._activation.supervisors_of(self._component) if one.lost), None)
         return None
