@@ -1,7 +1,7 @@
 """Action elimination (Nakhost & Müller 2010): remove redundant steps from a plan.
 
-Engines that return their first plan often include detours. Each trial removes one action and the actions that are then
-inapplicable. If the plan still reaches the goal, the removal is kept. A robot would execute each redundant step.
+The first plan of an engine often contains detours, and a robot would execute each redundant step. Each trial removes
+one action and all later actions that are then inapplicable. The removal is kept if the plan still reaches the goal.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _Act:
-    """A ground action with sets of facts as bits, so that a trial takes about a microsecond."""
+    """A ground action whose sets of facts are integers with one bit per fact, so that a trial takes a microsecond."""
 
     index: int
     action: GroundAction
@@ -33,7 +33,7 @@ class _State:
     numbers: Numbers
 
     def after(self, act: _Act) -> _State | None:
-        """Return the next state; `None` if the action is not applicable."""
+        """Return the state after the action; `None` if the action is not applicable."""
         if act.needs & ~self.facts:
             return None
         action, numbers = act.action, self.numbers
@@ -48,13 +48,13 @@ class _State:
 
 
 def indispensable(problem: Problem, chosen: Sequence[int]) -> list[int]:
-    """Return the actions of a plan, by index, without redundant ones.
+    """Return the indices of the plan's actions without redundant actions.
 
     No action of the result can be removed together with the actions that depend on it.
 
     Args:
-        problem: without durations.
-        chosen: the actions of a plan for it, in order.
+        problem: a problem without durations.
+        chosen: the indices of the actions of a plan for the problem, in order.
     """
     acts, start, goal = _encoded(problem, chosen)
     before = None
@@ -65,7 +65,7 @@ def indispensable(problem: Problem, chosen: Sequence[int]) -> list[int]:
 
 
 def _once(problem: Problem, acts: list[_Act], state: _State, goal: int) -> list[_Act]:
-    """Try to remove each action, from the first to the last."""
+    """Return the actions after one trial for each action, from the first to the last."""
     position = 0
     while position < len(acts):
         fewer, end = _without(state, acts[position + 1 :])
@@ -78,7 +78,7 @@ def _once(problem: Problem, acts: list[_Act], state: _State, goal: int) -> list[
 
 
 def _without(state: _State, acts: Sequence[_Act]) -> tuple[list[_Act], _State]:
-    """Return the actions that are still applicable, and the state after them."""
+    """Return the actions that are applicable one after the other from `state`, and the state after them."""
     taken = []
     for act in acts:
         ahead = state.after(act)

@@ -1,7 +1,7 @@
-"""Blocking work with a time limit, which ends early when its caller is cancelled.
+"""Blocking work with a time limit, which ends early if its caller is cancelled.
 
-The event loop may run in simulated time and must not wait for a thread when it closes. A daemon thread therefore does
-blocking work, and a timer watches real time. The work itself checks its `WorkLimit` periodically.
+The event loop may use simulated time, and must not wait for a thread when the loop closes. Blocking work therefore runs
+in a daemon thread, and a timer measures real time. The work itself checks its `WorkLimit` regularly.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_SPARINGLY = 256  # reading the clock costs more than one binding
+_SPARINGLY = 256  # calls of `spend`; reading the clock takes longer than one piece of work
 
 
 class WorkLimitError(Exception):
-    """The time for a piece of work is up, or its caller is cancelled.
+    """Error: the time limit of the work has passed, or its caller is cancelled.
 
     Attributes:
-        doing: the work in progress at that time, e.g. `grounding action 'a'`.
+        doing: the work in progress at the end, e.g. `grounding action 'a'`.
     """
 
     def __init__(self, doing: str) -> None:
@@ -37,13 +37,13 @@ class WorkLimitError(Exception):
 
 
 class WorkLimit:
-    """A limit in real time for a piece of work.
+    """A limit in real time for blocking work.
 
     Attributes:
-        doing: the work in progress, for error messages.
+        doing: a description of the work in progress, for error messages.
 
     Args:
-        seconds: real time from now on; unlimited if omitted.
+        seconds: the limit, from the construction of this object; unlimited if omitted.
     """
 
     def __init__(self, seconds: float = math.inf) -> None:
@@ -54,18 +54,18 @@ class WorkLimit:
 
     @property
     def left(self) -> float:
-        """The seconds that are left; infinite without a limit."""
+        """The remaining seconds; infinite without a limit."""
         return max(0.0, self._deadline - time.monotonic())
 
     def cancel(self) -> None:
-        """Stop the work at its next `spend`; may be called from any thread."""
+        """Stop the work at its next call of `spend`; any thread may call this method."""
         self._cancelled = True
 
     def spend(self) -> None:
-        """Count one small piece of work; the work calls it for each.
+        """Count one small piece of work; the work must call this method regularly.
 
         Raises:
-            WorkLimitError: the time is up, or the limit is cancelled.
+            WorkLimitError: the time limit has passed, or `cancel` was called.
         """
         self._spent += 1
         if self._cancelled or (self._spent % _SPARINGLY == 0 and not self.left):
@@ -74,7 +74,7 @@ class WorkLimit:
 
 @contextlib.contextmanager
 def alarm(seconds: float, ring: Callable[[], object]) -> Iterator[None]:
-    """Call `ring` in the event loop after `seconds` of real time, unless the block ends before."""
+    """Call `ring` in the event loop after `seconds` of real time, unless the block ends earlier."""
     watch = threading.Timer(min(seconds, threading.TIMEOUT_MAX), _in_loop(ring))
     watch.daemon = True
     if math.isfinite(seconds):
@@ -86,14 +86,14 @@ def alarm(seconds: float, ring: Callable[[], object]) -> Iterator[None]:
 
 
 async def aside(work: Callable[[], T], patience: WorkLimit | None = None) -> T:
-    """Run the work in a thread and return its result; the thread is abandoned when the limit expires.
+    """Run `work` in a thread and return its result; abandon the thread when the limit has passed.
 
     Args:
-        work: may block. To end early it must call `spend` of the same limit; otherwise its thread runs on.
-        patience: the limit, cancelled at the end, also if the caller is cancelled; by default a new one.
+        work: may block. To end early, it must call `spend` of the same limit; otherwise its thread continues.
+        patience: the limit; it is cancelled at the end, also if the caller is cancelled. By default there is no limit.
 
     Raises:
-        WorkLimitError: the time is up.
+        WorkLimitError: the time limit has passed.
     """
     patience = patience or WorkLimit()
     result: asyncio.Future[T] = asyncio.get_running_loop().create_future()
@@ -128,7 +128,7 @@ def _in_loop(call: Callable[..., object]) -> Callable[..., None]:
     loop = asyncio.get_running_loop()
 
     def called(*values: object) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop is closed, so that no task waits
+        with contextlib.suppress(RuntimeError):  # the loop is closed, so no task waits
             loop.call_soon_threadsafe(call, *values)
 
     return called

@@ -1,4 +1,4 @@
-"""Explanations of 'no plan': one sentence for each goal fact out of reach, down to the missing facts, and mutexes."""
+"""Explanations of 'no plan': one sentence for each unreachable goal fact, down to its missing facts; mutexes."""
 
 from __future__ import annotations
 
@@ -31,13 +31,10 @@ _LONGEST_CHAIN = 6
 def why_unsolvable(
     domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit | None = None
 ) -> tuple[str, ...]:
-    """One sentence for each goal fact that no action sequence can reach even without deletions.
+    """Return one sentence for each goal fact that no action sequence can reach even without deletions.
 
-    Each sentence follows the nearest actions back to missing facts. If every fact is reachable alone, the answer names
-    the mutexes among them.
-
-    Raises:
-        InputError, WorkLimitError: as for `planning.problem.construction.build_problem`.
+    Each sentence follows the nearest actions back to missing facts. If each goal fact is reachable alone, the result
+    consists of the mutexes among the goal facts.
     """
     check_goal(goal, world)
     derived = derivation(domain)
@@ -56,7 +53,7 @@ def why_unsolvable(
 
 
 def _not_together(domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit) -> tuple[str, ...]:
-    """The mutexes among the goal facts, or a sentence for more than two facts that exclude each other."""
+    """Return the mutexes among the goal facts, or a sentence if more than two facts exclude each other."""
     patience.doing = "looking for goal facts that exclude each other"
     problem = ProblemBuilder(domain).build_problem(world, goal, patience=patience)
     pairs = [] if problem.one_at_a_time else list(goal_mutexes(problem.whole or problem, patience))
@@ -66,7 +63,7 @@ def _not_together(domain: PlanningDomain, world: World, goal: Expression, patien
 
 
 def _declared(fact: Fact) -> bool:
-    """Whether the domain declares the fact; the name of one for a disjunction has a blank."""
+    """Return whether the domain declares the fact; the predicate of a bookkeeping fact contains a blank."""
     return " " not in fact.predicate.removeprefix(NOT)
 
 
@@ -77,12 +74,12 @@ def _as_written(fact: Fact) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Reach:
-    """The facts and numbers that relaxed reachability allows.
+    """The facts and the changes of numbers that relaxed reachability allows.
 
     Attributes:
-        facts: in positive normal form.
-        changes: possible changes of numbers.
-        world: the present.
+        facts: the reachable facts, in positive normal form.
+        changes: the possible changes of numbers.
+        world: the present world.
     """
 
     facts: frozenset[Fact]
@@ -98,7 +95,7 @@ class _Reach:
         return _Reach(frozenset([numbering.facts[one] for one in literals]), tuple(changes), world)
 
     def allows(self, condition: Residual) -> bool:
-        """Return whether each leaf of the condition holds or may hold alone."""
+        """Return whether each leaf of the condition is true or may become true independently of the other leaves."""
         match condition:
             case bool():
                 return condition
@@ -118,7 +115,10 @@ class _Reach:
 
 @dataclass(frozen=True, slots=True)
 class _Nearest:
-    """A step that adds a fact, with its missing facts and conditions, and the number of unchangeable ones."""
+    """A step that adds a fact, with its missing facts and conditions.
+
+    `fixed` is the number of missing facts and conditions that no action can change.
+    """
 
     step: PlanStep
     facts: tuple[Fact, ...]
@@ -136,7 +136,7 @@ class _Causes:
     index: ReachedFacts
 
     def of(self, wanted: Residual) -> Iterator[str]:
-        """Yield a sentence for each unreachable literal."""
+        """Yield a sentence for each unreachable literal or bound of the condition."""
         match wanted:
             case Literal():
                 if as_fact(wanted) not in self.reached:
@@ -153,7 +153,7 @@ class _Causes:
                     yield from itertools.chain.from_iterable(causes)
 
     def chain(self, fact: Fact) -> str:
-        """A sentence from the fact through the nearest actions to unreachable facts."""
+        """Return a sentence that leads from the fact through the nearest actions to unreachable facts."""
         said: list[str] = []
         agenda, seen, rooted = [fact], {fact}, False
         while agenda and len(said) < _LONGEST_CHAIN:
@@ -171,12 +171,12 @@ class _Causes:
         return "; ".join(said if rooted or agenda else [*said, "none of these can come first"])
 
     def nearest(self, fact: Fact) -> _Nearest | None:
-        """The action with the fewest missing facts that adds the fact; the first of the domain among equals."""
+        """Return the action that adds the fact with the fewest missing facts; among equals, the first of the domain."""
         found = [near for rule in self.rules for near in self.ways(rule, fact)]
         return min(found, key=_distance, default=None)
 
     def ways(self, rule: JoinRule, fact: Fact) -> Iterator[_Nearest]:
-        """For each effect of the action that can be the fact, the arguments with the fewest missing facts."""
+        """Yield, for each effect that can add the fact, the arguments of the action with the fewest missing facts."""
         for leaf in effect_leaves(rule.action.effect):
             if isinstance(leaf, Add) and leaf.atom.predicate == fact.predicate:
                 start = rule.unify(leaf.atom, fact, {})
@@ -185,7 +185,7 @@ class _Causes:
                     yield closest
 
     def closest(self, rule: JoinRule, start: dict[str, Value]) -> _Nearest | None:
-        """Drop one more positive precondition at a time until the others have arguments."""
+        """Return the step with the fewest dropped positive preconditions so that the other ones have arguments."""
         for given_up in range(len(rule.atoms) + 1):
             found = [
                 self.lacking(rule, full)
@@ -198,7 +198,7 @@ class _Causes:
         return None
 
     def completed(self, rule: JoinRule, bindings: dict[str, Value]) -> dict[str, Value] | None:
-        """Bind undecided parameters to the first object of their type."""
+        """Return the bindings with each unbound parameter bound to the first object of its type; `None` without one."""
         first = {name: next(iter(objects), None) for name, objects in rule.allowed.items()}
         full = {name: bindings.get(name, value) for name, value in first.items()}
         return {k: v for k, v in full.items() if v is not None} if None not in full.values() else None
@@ -217,7 +217,7 @@ class _Causes:
 
 
 def _cases(action: PlanningAction) -> Iterator[PlanningAction]:
-    """One action for each effect, with the variables and conditions of the effect as parameters and precondition."""
+    """Yield an action for each effect; variables and conditions of the effect become parameters and precondition."""
     for leaf, variables, conditions in _effects(action.effect):
         needed = (*conjuncts(action.precondition), *(part for one in conditions for part in conjuncts(one)))
         yield replace(action, parameters=(*action.parameters, *variables), precondition=And(needed), effect=leaf)
@@ -226,7 +226,7 @@ def _cases(action: PlanningAction) -> Iterator[PlanningAction]:
 def _effects(
     effect: Effect, variables: tuple[TypedVariable, ...] = (), conditions: tuple[Expression, ...] = ()
 ) -> Iterator[tuple[Effect, tuple[TypedVariable, ...], tuple[Expression, ...]]]:
-    """Yield the leaves of an effect, each with the variables and conditions around it."""
+    """Yield the leaves of an effect, each with the variables and conditions that enclose it."""
     match effect:
         case AllOf(parts):
             for part in parts:
@@ -240,7 +240,7 @@ def _effects(
 
 
 def _present(rules: Iterable[JoinRule], world: World) -> Iterator[Fact]:
-    """Yield the facts that hold now, of all predicates in the actions' preconditions."""
+    """Yield the facts that hold in `world`, of all predicates in the preconditions of the actions."""
     for predicate in dict.fromkeys(atom.predicate for rule in rules for atom in rule.atoms):
         arity = len(world.schema.predicates[predicate].parameters)
         for args in world.match(predicate, (None,) * arity):
@@ -261,7 +261,7 @@ def _stays(fact: Fact) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _NumberedAction:
-    """A ground action with facts as numbers; sets of facts are bits."""
+    """A ground action with facts as numbers; each set of facts is an integer with one bit per fact."""
 
     needs: tuple[int, ...]
     needed: int
@@ -271,10 +271,10 @@ class _NumberedAction:
 
 
 def goal_mutexes(problem: Problem, patience: WorkLimit) -> Iterator[tuple[Fact, Fact]]:
-    """The pairs of goal facts that never hold together, though each may by itself.
+    """Yield the pairs of goal facts that never hold together, though each fact may hold alone.
 
     Raises:
-        WorkLimitError: it takes too long.
+        WorkLimitError: the search exceeds `patience`.
     """
     number = {fact: i for i, fact in enumerate(dict.fromkeys([*problem.init, *problem.goal, *_mentioned(problem)]))}
     actions = []
@@ -301,7 +301,7 @@ def _bits(numbers: Iterable[int]) -> int:
 
 
 def _reached(actions: list[_NumberedAction], init: list[int], size: int, patience: WorkLimit) -> list[int]:
-    """For each fact the facts that can hold together with it, as bits; itself included if it can hold at all."""
+    """Return, for each fact, the facts that can hold together with it, as bits; a reachable fact includes itself."""
     possible = _bits(init)
     together = [possible if possible >> i & 1 else 0 for i in range(size)]
     before: list[int] = []

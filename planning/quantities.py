@@ -1,4 +1,4 @@
-"""Ground numeric expressions (PDDL 2.1, level 2): the residual of a term after partial evaluation."""
+"""Ground numeric expressions (PDDL 2.1, level 2): residuals of terms after partial evaluation."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from knowledge_base.language.evaluation.world import World
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """`+ - * /` on quantities; `-` with one argument negates."""
+    """An arithmetic operation `+ - * /` on quantities; `-` with one argument is the negative value."""
 
     operator: str
     args: tuple[Quantity, ...]
 
 
 Quantity = float | Fact | Operation
-"""A number, the value of a ground numeric fluent (written as a `Fact`), or an operation on these."""
+"""A number, a ground numeric fluent (written as a `Fact`), or an operation on quantities."""
 
 Numbers = Mapping[Fact, float]
 
@@ -39,7 +39,7 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,
 }
 OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
-"""The comparison that holds exactly if the other one does not."""
+"""The complement of each comparison operator."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class NumericBound:
     right: Quantity
 
     def holds(self, numbers: Numbers) -> bool:
-        """Return whether it is true; a comparison with a division by zero is false.
+        """Return whether the comparison is true; a comparison with a division by zero is false.
 
-        A fluent without an entry in `numbers` is 0.
+        The value of a fluent without an entry in `numbers` is 0.
         """
         try:
             return _COMPARE[self.operator](value(self.left, numbers), value(self.right, numbers))
@@ -61,25 +61,25 @@ class NumericBound:
             return False
 
     def fluents(self) -> Iterator[Fact]:
-        """Yield the numeric fluents in it."""
+        """Yield the numeric fluents of the comparison."""
         yield from fluents(self.left)
         yield from fluents(self.right)
 
     def __str__(self) -> str:
-        """PDDL: `(> (fuel truck1) 3)`."""
+        """Return the comparison in PDDL, e.g. `(> (fuel truck1) 3)`."""
         return f"({self.operator} {text(self.left)} {text(self.right)})"
 
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """A ground numeric effect: sets the fluent to `amount`, or with `increase` adds `amount` to it."""
+    """A ground numeric effect, which sets `fluent` to `amount`, or with `increase` adds `amount` to `fluent`."""
 
     fluent: Fact
     amount: Quantity
     increase: bool
 
     def result(self, numbers: Numbers) -> float:
-        """Return the fluent's value afterwards.
+        """Return the value of the fluent after the effect.
 
         Raises:
             ArithmeticError: the value cannot be computed.
@@ -89,10 +89,7 @@ class Assignment:
 
 
 def helps(change: Assignment, bound: NumericBound) -> bool:
-    """Return whether a change may make a false bound true; `False` is certain.
-
-    An action that only consumes fuel, for example, cannot make `(>= (fuel) 3)` true.
-    """
+    """Return whether a change may make a false bound true; the result `False` is certain, `True` is not."""
     if not change.increase or isinstance(change.amount, Fact | Operation) or bound.operator == "=":
         return True
     slopes = linear(Operation("-", (bound.left, bound.right)))
@@ -143,7 +140,7 @@ def fluents(quantity: Quantity) -> Iterator[Fact]:
 
 
 def linear(quantity: Quantity) -> dict[Fact, float] | None:
-    """Return the coefficients of a linear sum of fluents, without constants; `None` if it is not linear."""
+    """Return the coefficients of a linear sum of fluents, without constants; `None` if the quantity is not linear."""
     match quantity:
         case Fact():
             return {quantity: 1.0}
@@ -185,7 +182,7 @@ def _scaled(part: dict[Fact, float] | None, factor: float) -> dict[Fact, float] 
 
 
 def text(quantity: Quantity) -> str:
-    """Return the quantity in PDDL: `(+ (fuel truck1) 3)`."""
+    """Return the quantity in PDDL, e.g. `(+ (fuel truck1) 3)`."""
     match quantity:
         case Fact():
             return str(quantity)
@@ -196,7 +193,7 @@ def text(quantity: Quantity) -> str:
 
 
 def to_json(quantity: Quantity) -> Any:
-    """Return JSON data: a number, `{"fluent": [NAME, ARG, ...]}` or `[OPERATOR, ARG, ...]`."""
+    """Return the quantity as JSON data: a number, `{"fluent": [NAME, ARG, ...]}` or `[OPERATOR, ARG, ...]`."""
     match quantity:
         case Fact(name, args):
             return {"fluent": [name, *args]}
@@ -207,7 +204,7 @@ def to_json(quantity: Quantity) -> Any:
 
 
 def from_json(data: Any) -> Quantity:
-    """Return the quantity of a form by `to_json`."""
+    """Return the quantity that `to_json` wrote as `data`."""
     match data:
         case {"fluent": [str() as name, *args]}:
             return Fact(name, tuple(args))

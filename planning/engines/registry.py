@@ -181,7 +181,7 @@ def described(one: Engine) -> str:
 def chosen(problem: Problem, *, usable: Callable[[Engine], bool] = installed) -> list[Engine]:
     """Return at most `AT_ONCE` engines for a race; empty if no usable engine supports the problem.
 
-    The result is also empty for a temporal problem that is too large for every engine: the problem with one action at
+    The result is also empty for a temporal problem that is too large for every engine. The problem with one action at
     a time is then solved faster.
     """
     racing = [one for one in able(problem.features) if one.races and usable(one)]

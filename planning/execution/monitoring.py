@@ -1,4 +1,4 @@
-"""Monitoring answers broken causal links, superfluous steps and better plans while a plan runs."""
+"""Monitoring of a running plan: handles broken causal links, superfluous steps and better plans."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 
 
 class Monitoring:
-    """The monitoring of one plan.
+    """The monitoring of one plan, as long as the skill `monitor` runs.
 
     Args:
         run: the plan.
-        escalation: replaces it; the other parts of the planning component are its parts.
-        clock: of the program's run.
-        is_own: whether the running step made a change, from the change's author.
-        cancelled: receives the tasks that were cancelled and have not ended.
+        escalation: replaces the plan; its attributes are also used here.
+        clock: the clock of the run.
+        is_own: returns whether a change by this author is an effect of the running step.
+        cancelled: receives the tasks that are cancelled and have not ended.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Monitoring:
         self._tasks: list[asyncio.Task[None]] = []
 
     async def outcome(self) -> Outcome:
-        """Monitor the plan until its end; return the outcome of the skill `monitor`."""
+        """Monitor the plan until its end, and return the outcome of the skill `monitor`."""
         try:
             self._begin()
             while True:
@@ -89,7 +89,7 @@ class Monitoring:
             self._tasks.append(asyncio.create_task(self._improve(run.improvements)))
 
     def _resume(self) -> None:
-        """Continue after a restart. The running step may be half done; its end is validated."""
+        """Continue after a restart; the running step may be half done, and its effects are validated at its end."""
         run = self._run
         self._install().update()
         if run.searching_since is not None:
@@ -98,7 +98,7 @@ class Monitoring:
             self._begun(run.missed.pop(0))
 
     async def _next_news(self) -> Heard:
-        """Wait for the next news."""
+        """Wait for the next news and return it."""
         while not self._run.news:
             self._new.clear()
             await self._new.wait()
@@ -112,14 +112,14 @@ class Monitoring:
         self._run.on_begin = None
         self._unsubscribe()
         for task in self._tasks:
-            if task.cancel():  # else it is over
+            if task.cancel():  # `False` if the task has ended
                 self._cancelled.add(task)
                 task.add_done_callback(self._cancelled.discard)
         if self._monitor is not None:
             self._monitor.close()
 
     def _answer(self, news: Heard) -> Outcome | None:
-        """Return the outcome with which monitoring ends; `None` if it continues."""
+        """Handle the news; return the outcome with which monitoring ends, or `None` if monitoring continues."""
         run = self._run
         outcome: Outcome | None = None
         if isinstance(news, Found | NotFound):
@@ -147,7 +147,7 @@ class Monitoring:
         return outcome
 
     def _changed(self, change: Change) -> None:
-        """Look at the plan again if recursive predicates now expand to other conditions."""
+        """Validate the plan again if recursive predicates now expand to other conditions."""
         settled = self._derivation.at(self._knowledge)
         if settled != self._settled:
             self._settled = settled
@@ -181,7 +181,7 @@ class Monitoring:
             self._monitor.look("the steps before")
 
     def _may_continue(self, news: Broken) -> bool:
-        """Whether the running step may continue during a search: only a later step needs the broken condition."""
+        """Return whether the running step may continue during a search, since only a later step needs the condition."""
         run, running = self._run, self._run.progress.running
         later = len(running) == 1 and bool(news.needed) and news.user > running[0]
         return later and run.attempt.replans < run.replans and run.successor is None
@@ -208,7 +208,7 @@ class Monitoring:
                     self._put(Better(answer))
 
     def _better(self, plan: Plan) -> tuple[PlanStep, ...] | None:
-        """The running step and the end of a better plan, if that end costs less than the steps that have not begun."""
+        """Return the running step and the end of a better plan; `None` if that costs no less than the present steps."""
         run, progress = self._run, self._run.progress
         if run.successor is not None or run.state is PlanState.BROKEN or len(progress.running) != 1:
             return None
@@ -221,17 +221,17 @@ class Monitoring:
         return (step, *end)
 
     def _shorten(self, steps: tuple[PlanStep, ...]) -> Outcome | None:
-        """Skip steps, after the running step if that is not one of them."""
+        """Omit steps; the running step continues if it is the first step of the shorter plan."""
         run, why = self._run, "fewer steps lead to the goal"
         skipped = [step for step in run.progress.remaining_steps if step not in steps]
         self._records.skipped(run.name, skipped, why)
         if not run.follow(run.shortened(steps)):
             return self._replaced(why)
-        self._install().update()  # the monitor has just looked at these steps, as if the running one were done
+        self._install().update()  # the monitor has just validated these steps
         return None
 
     def _follow(self, answer: PlanFound, successor: Successor) -> Outcome | None:
-        """Replace the plan by a new one, after the running step if the new one begins with that too."""
+        """Replace the plan by a new plan; the running step continues if the new plan begins with an equal step."""
         run, name = self._run, self._escalation.runs.new_name()
         self._records.found(answer, name)
         if not run.follow(replace(successor, name=name)):
@@ -240,7 +240,7 @@ class Monitoring:
         return None
 
     def _replaced(self, why: str) -> Outcome:
-        """Return the outcome with the plot of the successor; `plan_invalid` if that no longer leads to the goal."""
+        """Return the outcome with the successor's plot; `plan_invalid` if the successor no longer leads to the goal."""
         return self._escalation.succeeded(self._run, why) or _invalid("", why, "earlier")
 
 

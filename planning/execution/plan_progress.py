@@ -1,6 +1,6 @@
-"""PlanProgress holds the done, running and remaining steps of a plan, and tests whether they lead to the goal.
+"""Progress of a plan: done, running and remaining steps, and whether the remaining steps lead to the goal.
 
-A local repair keeps the end of a broken plan, and plans only the way to that end, if it is short.
+A local repair keeps the end of a broken plan, and plans only a short sequence of steps before that end.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from planning.strips import Problem
 from planning.validation import validate
 
 _MOST_RUNNING = 3
-"""The number of running steps up to which each subset of them is tried as done; of more, only none and all."""
+"""The largest number of running steps for which each subset is tried as done; beyond it, only none and all."""
 MOST_LONGER = 2
-"""The number of steps by which a repaired plan may be longer than the remaining one."""
+"""The number of steps by which a repaired plan may be longer than the remaining plan."""
 _MOST_UNMET = 3
-"""The number of unmet conditions up to which an end of a plan is tried."""
+"""The largest number of unmet conditions with which a repair keeps an end of a plan."""
 _MOST_LEFT_OUT = 2
-"""The number of first steps that a repair may replace."""
+"""The largest number of first steps that a repair may replace."""
 
 
 def is_true(e: Expression, world: World) -> bool:
-    """Whether the condition holds; one about a missing object does not."""
+    """Return whether the condition is true; a condition about a missing object is false."""
     try:
         return holds(e, world)
     except InputError:
@@ -47,8 +47,8 @@ def is_true(e: Expression, world: World) -> bool:
 
 
 def leads_to(steps: Iterable[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> bool:
-    """Whether the steps, taken in this order from `world`, reach the goal; `world` stays unchanged."""
-    ahead: Overlay | None = None  # lazily: of a plan's ends, most fail at their first step
+    """Return whether the steps, executed in this order from `world`, reach the goal; `world` stays unchanged."""
+    ahead: Overlay | None = None  # made on demand, since most ends of a plan fail at their first step
     try:
         for step in steps:
             if not domain.applicable(step, ahead or world):
@@ -63,15 +63,16 @@ def leads_to(steps: Iterable[PlanStep], domain: PlanningDomain, world: World, go
 def shortest_end(
     steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression
 ) -> tuple[PlanStep, ...] | None:
-    """The fewest last steps that lead to the goal from `world`; `None` if not even all of them do."""
+    """Return the fewest last steps that lead from `world` to the goal; `None` if not even all steps do."""
     ends = (tuple(steps[first:]) for first in range(len(steps), -1, -1))
     return next((end for end in ends if leads_to(end, domain, world, goal)), None)
 
 
 def thinned(steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> tuple[PlanStep, ...]:
-    """Return a plan without useless steps: each is omitted, with the steps that need it, if the goal is still reached.
+    """Return the plan without useless steps, by action elimination (Nakhost & Müller 2010).
 
-    Action elimination (Nakhost & Müller 2010); the result is a plan whenever `steps` are one.
+    A step is removed, together with the steps that need it, if the other steps still reach the goal. If `steps` lead to
+    the goal, the result does too.
     """
     kept, number = tuple(steps), 0
     while number < len(kept):
@@ -86,7 +87,7 @@ def thinned(steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goa
 def _possible(
     first: Iterable[PlanStep], then: Iterable[PlanStep], domain: PlanningDomain, world: World
 ) -> Iterator[PlanStep]:
-    """The steps of `then` that are applicable after `first`, one after the other."""
+    """Yield the steps of `then` that are applicable one after the other, after all steps of `first`."""
     ahead = Overlay(world)
     for step in first:
         ahead.apply(domain.effects(step, ahead))
@@ -97,7 +98,7 @@ def _possible(
 
 
 def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> float:
-    """Return the `(total-cost)` of the steps, in this order from `world`; their number if it is not declared."""
+    """Return the `(total-cost)` of the steps, executed from `world`; their number if it is not declared."""
     if TOTAL_COST.function not in domain.schema.functions:
         return len(steps)
     ahead = Overlay(world)
@@ -108,20 +109,21 @@ def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> 
 
 
 class PlanProgress:
-    """The done, running and remaining steps of a plan, by their number from 1.
+    """The done, running and remaining steps of a plan, by their numbers from 1.
 
-    A step is done, or omitted by a rule, when a step that must follow it has begun: no plot begins a step too early.
+    A plot never begins a step too early. A step therefore counts as done, or omitted by a rule, when a step that must
+    follow it has begun.
 
     Args:
-        steps: the plan's steps.
-        domain: has their conditions and effects, without derived predicates.
-        goal: of the plan, in the same way.
-        before: pairs of steps of which the first must be done when the second begins; each pair of the
-            sequence by default.
+        steps: the steps of the plan.
+        domain: the planning domain, with derived predicates expanded.
+        goal: the goal of the plan, with derived predicates expanded.
+        before: pairs of steps; the first step of a pair must be done when the second begins. By default the steps are
+            a sequence.
 
     Attributes:
-        running: the steps that have begun, without those that are certainly done.
-        remaining: the steps that are not done, with the running ones, in an executable order.
+        running: the steps that have begun, except those that are certainly done.
+        remaining: the steps that are not done, including the running ones, in an executable order.
         early: whether another author has caused an effect of a later step, so that steps may be useless.
     """
 
@@ -144,14 +146,14 @@ class PlanProgress:
         self.early = False
 
     def to_json(self) -> dict[str, Any]:
-        """The steps, their order, and the numbers of those that have begun; the done ones follow."""
+        """Return steps, order and the numbers of the begun steps as plain data; the done steps follow from these."""
         before = None if self._before is None else sorted(map(list, self._before))
         steps = [step.to_json() for step in self.steps]
         return {"steps": steps, "before": before, "begun": sorted(self._begun), "early": self.early}
 
     @classmethod
     def from_json(cls, form: Mapping[str, Any], domain: PlanningDomain, goal: Expression) -> PlanProgress:
-        """The inverse of `to_json`, with conditions written for the present state of the world."""
+        """Return the progress that `to_json` wrote as `form`, with conditions expanded for the present world."""
         before = None if form["before"] is None else {(first, second) for first, second in form["before"]}
         progress = cls([PlanStep.from_json(step) for step in form["steps"]], domain, goal, before)
         for number in form["begun"]:
@@ -160,18 +162,18 @@ class PlanProgress:
         return progress
 
     def renewed(self, domain: PlanningDomain, goal: Expression) -> PlanProgress:
-        """The same progress, with conditions written for another state of the world."""
+        """Return an equal progress with conditions expanded for another state of the world."""
         progress = PlanProgress(self.steps, domain, goal, self._before)
         for number in self._begun:
             progress.begin(number)
         return progress
 
     def take_order(self, before: AbstractSet[tuple[int, int]]) -> None:
-        """Replace the order, before the first step begins."""
+        """Replace the order of the steps; valid only before the first step begins."""
         self._before = before
 
     def begin(self, number: int) -> None:
-        """Begin a step."""
+        """Record that a step begins; the steps that must end before it are then done."""
         self._begun.add(number)
         agenda = [number]
         while agenda:
@@ -189,43 +191,43 @@ class PlanProgress:
 
     @property
     def remaining_steps(self) -> tuple[PlanStep, ...]:
-        """The steps with the numbers of `remaining`."""
+        """The plan steps with the numbers in `remaining`."""
         return self.steps_of(self.remaining)
 
     def needed(self) -> Mapping[Expression, int] | None:
-        """The conditions that must hold now, with the first user of each; `None` if regression cannot write them.
+        """Return the conditions that must hold now, with the first user of each; `None` if regression is not possible.
 
-        The effects of a running step may hold already, so that later steps need them too.
+        The effects of a running step may already hold. The conditions therefore include the needs of later steps.
         """
         return self._needs.before(self.remaining)
 
     def needed_by(self, numbers: tuple[int, ...]) -> Mapping[Expression, int] | None:
-        """As `needed`, if only the steps with these numbers remained, in this order."""
+        """Return the same as `needed` if only the steps with these numbers remained, in this order."""
         return self._needs.before(numbers)
 
     def steps_of(self, numbers: Iterable[int]) -> tuple[PlanStep, ...]:
-        """The steps with these numbers."""
+        """Return the plan steps with these numbers."""
         return tuple([self.steps[number - 1] for number in numbers])
 
     def needed_later(self) -> Mapping[Expression, int] | None:
-        """As `needed`, if all running steps were done."""
+        """Return the same as `needed` if all running steps were done."""
         return self._needs.before(self._after(self.running))
 
     def stands(self, world: World) -> bool:
-        """Whether the goal is reached from `world`; each running step counts as not begun or as done."""
+        """Return whether the plan reaches the goal from `world`, with any subset of the running steps done."""
         return any(leads_to(steps, self.domain, world, self.goal) for steps in self._ways_on())
 
     def shortest_end(self, world: World) -> tuple[PlanStep, ...] | None:
-        """The fewest last steps that lead to the goal from `world`, with any of the running steps."""
+        """Return the fewest last steps that lead to the goal from `world`, for any subset of the running steps done."""
         ends = (shortest_end(steps, self.domain, world, self.goal) for steps in self._ways_on())
         return min((end for end in ends if end is not None), key=len, default=None)
 
     def coming(self) -> tuple[PlanStep, ...]:
-        """The steps that have not begun."""
+        """Return the steps that have not begun."""
         return self.steps_of(self._after(self.running))
 
     def _ways_on(self) -> Iterator[tuple[PlanStep, ...]]:
-        """The step sequences that may remain, for each choice of running steps that are done."""
+        """Return the step sequences that may remain, one for each choice of running steps that are done."""
         running = self.running
         sizes = range(len(running) + 1) if len(running) <= _MOST_RUNNING else (0, len(running))
         finished = itertools.chain.from_iterable(itertools.combinations(running, size) for size in sizes)
@@ -238,7 +240,7 @@ class PlanProgress:
 
 @dataclass(frozen=True, slots=True)
 class LocalRepair:
-    """The end of a plan to be kept, and the problem of making it possible again."""
+    """The end of a plan to keep, and the problem of making this end applicable again."""
 
     end: tuple[PlanStep, ...]
     problem: Problem
@@ -246,7 +248,7 @@ class LocalRepair:
     def repaired(
         self, first: Plan, before: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression
     ) -> Plan | None:
-        """The plan that begins with the solution `first`, if it leads to the goal and is not much longer."""
+        """Return the plan of the solution `first` and the kept end; `None` if it is invalid or too long."""
         plan = Plan((*first.steps, *self.end))
         short = len(plan.steps) <= len(before) + MOST_LONGER
         return plan if short and validate(plan, domain, world, goal).valid else None
@@ -260,24 +262,24 @@ def local_repair(
     goal: Expression,
     patience: WorkLimit | None = None,
 ) -> LocalRepair | None:
-    """Return the repair of a plan that promises the least work; `None` if all need too much.
+    """Return the repair of a plan with the fewest steps to keep and conditions to restore; `None` without a repair.
 
-    Of the ends of the plan the one that is nearest to being possible is kept; the problem is to reach what it needs.
+    The problem of the repair is to restore the conditions that the kept end of the plan needs.
 
     Args:
         before: the plan, with its done, running and remaining steps.
         excluded: steps that the repair must omit.
-        domain: has the steps' conditions and effects.
-        world: the present.
+        domain: the planning domain.
+        world: the present world.
         goal: the goal of the plan.
-        patience: for how long.
+        patience: the limit of the work.
 
     Raises:
-        WorkLimitError: it takes too long.
+        WorkLimitError: the limit has passed.
     """
     derived = derivation(domain)
-    closed, left = derived.world(world), before.remaining  # once: the plan may continue meanwhile
-    if derived.recursive:  # its conditions belong to another state of the world
+    closed, left = derived.world(world), before.remaining  # read once, since the plan may continue meanwhile
+    if derived.recursive:  # the conditions in `before` belong to another state of the world
         before = before.renewed(derived.domain, derived.expand(goal))
     ends = (left[first:] for first in range(min(_MOST_LEFT_OUT + 1, len(left))))
     needs = [(before.steps_of(end), before.needed_by(end)) for end in ends]
@@ -295,15 +297,15 @@ def local_repair(
         return None
     try:
         problem = build_problem(domain, world, And(tuple(needed)), patience=patience)
-    except InputError:  # no problem has these conditions as its goal
+    except InputError:  # a problem cannot have these conditions as its goal
         return None
     return None if problem.unreachable else LocalRepair(end, problem)
 
 
 def _unmet(needed: Iterable[Expression], world: World, known: dict[int, bool]) -> list[Expression]:
-    """Return the conditions that do not hold, at most one more than `_MOST_UNMET`.
+    """Return the conditions that are false in `world`, at most one more than `_MOST_UNMET`.
 
-    `known` keeps truth values by identity: the ends of a plan share most of their conditions.
+    `known` caches truth values by identity, since the ends of a plan share most of their conditions.
     """
     unmet: list[Expression] = []
     for one in needed:
@@ -320,5 +322,5 @@ def _true(condition: Expression, world: World) -> bool:
     if isinstance(condition, Atom) and condition.predicate in world.schema.predicates:
         args = [term.value for term in condition.args if isinstance(term, Constant)]
         if len(args) == len(condition.args) and condition.predicate not in world.schema.computed:
-            return world.holds(condition.predicate, tuple(args))  # most are such, and a compiled test does not pay
+            return world.holds(condition.predicate, tuple(args))  # the most frequent case
     return is_true(condition, world)

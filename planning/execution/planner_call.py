@@ -1,4 +1,4 @@
-"""Planner calls: every call of a planner ends within a bound of real time, however the planner behaves."""
+"""Planner calls that end within a bound of real time, even if the planner ignores its limit and its cancellation."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 
 STOPPING = 10.0
-"""Seconds in which a cancelled planner must stop; the processes of an engine end within one."""
+"""The seconds in which a cancelled planner must stop; the processes of an engine stop within one second."""
 
 _Result = TypeVar("_Result")
 
 
 class LateError(Exception):
-    """A planner did not answer in time.
+    """Error: a planner has returned no result in time.
 
     Attributes:
-        obeyed: whether the work stopped when it was cancelled.
+        obeyed: whether the planner stopped when it was cancelled.
     """
 
     def __init__(self, *, obeyed: bool) -> None:
@@ -40,15 +40,15 @@ class LateError(Exception):
 
 
 async def bounded(work: Awaitable[_Result], seconds: float, name: str) -> _Result:
-    """Return the result of the work within a bound of real time; cancel the work at that bound or with the caller.
+    """Return the result of `work` within a bound of real time; cancel `work` at the bound or with the caller.
 
     Args:
-        work: of a planner.
-        seconds: the bound.
-        name: of the planner, for complaints.
+        work: the call of a planner.
+        seconds: the bound of real time.
+        name: the name of the planner, for reports of faults.
 
     Raises:
-        LateError: the work has no result.
+        LateError: the work has no result at the bound.
     """
     task = asyncio.ensure_future(_contained(work))
     try:
@@ -81,11 +81,11 @@ async def _ends(task: asyncio.Future[Any], seconds: float) -> bool:
 
 
 async def _stopped(task: asyncio.Future[Any], name: str) -> bool:
-    """Cancel the work; return whether it stopped."""
+    """Cancel the work; return whether it stopped within `STOPPING` seconds."""
     task.cancel()
     try:
         ended = await _ends(task, STOPPING)
-    except asyncio.CancelledError:  # the program ends, and would wait for it
+    except asyncio.CancelledError:  # the program ends, and would otherwise wait for the task
         if not task.done():
             _throw_away(task, name)
         raise
@@ -95,7 +95,7 @@ async def _stopped(task: asyncio.Future[Any], name: str) -> bool:
 
 
 def _throw_away(task: asyncio.Future[Any], name: str) -> None:
-    """Abandon work that ignores its cancellation."""
+    """Report and abandon work that ignores its cancellation."""
     blame(name, "it ignores its cancellation")
     task.add_done_callback(lambda task: task.cancelled() or task.exception())  # marks its exception as retrieved
     if isinstance(task, asyncio.Task):
@@ -105,16 +105,16 @@ def _throw_away(task: asyncio.Future[Any], name: str) -> None:
 
 
 def blame(name: str, what: str) -> None:
-    """Report a fault of a planner that changes no answer to the exception handler of the loop."""
+    """Report a planner's fault that affects no outcome to the exception handler of the event loop."""
     asyncio.get_running_loop().call_exception_handler({"message": f"planner {name}: {what}"})
 
 
 class Improvements:
-    """Better plans after the first one: an asynchronous iterator that the caller closes.
+    """Better plans after the first plan: an asynchronous iterator, which the caller must close.
 
     Args:
-        better: plans of the planner (`Improving.plans`).
-        name: of the planner, for complaints.
+        better: the plans of the planner (`Improving.plans`).
+        name: the name of the planner, for reports of faults.
     """
 
     def __init__(self, better: AsyncGenerator[PlanningOutcome, None], name: str) -> None:
@@ -131,24 +131,24 @@ class Improvements:
         """Stop the planner."""
         try:
             await bounded(self._better.aclose(), STOPPING, self._name)
-        except LateError:  # reported already if it did not obey
+        except LateError:  # `bounded` has already reported a planner that ignores its cancellation
             return
         except Exception as error:  # noqa: BLE001  no fault of a planner may end the run
             blame(self._name, f"it cannot be closed: {described(error)}")
 
 
 PATIENCE = 90.0
-"""Seconds of real time that a planner may exceed its own bound; an engine may need a minute to start."""
+"""The seconds of real time by which a planner may exceed its limit; the start of an engine may take a minute."""
 
 Answer = tuple[PlanningOutcome, Improvements | None]
-"""The answer of a planner, and its better plans, which the caller closes."""
+"""The outcome of a planner, and its better plans, which the caller must close; `None` if there are none."""
 
 
 class PlannerCalls:
-    """Calls of one planner, bounded in real time and in the time of the run.
+    """Calls of one planner, with limits in real time and in the time of the run.
 
     Attributes:
-        name: of the planner's class, for complaints.
+        name: the name of the planner's class, for reports of faults.
     """
 
     def __init__(self, planner: Planner, clock: LoopClock) -> None:
@@ -157,14 +157,14 @@ class PlannerCalls:
         self.name = type(planner).__name__
 
     def give_up_at(self, seconds: float) -> asyncio.Timeout:
-        """Bound all calls of a block in simulated time.
+        """Return a timeout in simulated time for all calls of a block.
 
-        A search holds that time; a planner that is itself simulated may let it pass up to this bound.
+        A search stops simulated time. A planner that is itself simulated may let time pass up to this timeout.
         """
         return self._clock.timeout_at(self._clock.now() + seconds + PATIENCE if self._clock.simulated else math.inf)
 
     async def solve(self, problem: Problem, seconds: float, *, going_on: bool = True) -> Answer:
-        """Return the planner's answer, and its better plans in real time; simulated runs must be repeatable."""
+        """Return the outcome of the planner, in real time with its better plans, which are not repeatable."""
         if going_on and not self._clock.simulated and isinstance(self._planner, Improving):
             plans = self._planner.plans(problem, seconds)
             better = Improvements(plans, self.name)
@@ -176,7 +176,7 @@ class PlannerCalls:
         return await self._bounded(self._planner.solve(problem, seconds), seconds), None
 
     async def _bounded(self, answering: Awaitable[object], seconds: float) -> PlanningOutcome:
-        """Return the answer, or the failure to answer, within a bound of real time."""
+        """Return the outcome of a call within a bound of real time; a fault of the planner is an `EngineFailed`."""
         engine = self.name
         try:
             with self._clock.hold():

@@ -1,8 +1,8 @@
-"""Regression computes what must hold before a step so that a condition holds after it (Waldinger 1977, Reiter 1991).
+"""Regression: the condition that must hold before a step so that another holds after it (Waldinger 1977, Reiter 1991).
 
-Regression rewrites conditions with their quantifiers, without grounding: `(forall (?l - lamp) (on ?l))` before
-`(switch-on a)` is `(forall (?l - lamp) (or (on ?l) (= ?l a)))`. A lamp that is unknown yet can break it.
-The conditions before a whole plan are its causal links from the present.
+Regression rewrites conditions with their quantifiers, without grounding. For example, `(forall (?l - lamp) (on ?l))`
+before `(switch-on a)` becomes `(forall (?l - lamp) (or (on ?l) (= ?l a)))`. A new lamp can falsify this condition.
+The conditions before a whole plan are the causal links from the present world.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ _CHANGING = {"increase": "+", "decrease": "-", "scale-up": "*", "scale-down": "/
 
 
 class UnregressableError(Exception):
-    """An effect changes a number for many objects by different amounts, which no condition before can express."""
+    """Error: an effect changes a number by different amounts for many objects, so regression is not possible."""
 
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """One change that an effect makes: for all `variables`, where `condition` held before."""
+    """One change by an effect, for all values of `variables` for which `condition` held before the effect."""
 
     variables: tuple[TypedVariable, ...]
     condition: Expression
@@ -57,7 +57,7 @@ class Leaf:
 
 
 def leaves(effect: Effect) -> tuple[Leaf, ...]:
-    """The changes that an effect consists of; its parameters must have been filled in."""
+    """Return the changes of an effect; the parameters must have been substituted."""
     return tuple(_leaves(effect, (), TRUE))
 
 
@@ -65,7 +65,7 @@ def regressed(e: Expression, changes: Sequence[Leaf]) -> Expression:
     """Return the condition that must hold before these changes so that `e` holds after them.
 
     Raises:
-        UnregressableError: the changes have no such condition.
+        UnregressableError: there is no such condition for these changes.
     """
     match e:
         case Atom():
@@ -86,19 +86,19 @@ def regressed(e: Expression, changes: Sequence[Leaf]) -> Expression:
 
 
 def conjunction(parts: Iterable[Expression]) -> Expression:
-    """All of them, simplified."""
+    """Return the simplified conjunction of the conditions."""
     kept = dict.fromkeys(inner for part in parts for inner in conjuncts(part))
     return FALSE if FALSE in kept else _alone(And(tuple(kept)))
 
 
 def disjunction(parts: Iterable[Expression]) -> Expression:
-    """At least one of them, simplified."""
+    """Return the simplified disjunction of the conditions."""
     kept = dict.fromkeys(inner for part in parts for inner in (part.parts if isinstance(part, Or) else (part,)))
     return TRUE if TRUE in kept else _alone(Or(tuple(kept)))
 
 
 def negation(e: Expression) -> Expression:
-    """The opposite, simplified."""
+    """Return the simplified negation of the condition."""
     if isinstance(e, Not):
         return e.body
     return FALSE if e == TRUE else TRUE if e == FALSE else Not(e)
@@ -122,7 +122,7 @@ def _leaves(effect: Effect, variables: tuple[TypedVariable, ...], condition: Exp
 
 
 def _atom(atom: Atom, changes: Sequence[Leaf]) -> Expression:
-    """It was added, or held and was not deleted (an addition wins over a deletion, as everywhere)."""
+    """Return the condition that the atom was added, or was true and not deleted; an addition precedes a deletion."""
     added: list[Expression] = []
     deleted: list[Expression] = []
     for leaf in changes:
@@ -136,7 +136,7 @@ def _atom(atom: Atom, changes: Sequence[Leaf]) -> Expression:
 
 def _comparison(e: Comparison, changes: Sequence[Leaf]) -> Expression:
     if isinstance(e.left, Constant | Variable) and isinstance(e.right, Constant | Variable):
-        return _decided(e.operator, e.left, e.right) or e  # as that does below, only sooner
+        return _decided(e.operator, e.left, e.right) or e  # a shortcut with the same result as the general case
     return disjunction(
         conjunction((before_left, before_right, _compared(e.operator, new_left, new_right)))
         for before_left, new_left in _values(e.left, changes)
@@ -145,7 +145,7 @@ def _comparison(e: Comparison, changes: Sequence[Leaf]) -> Expression:
 
 
 def _hit(leaf: Leaf, own: tuple[Term, ...], asked: tuple[Term, ...]) -> Expression:
-    """When the change is about just these arguments."""
+    """Return the condition under which the change concerns exactly these arguments."""
     taken = frozenset[str]().union(*map(free_variables, asked))
     names = {v.name: Variable(fresh(v.name, taken)) for v in leaf.variables if v.name in taken}
     variables = tuple(replace(v, name=names.get(v.name, v).name) for v in leaf.variables)
@@ -159,14 +159,14 @@ def _compared(operator: str, left: Term, right: Term) -> Expression:
 
 
 def _decided(operator: str, left: Term, right: Term) -> Expression | None:
-    """`TRUE` or `FALSE` where that does not depend on the world or on variables."""
+    """Return `TRUE` or `FALSE` if the comparison does not depend on the world or on variables; otherwise `None`."""
     if operator in ("=", "!=") and isinstance(left, Constant) and isinstance(right, Constant):
         return TRUE if (left.value == right.value) is (operator == "=") else FALSE
     return TRUE if operator == "=" and isinstance(left, Variable) and left == right else None
 
 
 def _values(term: Term, changes: Sequence[Leaf]) -> list[tuple[Expression, Term]]:
-    """The value of a term after the changes, as terms before them, by cases that exclude each other."""
+    """Return the value of a term after the changes: mutually exclusive conditions, each with a term before them."""
     match term:
         case Call(function, args):
             cases: list[tuple[Expression, Term]] = [(TRUE, term)]
@@ -203,31 +203,31 @@ def _assigned(
 
 
 class CausalNeeds:
-    """The causal links of a plan's steps from the present, by regression.
+    """The causal links from the present world to the steps of a plan, computed by regression.
 
     Args:
-        steps: the plan's steps, numbered from 1.
-        domain: has their conditions and effects.
-        goal: of the plan; it counts as the user after the last step.
+        steps: the steps of the plan, numbered from 1.
+        domain: the planning domain.
+        goal: the goal of the plan; it counts as the user after the last step.
 
     Raises:
-        InputError: a step names no action of the domain.
+        InputError: the domain lacks the action of a step.
     """
 
     def __init__(self, steps: Sequence[PlanStep], domain: PlanningDomain, goal: Expression) -> None:
         self._steps = [_Regressing.of(domain.ground(step)) for step in steps]
-        self._names: dict[int, frozenset[str]] = {}  # by identity: all conditions live as long as `_found`
+        self._names: dict[int, frozenset[str]] = {}  # by identity; `_found` keeps all conditions alive
         wanted = dict.fromkeys(conjuncts(goal), len(steps) + 1)
         self._found: dict[tuple[int, ...], _Found | None] = {(): _Found(wanted, tuple(filter(_is_open, wanted)))}
 
     def before(self, left: tuple[int, ...]) -> Mapping[Expression, int] | None:
-        """Conditions that hold now exactly if the steps with these numbers, in this order, lead to the goal.
+        """Return the conditions that hold now exactly if the steps with these numbers, in this order, lead to the goal.
 
-        Each with the number of the first step that needs it (the goal's is one more than the last step's).
-        `None` if what is needed cannot be written as a condition, see `UnregressableError`.
+        Each condition has the number of the first step that needs it. The number of the goal is the number of
+        steps plus one. The result is `None` if regression is not possible, see `UnregressableError`.
         """
         known = next(cut for cut in range(len(left) + 1) if left[cut:] in self._found)
-        for cut in range(known - 1, -1, -1):  # not by recursion: a plan may be long
+        for cut in range(known - 1, -1, -1):  # a loop, since recursion would be too deep for a long plan
             self._found[left[cut:]] = self._prepended(left[cut], self._found[left[cut + 1 :]])
         found = self._found[left]
         return None if found is None else MappingProxyType(found.needed)
@@ -248,7 +248,7 @@ class CausalNeeds:
             for condition, user in zip(touched, users, strict=True):
                 for part in conjuncts(regressed(condition, step.changes)):
                     before = len(needed)
-                    needed.setdefault(part, user)  # hashed once: it may be long
+                    needed.setdefault(part, user)  # hashed only once, since a condition may be long
                     if len(needed) > before and _is_open(part):
                         fresh.append(part)
         except UnregressableError:
@@ -260,12 +260,12 @@ class CausalNeeds:
         return _Found(needed, (*kept, *fresh))
 
     def _touched(self, step: _Regressing, after: _Found) -> tuple[list[Expression], list[Expression]]:
-        """Split the needs of later steps: those that the step always causes, and others that it may touch.
+        """Return the later needs that the step always causes, and the later needs that the step may change.
 
-        That is little; the rest is taken over as it is.
+        Both are usually few; all other needs stay unchanged.
         """
         plain, changed_here = step.plain, step.changed
-        if plain is None:  # its changes depend on the world: everything about the same predicates
+        if plain is None:  # its changes depend on the world, so it may change each condition with one of its predicates
             return [], [one for one in after.needed if not changed_here.isdisjoint(self._about(one))]
         touched = [one for one in after.open if not changed_here.isdisjoint(self._about(one))]
         if not after.needed.keys().isdisjoint(plain.deletes):
@@ -274,7 +274,7 @@ class CausalNeeds:
         return [atom for atom in plain.adds if atom in after.needed], touched
 
     def _about(self, condition: Expression) -> frozenset[str]:
-        """The predicates and functions that the condition asks about."""
+        """Return the predicates and functions that the condition reads."""
         found = self._names.get(id(condition))
         if found is None:
             found = self._names[id(condition)] = frozenset(names_of(condition))
@@ -283,7 +283,7 @@ class CausalNeeds:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """The needs before some steps, with the first user of each; and those that are more than ground facts, in order."""
+    """The needs before some steps, with the first user of each, and the needs that are not ground facts, in order."""
 
     needed: Mapping[Expression, int]
     open: tuple[Expression, ...]
@@ -291,14 +291,14 @@ class _Found:
 
 @dataclass(frozen=True, slots=True)
 class _Regressing:
-    """The parts of a step that regression needs.
+    """The parts of a step that regression uses.
 
     Attributes:
-        needed: its own conditions, as an ordered set.
-        open: its conditions that are more than ground facts.
-        changes: its effects.
-        changed: predicates and functions of that.
-        plain: the ground facts among it, if there are no other changes.
+        needed: the conditions of the step, as an ordered set.
+        open: the conditions that are not ground facts.
+        changes: the changes by the step's effect.
+        changed: the predicates and functions that the step changes.
+        plain: the facts that the step adds and deletes in every world; `None` if there are other changes.
     """
 
     needed: Mapping[Expression, None]
@@ -309,7 +309,7 @@ class _Regressing:
 
     @staticmethod
     def of(step: GroundStep) -> _Regressing:
-        """Made once: one plan has most steps of the one before."""
+        """Return the parts of a step; cached, since successive plans share most steps."""
         known = _regressing.find(step, None)
         if known is None:
             needed, changes = dict.fromkeys(conjuncts(step.typed)), leaves(step.effect)
@@ -324,23 +324,23 @@ _regressing: IdentityCache[GroundStep, _Regressing] = IdentityCache(size=1024)
 
 @dataclass(frozen=True, slots=True)
 class _Plain:
-    """The ground facts that a step makes true and false in every world."""
+    """The ground facts that a step adds and deletes in every world."""
 
     adds: tuple[Expression, ...]
     deletes: tuple[Expression, ...]
 
 
 def _plain(changes: Iterable[Leaf]) -> _Plain | None:
-    """The changes that a step makes in every world; `None` if it may make others."""
+    """Return the changes that the step causes in every world; `None` if it may cause others."""
     adds: dict[Expression, None] = {}
     deletes: dict[Expression, None] = {}
     for one in changes:
         if one.variables or one.condition != TRUE or isinstance(one.change, NumericEffect) or _is_open(one.change.atom):
             return None
         (adds if isinstance(one.change, Add) else deletes)[one.change.atom] = None
-    return _Plain(tuple(adds), tuple([atom for atom in deletes if atom not in adds]))  # an addition wins
+    return _Plain(tuple(adds), tuple([atom for atom in deletes if atom not in adds]))  # an addition precedes a deletion
 
 
 def _is_open(e: Expression) -> bool:
-    """Whether it is anything but a ground fact."""
+    """Return whether the condition is not a ground fact."""
     return not isinstance(e, Atom) or not all(isinstance(term, Constant) for term in e.args)

@@ -1,4 +1,4 @@
-"""Escalation answers a failed plan, one `EscalationStep` after another; Plotting makes the plots of plans."""
+"""Escalation, which handles a failed plan by one `EscalationStep` after another, and the plots of plans."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 
 
 class Choices:
-    """The last chosen plot for each planning action and its arguments, so that another candidate can follow a failure.
+    """The last chosen plot for each plan step, so that another candidate can be tried after a failure.
 
     Args:
-        domain: has the planning actions.
-        library: has the plots.
+        domain: the planning domain.
+        library: the plots.
     """
 
     def __init__(self, domain: PlanningDomain, library: Library) -> None:
@@ -47,7 +47,7 @@ class Choices:
         self._chosen: dict[tuple[str, frozenset[tuple[str, Any]]], str] = {}
 
     def note(self, step: Step) -> None:
-        """Note the choices of a macrostep."""
+        """Store the choices of a macrostep."""
         for made in step.decisions:
             decision = made.decision
             plot = None if decision.chosen is None else self._library.plot(decision.chosen)
@@ -55,7 +55,7 @@ class Choices:
                 self._chosen[plot.implements, frozenset(decision.arguments.items())] = plot.name
 
     def of(self, step: PlanStep) -> str | None:
-        """The last plot chosen for a step."""
+        """Return the name of the last plot that was chosen for a step, or `None`."""
         bindings = self._domain.bindings(step)
         for plot in implementing(step, self._library):
             own = frozenset((name, value) for name, value in bindings.items() if name in plot.parameters)
@@ -64,23 +64,23 @@ class Choices:
         return None
 
     def remember(self) -> list[Any]:
-        """Plain data."""
+        """Return the choices as plain data."""
         return [[action, dict(sorted(arguments)), plot] for (action, arguments), plot in self._chosen.items()]
 
     def recall(self, memory: Iterable[Any]) -> None:
-        """The inverse of `remember`."""
+        """Restore the choices that `remember` returned."""
         self._chosen = {(action, frozenset(arguments.items())): plot for action, arguments, plot in memory}
 
 
 @dataclass(frozen=True, slots=True)
 class Plotting:
-    """Makes plots of plans.
+    """Generator of the plots of plans.
 
     Attributes:
-        derivation: of the planning domain.
-        library: plots that implement its actions, and the holders whose rules are inherited.
-        knowledge: the world that a plan is for.
-        parallel: whether independent steps run in parallel.
+        derivation: the derivation of the planning domain.
+        library: the plots that implement planning actions, and the plots whose rules are inherited.
+        knowledge: the knowledge base with the present world.
+        parallel: whether independent steps are executed in parallel.
         shared: names of components that can execute several skills concurrently.
     """
 
@@ -93,13 +93,13 @@ class Plotting:
     def plotted(
         self, run: PlanRun, plan: Plan, known: PartialOrder | None = None, instead_of: str | None = None
     ) -> tuple[PartialOrder, dict[str, Any]]:
-        """Return the order of a plan's steps, which its progress takes over, and its plot as data.
+        """Return the partial order of a plan's steps and the plot of the plan as data; set the order of `run.progress`.
 
         Args:
             run: the plan in execution.
-            plan: its steps, maybe with a schedule.
-            known: the order of the steps, if it is known.
-            instead_of: the candidate that the first step tries last.
+            plan: the steps, possibly with a schedule.
+            known: the partial order of the steps; computed if omitted.
+            instead_of: the candidate that the first step must try last.
         """
         order = self._order(plan, run.goal, known)
         rules = self.library.plot(run.holder).rules if run.holder in self.library else ()
@@ -113,7 +113,7 @@ class Plotting:
             state: Any = form
             for key in next(path for name, _, path in plot.walk() if name == "step_1"):
                 state = state[key]
-            state["dynamic"].sort(key=lambda name: name == instead_of)  # the others stay in their order
+            state["dynamic"].sort(key=lambda name: name == instead_of)  # stable: the other candidates keep their order
         return order, form
 
     def _order(self, plan: Plan, goal: Expression, known: PartialOrder | None) -> PartialOrder:
@@ -125,10 +125,10 @@ class Plotting:
 
 @dataclass(frozen=True, slots=True)
 class Escalation:
-    """Continues a plan without a planner call, requests a new plan, or abandons the goal.
+    """Handler of failed plans: continues the plan without a planner call, requests a new plan, or abandons the goal.
 
     Attributes:
-        plotting, runs, choices, search, records: parts of the planning component.
+        plotting, runs, choices, search, records: objects of the planning component.
     """
 
     plotting: Plotting
@@ -142,7 +142,7 @@ class Escalation:
         return self.plotting.knowledge
 
     def answer(self, run: PlanRun, why: str) -> Outcome:
-        """Answer the failure of a plan.
+        """Handle the failure of a plan.
 
         Returns:
             The outcome of the skill `repair`.
@@ -168,20 +168,20 @@ class Escalation:
         return Outcome("replan")
 
     def succeeded(self, run: PlanRun, why: str) -> Outcome | None:
-        """Return the outcome with the plot of the successor; `None` if that no longer leads to the goal."""
+        """Return the outcome with the successor's plot; `None` if the successor no longer leads to the goal."""
         if self._reached(run):
             return Outcome("goal_holds")
         end = self._end(run)
         return None if end is None else self._continued(run, end, why)
 
     def bound(self, run: PlanRun, order: PartialOrder, form: dict[str, Any]) -> Outcome:
-        """Keep a plan, given the order of its steps and the form of its plot; return the outcome that carries that."""
+        """Add a plan run and record the order of its steps; return the outcome that contains its plot."""
         self.runs.add(run)
         self.records.ordered(run.name, order)
         return Outcome("plan_found", {"plot": form, "name": run.name, "steps": len(run.progress.steps)})
 
     def _reached(self, run: PlanRun) -> bool:
-        """Whether the goal holds, so that the plan is over."""
+        """Return whether the goal holds; delete the plan run if it does."""
         if self.plotting.derivation.recursive:
             run.renew(self.plotting.derivation.at(self._knowledge))
         reached = is_true(run.progress.goal, self._knowledge)
@@ -190,8 +190,8 @@ class Escalation:
         return reached
 
     def _end(self, run: PlanRun) -> tuple[PlanStep, ...] | None:
-        """The fewest last steps of the successor, or of the plan without one, that lead to the goal."""
-        world, progress = self._knowledge.snapshot(), run.progress  # its reads need no lock
+        """Return the fewest last steps of the successor, or of the plan without one, that lead to the goal."""
+        world, progress = self._knowledge.snapshot(), run.progress  # reads of a snapshot need no lock
         if run.successor is None:
             return progress.shortest_end(world)
         return shortest_end(run.successor.steps, progress.domain, world, progress.goal)
@@ -199,7 +199,7 @@ class Escalation:
     def _chosen(
         self, run: PlanRun, failed: PlanStep | None, end: tuple[PlanStep, ...] | None, why: str
     ) -> tuple[EscalationStep, str | None]:
-        """The escalation step, and the plot that was chosen for the failed plan step."""
+        """Return the escalation step, and the plot that was chosen for the failed plan step."""
         attempt, progress = run.attempt, run.progress
         if failed is None:
             return attempt.interrupted(end[0] if end else None), None
@@ -209,7 +209,7 @@ class Escalation:
         return attempt.failed(failure, stands=end is not None, others=others), choice
 
     def _failed_step(self, progress: PlanProgress) -> PlanStep | None:
-        """The running step, unless its expected effects hold."""
+        """Return the running step; `None` if its expected effects hold, or if several steps are running."""
         if len(progress.running) != 1:
             return None
         step, domain = progress.steps[progress.running[0] - 1], self.plotting.derivation.domain
@@ -217,7 +217,7 @@ class Escalation:
         return None if is_true(expected, self._knowledge) else step
 
     def _continued(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None) -> Outcome:
-        """Continue with `steps` without a planner call; their first one prefers other candidates to `instead_of`."""
+        """Continue with `steps` without a planner call; the first step tries the candidate `instead_of` last."""
         name = self._recorded(run, steps, why, instead_of)
         found = None if run.successor is None else run.successor.found
         known = None if found is None else found.known_order(steps, self._knowledge.version)
@@ -226,14 +226,14 @@ class Escalation:
         return self.bound(again, *self.plotting.plotted(again, Plan(steps), known, instead_of))
 
     def _recorded(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None) -> str:
-        """Record why other steps continue a plan; return the name of their plot."""
+        """Record why other steps continue a plan, and return the name of their plot."""
         successor, remaining = run.successor, run.progress.remaining_steps
         if successor is not None and successor.name is not None:
             self.records.replaced(run.name, successor.name, successor.kept)
             return successor.name
         name = self.runs.new_name()
         if successor is not None:
-            return name  # monitoring recorded the shorter plan
+            return name  # monitoring has already recorded the shorter plan
         if len(steps) < len(remaining):
             self.records.skipped(run.name, [step for step in remaining if step not in steps], why)
         else:
@@ -247,7 +247,7 @@ class Escalation:
 
 
 def situation(domain: PlanningDomain, world: View, goal: Expression) -> str:
-    """Return a digest of the part of the world that the problem of reaching the goal depends on."""
+    """Return a digest of the facts, numbers and objects on which the problem of reaching the goal depends."""
     names = _asked.find(goal, domain) or _asked.keep(goal, domain, _asked_about(goal, domain))
     facts = sorted(str(fact) for fact in world.facts() if fact.predicate in names)
     numbers = sorted((str(number), value) for number, value in world.values().items() if number.predicate in names)
