@@ -1,1 +1,1 @@
-"""Dynamic states choose their content among plots; rules and handlers expand into states and transitions."""
+"""Dynamic plots: dynamic states choose their content, and rules and handlers expand into states and transitions."""

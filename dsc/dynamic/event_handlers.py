@@ -1,12 +1,13 @@
 r"""Event handlers as states and transitions (S1.14).
 
-An interrupting handler adds to each state a transition to a state with its actions, and one back. The other handlers
-get separate regions parallel to the whole plot, one for each event:
+An interrupting handler adds to each state a transition to a new state with the handler's actions, and a transition
+back. All other handlers expand into regions parallel to the whole plot, one region for each event:
 
     active { plot: ... ended_reached | low_bat: awaited <-> handled }  --> ended
 
-The orthogonal state activates each handler's `listen` once, at its entry. A second activation would repeat the event
-if the condition still holds. The orthogonal state passes each received event inside under a separate name.
+The orthogonal state executes each handler's `listen` only on its own entry. A second activation would repeat the
+event while its cause persists. The orthogonal state fires each received event again, under a separate name, for the
+states inside.
 """
 
 from __future__ import annotations
@@ -26,20 +27,20 @@ from knowledge_base.language.syntax.expression import Variable
 States = dict[str, AnyState]
 _EVENT = "event."
 BESIDE = "active"
-"""Name of the orthogonal state with the plot and its handlers; a number follows if the name is taken."""
+"""Name of the orthogonal state that contains the plot and its handlers; a number follows if the name is in use."""
 
 
 def with_handlers(
     plot: ActionPlot, written: ActionPlot, plots: Plots, added: FreshNames, entrances: Mapping[str, str]
 ) -> ActionPlot:
-    """Return the plot with the handlers that were `written`.
+    """Return the plot with the handlers of the written plot as states and transitions.
 
     Args:
         plot: the plot with its rules already expanded.
-        written: the plot as people wrote it.
+        written: the plot before any expansion, with its handlers.
         plots: provider of the plots that handlers use.
-        added: gives names to added elements.
-        entrances: states that are entered through another one.
+        added: generator of names for added elements.
+        entrances: for a step with insertions before it, the connector through which the step is entered.
 
     Raises:
         UnknownNameError: a handler uses a missing plot.
@@ -64,7 +65,10 @@ class _Handling:
     def interrupted(
         self, states: Mapping[str, AnyState], handlers: list[Handler], entrances: Mapping[str, str]
     ) -> States:
-        """Return the states of a scope, each with transitions to all handlers and back; interrupt regions as one."""
+        """Return the states of a scope with transitions to all handlers and back.
+
+        A composite state is interrupted at its inner states, and an orthogonal state as a whole.
+        """
         result: States = {}
         for name, state in states.items():
             if isinstance(state, CompositeState):
@@ -86,7 +90,7 @@ class _Handling:
         return {name: state.model_copy(update={"on": on}), **more}
 
     def around(self, plot: ActionPlot, handlers: Iterable[Handler]) -> ActionPlot:
-        """Return the plot as one region, with a region for each handled event; the orthogonal state listens."""
+        """Return a plot with one orthogonal state: a region with `plot`, and a region for each handled event."""
         handlers = list(handlers)
         beside = [handler for handler in handlers if not handler.interrupt]
         reached = {name: self._added.state(f"{name}_reached") for name in _ends(plot)}
@@ -132,7 +136,10 @@ def _ends(plot: ActionPlot) -> dict[str, FinalState]:
 
 
 def _inside(plot: ActionPlot, reached: Mapping[str, str]) -> States:
-    """Return the plot's states as those of a region: its ends become final states of the region, with an event each."""
+    """Return the plot's states for a region.
+
+    In the region, each final state of the plot has the name in `reached` and fires an event of this name.
+    """
     inside: States = {}
     for name, state in plot.states.items():
         if isinstance(state, FinalState):
@@ -145,12 +152,12 @@ def _inside(plot: ActionPlot, reached: Mapping[str, str]) -> States:
 
 
 def _told_its_attributes(end: FinalState) -> FinalState:
-    """Return an end of the plot that takes its attributes from the event of the region's end."""
+    """Return a final state of the plot whose outcome carries the attributes of the region's event."""
     return end.model_copy(update={"arguments": {key: Variable(_EVENT + key) for key in end.arguments}})
 
 
 def _passed_on(heard: str, mentioned: Iterable[str]) -> Transition:
-    """Return a transition that fires the event inside, with the attributes that its handlers read."""
+    """Return a transition that fires the event `heard` with the event attributes in `mentioned`."""
     known = sorted(name.removeprefix(_EVENT) for name in mentioned if name.startswith(_EVENT))
     return Transition(target=None, do=(Emit(emit=heard, arguments={key: Variable(_EVENT + key) for key in known}),))
 

@@ -1,9 +1,10 @@
-r"""Insertions of rules before and after steps, and skipped steps, as connectors and states (S1.4).
+r"""Insertions: rules before and after steps, expanded into connectors and states (S1.4).
 
     -> <clean?> -> look   before: look
          \-> wipe -/
 
-Each rule is evaluated once at every entry of the step, from any source, or after every completion.
+The condition of a `before` rule is evaluated at each entry into the step, from every source. The condition of an
+`after` rule is evaluated at each completion.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from knowledge_base.language.syntax.expression import Term
 
 
 class Insertions:
-    """Builds the insertions of one plot.
+    """Builder of the insertions of one plot.
 
     Attributes:
-        entrances: step -> the connector in front of it, if it has one.
+        entrances: the first connector before a step, by the step's name, for steps with insertions before them.
     """
 
     def __init__(self, plot: ActionPlot, plots: Plots, added: FreshNames, responses: Responses) -> None:
@@ -34,16 +35,16 @@ class Insertions:
         self._added, self._responses = added, responses
         self._steps: dict[str, Step] = {}
         self._before: dict[str, list[tuple[int, Rule]]] = {}
-        self._leading: dict[str, str] = {}  # added state in front of a step -> the step
+        self._leading: dict[str, str] = {}  # by the name of a state added before a step, the step
         self.entrances: dict[str, str] = {}
         self._placed = [(number, rule) for number, rule in enumerate(plot.rules) if rule.on is None]
 
     def through(self, states: Mapping[str, AnyState], written: Iterable[str]) -> States:
-        """Return the states of one scope with all insertions.
+        """Return the states of one scope by name, with all insertions.
 
         Args:
-            states: the written ones, and those added for outcome rules.
-            written: the names of the first.
+            states: the states of the scope: the written states, and the states added for outcome rules.
+            written: names of the written states.
         """
         if not self._placed:
             return dict(states)
@@ -73,7 +74,7 @@ class Insertions:
         return [(n, about_step(one, state, self._plot)) for n, one in found]
 
     def _after(self, name: str, state: Step) -> States:
-        """Return the state with its transitions on `done` redirected through the insertions after it."""
+        """Return a step whose transitions on `done` lead through its `after` rules, and the added states, by name."""
         rules = self._of(name, state, "after")
         if not rules or DONE not in state.on:
             return {name: state}
@@ -85,7 +86,7 @@ class Insertions:
         return {name: state.model_copy(update={"on": {**state.on, DONE: tuple(ways)}}), **more}
 
     def _in_front_of(self, name: str, passed: Mapping[str, Term], states: States) -> str:
-        """Return the first of the connectors in front of a step."""
+        """Add the connectors before a step to `states`; return the name of the first connector."""
         more: States = {}
         last = Transition(target=name, passed=dict(passed))
         first = self._chain(f"{name}_before", name, self._steps[name], self._before[name], ENTER, last, more)
@@ -110,7 +111,7 @@ class Insertions:
         self, way: Transition, mark: str, name: str, state: Step, rules: list[tuple[int, Rule]], by_default: str,
         states: States,
     ) -> Transition:  # fmt: skip
-        """Return a transition that leads through insertions to its former target."""
+        """Return a transition that leads through insertions to its original target; add their states to `states`."""
         kept: dict[str, Term] = {}
         last = Transition(target=way.target, passed=self._responses.remembered(way.passed, mark, kept))
         first = self._chain(mark, name, state, rules, by_default, last, states)
@@ -120,13 +121,13 @@ class Insertions:
         self, mark: str, name: str, state: Step, rules: list[tuple[int, Rule]], by_default: str, last: Transition,
         states: States,
     ) -> Transition:  # fmt: skip
-        """Build the connectors in sequence, with `last` at the end."""
+        """Add a sequence of connectors that ends with `last` to `states`; return a transition to the first one."""
         following = last
         for number, rule in reversed(rules):
             key = f"{mark}_{number}"
             if rule.then != by_default:
                 onward = self._responses.onward(rule, number, name, state)
-            elif rule.do.passed:  # arguments belong to the last transition of the sequence
+            elif rule.do.passed:  # only the transition into the step passes arguments
                 onward = [last.model_copy(update={"passed": {**last.passed, **rule.do.passed}})]
             else:
                 onward = [following]
@@ -150,7 +151,7 @@ class Insertions:
 
 
 def _handing_over(way: Transition, target: str, kept: Mapping[str, Term]) -> dict[str, object]:
-    """Return the new fields of a transition to another target, with its passed arguments kept in variables."""
+    """Return the new fields of a transition to another target; it assigns its passed arguments to variables."""
     if not kept:
         return {"target": target}
     own = (Assign(assign=way.assign),) if way.assign else ()
@@ -159,5 +160,5 @@ def _handing_over(way: Transition, target: str, kept: Mapping[str, Term]) -> dic
 
 
 def _in_order(result: States, states: Mapping[str, AnyState]) -> States:
-    """Order the written states first, then the added ones."""
+    """Return `result` in another order: the states in `states` first, then the added states."""
     return {**{name: result[name] for name in states}, **result}

@@ -1,6 +1,7 @@
-"""Situation of the engine on a knowledge base, and its choice of a dynamic state's content.
+"""Situation of the engine with a knowledge base, and the choice of a dynamic state's content.
 
-The choice is made top-down among the candidates, and bottom-up by their conditions (S0.4).
+The choice is top-down, because the state lists the candidates, and bottom-up, because each candidate declares its
+condition (S0.4).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from knowledge_base.world.overlay import Overlay
 
 
 class KnowledgeSituation:
-    """A `Situation` for one macrostep; it leaves the knowledge base unchanged."""
+    """A `Situation` for one macrostep; it never changes the knowledge base."""
 
     def __init__(self, knowledge: KnowledgeBase, library: Library) -> None:
         self._version = knowledge.version
@@ -35,7 +36,10 @@ class KnowledgeSituation:
 
     @property
     def _world(self) -> Overlay:
-        """The knowledge with the macrostep's changes, created on first use: most steps neither read nor change it."""
+        """The knowledge with the macrostep's changes.
+
+        It is created on first use, because most steps neither read nor change the knowledge.
+        """
         if self._pending is None:
             self._pending = self._knowledge.overlay()
         return self._pending
@@ -60,16 +64,16 @@ class KnowledgeSituation:
 
 
 ACHIEVE = "achieve"
-"""The library's plot for a goal without a fitting candidate: plan, execute, replan."""
+"""Name of the library's plot for a goal without a fitting candidate; this plot plans, executes and replans."""
 
 
 def choose(
     state: DynamicState, holder: str, bindings: Mapping[str, Any], world: World, plots: Plots, version: int
 ) -> Decision:
-    """Return the decision record for entering `state` in the plot named `holder`.
+    """Return the decision on the content of `state`, a dynamic state of the plot named `holder`.
 
-    A goal that holds already needs no content. Otherwise the first candidate whose condition holds is chosen; with a
-    goal and no such candidate, `achieve`.
+    If the state's goal is already true, no plot is chosen. Otherwise the first candidate with a true condition is
+    chosen. If no candidate fits and the state has a goal, the plot `achieve` is chosen.
 
     Raises:
         UnknownNameError: a candidate is not in the library, or a variable has no value.
@@ -98,7 +102,7 @@ def choose(
 
 
 def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdict:
-    """Return whether a candidate's condition holds for these arguments, with the leaf that decides."""
+    """Return whether a candidate's condition is true for these arguments, with the part that determines the result."""
     if plot.when is None:
         return Verdict(plot.name, fits=True, reason="no condition")
     bindings = {**_defaults(plot), **arguments}
@@ -115,10 +119,10 @@ def _defaults(plot: ActionPlot) -> dict[str, Any]:
 
 
 def plain(content: Content) -> Any:
-    """Return the content as a value for a chart's variable: plain JSON, with a geometry as a list of numbers."""
+    """Return a value of the knowledge base as plain JSON for a chart's variable; a geometry is a list of numbers."""
     return list(content) if isinstance(content, tuple) else content
 
 
 def scalars(bindings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the bindings that a condition can use; drop plots and other structures held in variables."""
+    """Return the bindings that a condition can read: strings, numbers and truth values, without plots or lists."""
     return {name: value for name, value in bindings.items() if isinstance(value, str | int | float | bool)}

@@ -1,6 +1,6 @@
-"""Library of plots: finds them by name, expands their rules and compiles their tables once (S0.9).
+"""Library of plots: returns plots by name, expands their rules and caches their compiled tables (S0.9).
 
-A substitute has an interface that fits all holders of the original (S0.1).
+A substitute must have an interface that fits all host states of the original (S0.1).
 """
 
 from __future__ import annotations
@@ -17,14 +17,17 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
 
 MOST_BOUND = 64
-"""Upper bound of compiled plots given as data: a retry binds the same plan again, and a long run has many plans."""
+"""Upper bound of cached compiled plots that were given as data.
+
+The cache serves retries, which bind an equal plan again. The bound limits memory in a long run with many plans.
+"""
 
 MOST_EXPECTED = 4
-"""Upper bound of plots made in this process and not yet bound: the last one of each plan."""
+"""Upper bound of plots that this process has made from plans and not yet bound."""
 
 
 class Library:
-    """Plots by name; provides the engine with their compiled form."""
+    """A collection of plots by name; provides the engine with compiled plots."""
 
     def __init__(self, plots: Iterable[ActionPlot] = ()) -> None:
         self._plots: dict[str, ActionPlot] = {}
@@ -45,11 +48,11 @@ class Library:
         return name in self._plots
 
     def add(self, plot: ActionPlot) -> None:
-        """Add a plot.
+        """Add a plot under its name.
 
         Raises:
             InputError: the value is not a plot.
-            SchemaError: another plot has its name.
+            SchemaError: the library already has a plot of this name.
         """
         if not isinstance(plot, ActionPlot):
             raise InputError(f"a plot is an ActionPlot, as load_plot and parse_plot give it, not {shown(plot)}")
@@ -60,7 +63,7 @@ class Library:
         self._plots[plot.name] = plot
 
     def plot(self, name: str) -> ActionPlot:
-        """Return the plot as it was written; raise `UnknownNameError`."""
+        """Return the plot of that name, without expansion; raise `UnknownNameError` if there is none."""
         found = self._plots.get(name)
         if found is None:
             raise UnknownNameError(f"there is no plot '{name}'", found=name, valid=self._plots)
@@ -69,21 +72,23 @@ class Library:
     def substitute(self, name: str, plot: ActionPlot) -> Library:
         """Return a new library in which `plot` replaces the plot of that name; this library is unchanged.
 
-        All users of the old plot use the new one: this replaces a whole branch, for a test or permanently.
+        All plots that refer to the name use the new plot. A substitute thus replaces a whole branch, e.g. for a test.
 
         Raises:
             UnknownNameError: the library has no plot of that name.
-            SchemaError: a holder of the old plot could not hold the new one; see `substitution.stand_in`.
+            SchemaError: a host state of the old plot could not contain the new plot; see `stand_in`.
         """
         other = stand_in(self.plot(name), plot)
         return Library(other if own.name == name else own for own in self)
 
     def with_default(self, plot: str, name: str, value: object, who: Who) -> Library:
-        """Return a new library in which a plot's parameter has another default; other plots keep their tables.
+        """Return a new library in which a plot's parameter has another default, set by the role `who`.
+
+        The new library shares the tables of all other plots.
 
         Raises:
-            UnknownNameError: there is no such plot or parameter.
-            InputError: the value does not fit the parameter, or `who` may not set it.
+            UnknownNameError: the library has no such plot, or the plot has no such parameter.
+            InputError: the value does not fit the parameter, or `who` may not set the parameter.
         """
         changed = self.plot(plot).with_default(name, value, who)
         other = Library(changed if own.name == plot else own for own in self)
@@ -96,32 +101,32 @@ class Library:
         return expand(plot, self)
 
     def implementing(self, planning_action: str) -> tuple[ActionPlot, ...]:
-        """Return the plots that execute a planning action, in the order of the library."""
+        """Return the plots that implement a planning action, in the order of the library; empty if there are none."""
         return tuple(plot for plot in self if plot.implements == planning_action)
 
     def compiled(self, name: str) -> CompiledPlot:
-        """Return the plot's tables; raise `UnknownNameError`."""
+        """Return the compiled plot of that name; raise `UnknownNameError` if there is none."""
         if name not in self._compiled:
             self._compiled[name] = compile_plot(self.expanded(self.plot(name)))
         return self._compiled[name]
 
     def expect(self, plot: ActionPlot) -> None:
-        """Remember a plot for a later `bind` of its unchanged form, which then skips reading."""
+        """Cache a plot; a later `bind` of its unchanged written form then need not read the form."""
         self._made[plot.text] = plot
         if len(self._made) > MOST_EXPECTED:
             del self._made[next(iter(self._made))]
 
     def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
-        """Compile a plot given as data; equal data share their tables.
+        """Return the compiled plot for data in the written form; equal data share their tables.
 
         Raises:
-            InputError: the data are not a plot, or it names unknown plots.
+            InputError: the data are not a plot, or the plot refers to unknown plots.
         """
-        if not isinstance(form, Mapping):  # a variable may hold any value
+        if not isinstance(form, Mapping):  # the value of a variable may have any type
             raise InputError(f"the value to be bound is not a plot: {form!r}")
-        key = json.dumps(form)  # the order of states counts
+        key = json.dumps(form)  # keys stay unsorted, because the order of states is part of a plot
         compiled = self._bound.pop(key, None) or compile_plot(self.expanded(self._made.get(key) or _read(form)), form)
-        self._bound[key] = compiled  # the last used plot is dropped last
+        self._bound[key] = compiled  # the least recently used plot is dropped first
         if len(self._bound) > MOST_BOUND:
             del self._bound[next(iter(self._bound))]
         return compiled
@@ -135,17 +140,17 @@ def _read(form: Mapping[str, Any]) -> ActionPlot:
 
 
 _ROLE = ("when", "implements", "effects", "confirm")
-"""The properties by which a library knows a plot; a substitute without them takes those of the original."""
+"""Fields of a plot's role as a candidate or planning action; a substitute without a role has the original's role."""
 
 
 def stand_in(original: ActionPlot, substitute: ActionPlot) -> ActionPlot:
-    """Return the substitute under the original's name, with the original's role if it declares none.
+    """Return the substitute under the original's name, with the original's role if the substitute declares none.
 
-    The role is the condition as a candidate, and the planning action with the treatment of its effects. The result
-    declares every outcome of the original, so that the holders' transitions remain valid.
+    The role consists of the condition as a candidate, and of the planning action with the treatment of its effects. The
+    result declares every outcome of the original, so that the host states' transitions remain valid.
 
     Raises:
-        SchemaError: a holder of the original could not hold the substitute.
+        SchemaError: a host state of the original could not contain the substitute.
     """
     require_stand_in(original, substitute)
     role = {key: getattr(original, key) for key in _ROLE if key not in substitute.model_fields_set}
@@ -154,12 +159,13 @@ def stand_in(original: ActionPlot, substitute: ActionPlot) -> ActionPlot:
 
 
 def require_stand_in(original: ActionPlot, substitute: ActionPlot) -> None:
-    """Raise an error if a holder of the original could not hold the substitute.
+    """Raise an error if a host state of the original could not contain the substitute.
 
-    Holders pass all parameters of the original, or only the required ones, and wire its outcomes.
+    A host state may pass all parameters of the original, or only the required parameters. It handles the original's
+    outcomes.
 
     Raises:
-        SchemaError: the interfaces differ; the message names the difference.
+        SchemaError: the interfaces differ; the message reports the difference.
     """
     for name, parameter in original.parameters.items():
         own = substitute.parameters.get(name)

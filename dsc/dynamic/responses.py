@@ -1,4 +1,4 @@
-"""Responses of rules as transitions, recovery states, and variables for counters and remembered values."""
+"""Responses of rules, expanded into transitions, recovery states and variables for counters and stored values."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from knowledge_base.language.syntax import expression as lang
 from knowledge_base.language.syntax.effect import substitute_effect
 
 DEFAULT_RETRIES = 3
-"""Limit of `retry` and `replan` responses without a `limit`, so that no rule repeats without end."""
+"""Upper bound of `retry` and `replan` responses without a written `limit`, so that no rule repeats without end."""
 
 States = dict[str, AnyState]
 Terms = Mapping[str, lang.Term]
 
 
 class Responses:
-    """Expands the responses of one plot's rules.
+    """Expansion of the responses of one plot's rules.
 
     Args:
-        plot: the plot.
+        plot: the plot with the rules.
         plots: provider of the plots that rules use.
-        added: gives names to added elements.
+        added: generator of names for added elements.
     """
 
     def __init__(self, plot: ActionPlot, plots: Plots, added: FreshNames) -> None:
@@ -45,13 +45,15 @@ class Responses:
         self._endings: dict[tuple[str, str], Transition] = {}
 
     def carried_out(self, rule: Rule, key: str, onward: Iterable[Transition], states: States) -> list[Transition]:
-        """Return transitions with the response of a rule, followed by `onward`; add its recovery state to `states`.
+        """Return transitions that execute a rule's response and then continue with `onward`.
+
+        A response with commands or a plot needs a recovery state, which is added to `states`.
 
         Args:
             rule: the rule, with the step's arguments already substituted.
-            key: part of the names of added elements.
-            onward: transitions after the response.
-            states: receives the added states.
+            key: common part of the names of added elements.
+            onward: transitions to take after the response.
+            states: mapping to which the recovery state is added.
         """
         guard, counting = self._limit(rule, key)
         onward = list(onward)
@@ -65,7 +67,17 @@ class Responses:
         return [_joined(rule, guard, {**counting, **kept}, Transition(target=name))]
 
     def onward(self, rule: Rule, number: int, name: str, state: State) -> list[Transition]:
-        """Return the transitions after a rule's response to a step; `number` is the rule's position in the plot."""
+        """Return the transitions for the continuation of a rule at a step.
+
+        Args:
+            rule: the rule, with the step's arguments already substituted.
+            number: position of the rule in the plot.
+            name: name of the step.
+            state: the step.
+
+        Raises:
+            SchemaError: the step has no transition for the continuation.
+        """
         then, about = rule.then, rule.label if rule.on is None else rule.on
         if self._plot.generated and (then in {REPLAN, GIVE_UP} or rule.leads_away):
             return [self._leaving(rule, name, about)]
@@ -79,21 +91,21 @@ class Responses:
         return [Transition(target=target, passed=rule.do.passed)]
 
     def _leaving(self, rule: Rule, name: str, about: str) -> Transition:
-        """Return a transition out of the generated plot."""
+        """Return a transition from a step to the final state with which a rule ends the generated plot."""
         if rule.leads_away:
             return Transition(target=self._end(self._beside[name], rule.outcome), passed=rule.do.passed)
-        reason = about if rule.do.acts or rule.on is None else reason_of(rule.on)  # the event has another source
+        reason = about if rule.do.acts or rule.on is None else reason_of(rule.on)  # `about` if the event is `done`
         return self.ending(name, REPLAN if rule.then == REPLAN else GAVE_UP, reason)
 
     def ending(self, name: str, outcome: str, reason: str) -> Transition:
-        """Return a transition from a step to its scope's final state that ends the generated plot with the outcome."""
+        """Return a transition from the step `name` to the final state that ends the generated plot with an outcome."""
         end = self._end(self._beside[name], outcome)
-        if (end, reason) not in self._endings:  # shared by many steps
+        if (end, reason) not in self._endings:  # many steps share the transition
             self._endings[end, reason] = Transition.model_validate({"to": end, "assign": {"reason": reason}})
         return self._endings[end, reason]
 
     def _handed_out(self, way: Transition) -> Transition:
-        """Assign arguments for an end of the plot to the variables that this end returns."""
+        """Return a transition to a final state, with its arguments assigned to the variables of the outcome."""
         end = self._states.get(way.target or "")
         if not way.passed or not isinstance(end, FinalState):
             return way
@@ -101,14 +113,14 @@ class Responses:
         return way.model_copy(update={"passed": {}, "do": (*way.do, Assign(assign=handed))})
 
     def _end(self, scope: Mapping[str, AnyState], outcome: str) -> str:
-        """Return the name of the scope's final state that emits the outcome; the search is cached."""
+        """Return the name of the scope's final state that emits the outcome; the outcome itself if none emits it."""
         if (id(scope), outcome) not in self._ends:
             found = (each for each, one in scope.items() if isinstance(one, FinalState) and one.emit == outcome)
             self._ends[id(scope), outcome] = next(found, outcome)
         return self._ends[id(scope), outcome]
 
     def remembered(self, terms: Terms, key: str, kept: dict[str, lang.Term]) -> dict[str, lang.Term]:
-        """Return the terms as variables of the plot; `kept` receives their assignments."""
+        """Return a new variable for each term; add the assignments of the terms to these variables to `kept`."""
         found: dict[str, lang.Term] = {}
         for name, term in terms.items():
             variable = self._added.variable(f"kept_{key}_{name}", "symbol")
@@ -117,7 +129,10 @@ class Responses:
         return found
 
     def _kept(self, terms: Terms, key: str, kept: dict[str, lang.Term]) -> dict[str, lang.Term]:
-        """Store terms that read the event in variables: the event is gone after an exit or a new entry of the state."""
+        """Return the terms; a new variable replaces each term that reads the event, and `kept` receives its assignment.
+
+        The variables are necessary because a later state can no longer read the event's attributes.
+        """
         lost = {name: term for name, term in terms.items() if reads_event(term)}
         return {**terms, **self.remembered(lost, key, kept)}
 
@@ -150,23 +165,23 @@ class Responses:
 
 
 def limit_of(rule: Rule, *, generated: bool = False) -> int | None:
-    """Return a rule's limit of answers for one state; `None` if unlimited."""
+    """Return the upper bound of a rule's responses for one state; `None` means no bound."""
     bounded = rule.then == RETRY or (rule.then == REPLAN and not generated)
     return rule.do.limit or (DEFAULT_RETRIES if bounded else None)
 
 
 def skipped(step: str) -> str:
-    """Return the name of the state that continues a generated plot after a step, without waiting for its effects."""
+    """Return the name of the state that continues a generated plot after a step without waiting for its effects."""
     return f"{step}_skipped"
 
 
 def reason_of(event: str) -> str:
-    """Return the reason why a step failed; a failure event carries its reason."""
+    """Return the reason of a step's failure: the attribute `reason` of a failure event, else the event's name."""
     return "?event.reason" if event in FAILURES else event
 
 
 def reads_event(term: lang.Term) -> bool:
-    """Return whether a term reads an attribute of the event."""
+    """Return whether a term reads an attribute of the current event."""
     return any(name.startswith("event.") for name in lang.free_variables(term))
 
 
@@ -175,7 +190,7 @@ def _spoken(rule: Rule) -> str:
 
 
 def because(outcome: str, giving_up: Transition) -> Transition:
-    """Return a transition on `gave_up` for use on another outcome, with that outcome as the reason."""
+    """Return a transition on `gave_up` for another outcome; this outcome replaces `event.reason`."""
     reason = {"event.reason": lang.Constant(outcome)}
     return giving_up.model_copy(
         update={
@@ -197,12 +212,12 @@ def _action_because(action: Internal, reason: Terms) -> Internal:
             return Assign(assign=filled(action.assign, reason))
         case Emit():
             return action.model_copy(update={"arguments": filled(action.arguments, reason)})
-        case _:  # a log or a branch of dialect scxml is unchanged
+        case _:  # actions of dialect scxml stay unchanged, because rules exist only in dialect dsc
             return action
 
 
 def _joined(rule: Rule, guard: lang.Expression | None, counting: Terms, after: Transition) -> Transition:
-    """Return one transition with the response of the rule and the actions of `after`."""
+    """Return the transition `after` with the rule's guard, and with the rule's actions before its actions."""
     both = [part for part in (guard, after.guard) if part is not None]
     actions: list[Internal] = []
     if rule.do.tell is not None:
@@ -219,10 +234,10 @@ def _joined(rule: Rule, guard: lang.Expression | None, counting: Terms, after: T
 
 
 class FreshNames:
-    """Gives unused names in one plot.
+    """Generator of unused names in one plot.
 
     Attributes:
-        variables: the added ones.
+        variables: the added variables by name.
     """
 
     def __init__(self, plot: ActionPlot) -> None:
@@ -232,19 +247,19 @@ class FreshNames:
         self.variables: dict[str, PlotVariable] = {}
 
     def state(self, wanted: str) -> str:
-        """Return a name for a state: the wanted one, or with a number if it is taken."""
+        """Return an unused name for a state: the wanted name, or the wanted name with a number."""
         name = _unused(wanted, self._names)
         self._names.add(name)
         return name
 
     def event(self, wanted: str) -> str:
-        """Return a name for an internal event: the wanted one, or with a number if it is taken."""
+        """Return an unused name for an internal event: the wanted name, or the wanted name with a number."""
         name = _unused(wanted, self._events)
         self._events.add(name)
         return name
 
     def variable(self, wanted: str, type_: str, initial: Any = None) -> str:
-        """Add a variable under the wanted name, or with a number if it is taken; return its name."""
+        """Add a variable and return its unused name: the wanted name, or the wanted name with a number."""
         taken = ChainMap[str, object](self.variables, *self._declared)  # type: ignore[arg-type]
         name = _unused(wanted.lower().replace("-", "_"), taken)
         declared = {"type": type_} if initial is None else {"type": type_, "initial": initial}
@@ -253,6 +268,6 @@ class FreshNames:
 
 
 def _unused(name: str, taken: Container[str]) -> str:
-    """Return the name, followed by a number if it is taken."""
+    """Return the name if it is not in `taken`; else the name with the smallest unused number from 2."""
     numbered = (f"{name}_{number}" for number in itertools.count(2))
     return name if name not in taken else next(other for other in numbered if other not in taken)

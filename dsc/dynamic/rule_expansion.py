@@ -1,4 +1,4 @@
-"""Expansion of rules and handlers into ordinary states and transitions, visible in every drawing (S1.4, S1.14)."""
+"""Expansion of rules and handlers into ordinary states and transitions, which every drawing shows (S1.4, S1.14)."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from knowledge_base.language.syntax.expression import Arithmetic, Comparison, Co
 
 
 def expand(plot: ActionPlot, plots: Plots) -> ActionPlot:
-    """Return the plot with its rules and handlers turned into states and transitions.
+    """Return the plot with states and transitions instead of its rules and handlers.
 
     Raises:
-        UnknownNameError: a rule or state names a missing plot.
-        SchemaError: a rule cannot be applied at a state.
+        UnknownNameError: a rule or state refers to a missing plot.
+        SchemaError: a rule cannot be applied to a state.
     """
     if not plot.rules and not plot.handlers and not plot.generated:
         return plot
@@ -40,17 +40,17 @@ class _Expansion:
         self.added = FreshNames(plot)
         self._responses = Responses(plot, plots, self.added)
         self._in_plans = [rule for rule in plot.rules if rule.leads_away and answers_in_plans(rule, plots)]
-        self._given_up: dict[str, str] = {}  # events by which inner states report `gave_up` -> reason
+        self._given_up: dict[str, str] = {}  # reasons, by the event with which an inner state reports `gave_up`
         self.detours = Insertions(plot, plots, self.added, self._responses)
 
     def scope(self, scope: Scope) -> dict[str, object]:
-        """Return the changed fields of a scope: its states, and a new initial state if an insertion precedes it."""
+        """Return the changed fields of a scope: `states`, and `initial` if an insertion precedes the initial state."""
         states = self.detours.through(self._states(scope.states), scope.states)
         entrance = self.detours.entrances.get(initial_of(scope))
         return {"states": states} if entrance is None else {"states": states, "initial": entrance}
 
     def _states(self, states: Mapping[str, AnyState]) -> States:
-        """Return the states of one scope, each followed by the recovery states of its rules."""
+        """Return the states of one scope; the recovery states of its rules follow each step."""
         result: States = {}
         for name, state in states.items():
             if isinstance(state, CompositeState | OrthogonalState):
@@ -95,7 +95,7 @@ class _Expansion:
 
 
 Ways = Mapping[str, tuple[Transition, ...]]
-"""Event -> transitions, tried in order."""
+"""Transitions by event, tried in order."""
 
 
 def led_away(
@@ -107,16 +107,17 @@ def led_away(
     added: FreshNames,
     given_up: MutableMapping[str, str],
 ) -> Ways:
-    """Return the transitions of a state with a goal, with those of rules that leave its plans.
+    """Return the transitions of a state with a goal, including the transitions of rules that leave its plans.
 
     Args:
-        name: the state's name.
-        state: has the budget.
-        on: its transitions so far.
-        beside: the states of its scope.
-        rules: those that may answer for steps of plans.
-        added: gives names to added elements.
-        given_up: receives the events by which the state reports `gave_up`, with reasons; for `answered`.
+        name: name of the state.
+        state: the state, whose budget bounds the number of plans.
+        on: transitions of the state without these rules.
+        beside: names of the states in the state's scope.
+        rules: rules that may respond to steps of plans.
+        added: generator of names for added elements.
+        given_up: mapping to which the events are added that report `gave_up` of the state, with reasons; `answered`
+            reads this mapping.
     """
     leading = {rule.outcome: rule for rule in rules if rule.leads_away and rule.then in beside}
     if not leading:
@@ -136,7 +137,10 @@ def led_away(
 
 
 def answered(on: Ways, given_up: MutableMapping[str, str]) -> Ways:
-    """Return a state's transitions with those for inner `gave_up` reports; remove settled reports from `given_up`."""
+    """Return the transitions of a state, including those on the reports of `gave_up` from inner states.
+
+    Reports that these transitions always handle are removed from `given_up`.
+    """
     own = on.get(GAVE_UP, ())
     if not (own and given_up):
         return on

@@ -1,4 +1,4 @@
-"""Steps, the states that hold another plot: their outcomes, outputs and contents, and references of rules to them."""
+"""Steps, states that contain another plot: their outcomes, outputs and contents, and the rules that apply to them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from knowledge_base.language.syntax.effect import mentioned, quantified_in, subs
 from knowledge_base.language.syntax.expression import Term, free_variables, substitute
 
 Outcomes = Mapping[str, Mapping[str, str] | None]
-"""Event name -> its attributes with their types."""
+"""Types of attributes by attribute name, by event name; `None` if the attributes are unknown."""
 
 _FAILED: Outcomes = {
     SKILL_ERROR: {"skill": "text", "reason": "text"},
@@ -31,14 +31,14 @@ class Plots(Protocol):
         ...
 
     def plot(self, name: str) -> ActionPlot:
-        """Return the plot of that name; raise `UnknownNameError`."""
+        """Return the plot of that name; raise `UnknownNameError` if there is none."""
         ...
 
 
 def outputs_of(state: AnyState, plots: Plots) -> Mapping[str, str] | None:
-    """Return the outputs of a state at completion: name -> type (S2.1); `None` if they depend on a variable.
+    """Return the types of a state's outputs by name (S2.1); `None` if the state's plot is the value of a variable.
 
-    A dynamic state has the outputs that all its candidates share, with the same type. A plan for a goal has none.
+    A dynamic state has the outputs that all its candidates have with equal types. A plan for a goal has no outputs.
 
     Raises:
         UnknownNameError: the state names a missing plot.
@@ -56,9 +56,9 @@ def _outputs(plot: ActionPlot) -> dict[str, str]:
 
 
 def outcomes_of(state: AnyState, plots: Plots) -> Outcomes:
-    """Return the outcome events of a submachine or dynamic state; nothing for other kinds.
+    """Return the outcome events of a submachine or dynamic state; empty for any other state.
 
-    The outcomes of a plot held in a variable are unknown beforehand; the result is empty.
+    The result is also empty if the state's plot is the value of a variable, because its outcomes are unknown.
 
     Raises:
         UnknownNameError: the state names a missing plot.
@@ -76,7 +76,7 @@ def outcomes_of(state: AnyState, plots: Plots) -> Outcomes:
 
 
 def answerable(state: AnyState, plots: Plots) -> Outcomes:
-    """Return the events that a rule can answer at a state: outcomes, and skill failures that its plot does not take.
+    """Return the events of a state to which a rule can respond: outcomes, and failures of skills.
 
     Raises:
         UnknownNameError: the state names a missing plot.
@@ -86,15 +86,15 @@ def answerable(state: AnyState, plots: Plots) -> Outcomes:
 
 
 Step = SubmachineState | DynamicState
-"""A state that holds another plot."""
+"""A state that contains another plot."""
 Terms = Mapping[str, Term]
 
 
 def contents_of(step: Step, plots: Plots) -> list[ActionPlot]:
-    """Return the plots that may become the content of a step; omit a plot held in a variable.
+    """Return the plots that may become the content of a step; a plot that is the value of a variable is omitted.
 
     Raises:
-        UnknownNameError: it names a missing plot.
+        UnknownNameError: the step refers to a missing plot.
     """
     if isinstance(step, DynamicState):
         return [plots.plot(name) for name in step.dynamic]
@@ -102,12 +102,12 @@ def contents_of(step: Step, plots: Plots) -> list[ActionPlot]:
 
 
 def is_planned(state: AnyState) -> bool:
-    """Return whether a planner may provide the state's content."""
+    """Return whether a planner may provide the state's content, because the state has a goal."""
     return isinstance(state, DynamicState) and state.goal is not None
 
 
 def action_of(step: Step, plots: Plots) -> str | None:
-    """Return the one planning action that all possible plots of the step implement, or `None`."""
+    """Return the planning action that all possible plots of a step implement; `None` if they have none in common."""
     if is_planned(step):
         return None
     actions = {plot.implements for plot in contents_of(step, plots)}
@@ -115,12 +115,12 @@ def action_of(step: Step, plots: Plots) -> str | None:
 
 
 def concerns(rule: Rule, name: str, step: Step, plots: Plots) -> bool:
-    """Return whether a rule applies to that step; a rule that names no steps applies to all."""
+    """Return whether a rule applies to the step of that name; a rule without steps applies to all steps."""
     return not rule.steps or name in rule.steps or action_of(step, plots) in rule.steps
 
 
 def answers_in_plans(rule: Rule, plots: Plots) -> bool:
-    """Return whether a rule may answer for steps of plans: it names planning actions, or no steps."""
+    """Return whether a rule may respond to steps of plans: it refers to planning actions, or applies to all steps."""
     return any(True for _ in _answered_in_plans(rule, plots))
 
 
@@ -130,7 +130,7 @@ def _answered_in_plans(rule: Rule, plots: Plots) -> Iterator[ActionPlot]:
 
 
 def entered_by(rule: Rule, plot: ActionPlot, plots: Plots) -> Iterator[ActionPlot]:
-    """Yield the known plots that receive the arguments passed by a rule of a plot, each once."""
+    """Yield the plots, without repetition, that may receive the arguments that a rule passes; omit unknown plots."""
     steps = {name: state for name, state, _ in plot.walk() if isinstance(state, Step)}
     if rule.leads_away:
         entered = [steps[rule.then]] if rule.then in steps else []
@@ -144,7 +144,7 @@ def entered_by(rule: Rule, plot: ActionPlot, plots: Plots) -> Iterator[ActionPlo
 
 
 def mentioned_in(rule: Rule | Handler) -> frozenset[str]:
-    """Return the variables that the condition and response of a rule or handler read."""
+    """Return the names of variables that the condition and the response of a rule or handler read."""
     do = rule.do
     passed = do.passed.values() if isinstance(do, Response) else ()
     terms = [*do.arguments.values(), *passed, *(term for c in do.command for term in terms_of(c).values())]
@@ -154,10 +154,10 @@ def mentioned_in(rule: Rule | Handler) -> frozenset[str]:
 
 
 def about_step(rule: Rule, step: Step, plot: ActionPlot) -> Rule:
-    """Return the rule with `?step.item` replaced by the step's arguments.
+    """Return the rule for one step: the step's arguments replace the variables `?step.item`.
 
     Raises:
-        SchemaError: an argument is a variable of the plot that the rule uses for another value.
+        SchemaError: an argument reads a variable whose name the rule uses for another value.
     """
     read = mentioned_in(rule)
     arguments = {STEP + name: term for name, term in step.arguments.items() if STEP + name in read}
@@ -177,12 +177,12 @@ def about_step(rule: Rule, step: Step, plot: ActionPlot) -> Rule:
 
 
 def filled(terms: Terms, values: Mapping[str, Term]) -> dict[str, Term]:
-    """Return the terms with variables replaced by other terms."""
+    """Return the terms with the variables in `values` replaced by their terms."""
     return {name: substitute(term, values) for name, term in terms.items()}
 
 
 def terms_of(command: Command) -> Terms:
-    """Return the values that a command passes to its component."""
+    """Return the terms that a command passes to its component, by name."""
     match command:
         case Configure(to=value):
             return {"to": value}

@@ -1,1 +1,1 @@
-"""Model of action plots: frozen values without behaviour. It imports no store, clock, skill or file access."""
+"""Model of action plots: immutable values without behaviour. The model must import no store, clock, skill or file."""

@@ -1,4 +1,8 @@
-"""Actions. `ExternalAction`s reach components, from entry and exit only; internal ones stay in the chart (S0.5)."""
+"""Actions of charts (S0.5).
+
+An external action reaches a component and is allowed only in entry and exit. An internal action changes only data of
+the chart, or the knowledge base.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +15,12 @@ from dsc.model.language import ConditionField, EffectField, Frozen, TermField, b
 
 
 class Trigger(Frozen):
-    """Start a skill; its outcome events reach the state that started it. An exit from that state cancels it.
+    """Start a skill; the state that starts the skill receives its outcome events and cancels the skill on exit.
 
     Attributes:
-        trigger: `component.skill`, by the name the deployment gave the component.
-        arguments: values for the skill's parameters (`with`).
-        names: skill event -> its name in this chart (`as`, S0.6).
+        trigger: `component.skill`, where `component` is the name in the deployment.
+        arguments: values for the skill's parameters, by name (`with`).
+        names: names of the skill's events in this chart, by the name in the skill (`as`, S0.6).
         within: seconds after which the skill is cancelled and ends with the event `timed_out`.
     """
 
@@ -34,40 +38,41 @@ class Configure(Frozen):
 
 
 class Switch(Frozen):
-    """Put a component into a mode: `switch: navigation`, `to: neutral` (the *state* pattern, S1.1)."""
+    """Switch a component to a mode: `switch: navigation`, `to: neutral` (the *state* pattern, S1.1)."""
 
     switch: str
     to: str
 
 
 class Send(Frozen):
-    """Send a component a one-way message: `send: voice.say`, `with: {text: hello}` (S1.1)."""
+    """Send a one-way message to a component: `send: voice.say`, `with: {text: hello}` (S1.1)."""
 
     send: str = Field(pattern=r"^[\w\-]+\.[\w\-]+$")
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
 
 
 ExternalAction = Trigger | Configure | Switch | Send
-"""Actions on components."""
+"""The external actions, which reach components, as a union of types."""
 
 
 class Assign(Frozen):
-    """Assign new values to variables of this plot."""
+    """Assign new values to variables of the plot, by name."""
 
     assign: dict[str, TermField]
 
 
 class Tell(Frozen):
-    """Change the knowledge base; later guards of the same macrostep see it."""
+    """Change the knowledge base; later guards of the same macrostep read the changed knowledge."""
 
     tell: EffectField
 
 
 class Emit(Frozen):
-    """Fire an event: a declared outcome goes to the state that holds this plot, any other stays inside.
+    """Fire an event: the host state receives an event declared in `emits`; the plot itself receives any other event.
 
-    With `delay` (seconds; only in dialect `scxml`) it arrives later as an event from outside. Until then a `Withdraw`
-    with its `id` drops it. `into` is a variable that receives a generated id (SCXML 6.2).
+    With `delay` (seconds; only in dialect `scxml`) the event arrives later, as an event from outside. A `Withdraw` with
+    the same `id` drops the delayed event before its arrival. `into` is the name of a variable that receives a generated
+    id (SCXML 6.2).
     """
 
     emit: str
@@ -84,25 +89,25 @@ class Emit(Frozen):
 
 
 class Withdraw(Frozen):
-    """Drop the pending delayed events of that id, fired in this plot (SCXML 6.3; only in dialect `scxml`)."""
+    """Drop the pending delayed events that this plot fired with this id (SCXML 6.3; only in dialect `scxml`)."""
 
     withdraw: TermField
 
 
 class Log(Frozen):
-    """Write constants and variables to the trace, in order (SCXML 4.7; only in dialect `scxml`)."""
+    """Write values to the trace as one text, in order (SCXML 4.7; only in dialect `scxml`)."""
 
     log: tuple[TermField, ...]
     label: str = ""
 
 
 class Choose(Frozen):
-    """The actions of one branch (SCXML 4.3; only in dialect `scxml`).
+    """Execute one of two sequences of actions (SCXML 4.3; only in dialect `scxml`).
 
     Attributes:
-        condition: selects the branch (`if`).
-        then: actions if it holds.
-        otherwise: actions if it does not (`else`).
+        condition: condition that selects the sequence (`if`).
+        then: actions if the condition is true.
+        otherwise: actions if the condition is false (`else`).
     """
 
     condition: ConditionField = Field(alias="if")
@@ -111,9 +116,9 @@ class Choose(Frozen):
 
 
 class Block(Frozen):
-    """A sequence of actions: an error skips its rest, but nothing after it (SCXML 4.9; only in dialect `scxml`).
+    """Execute a sequence of actions; an error skips only the rest of this block (SCXML 4.9; dialect `scxml` only).
 
-    A state with several `onentry` or `onexit` has one for each (SCXML 3.8, 3.9).
+    A state with several `onentry` or `onexit` elements has a block for each element (SCXML 3.8, 3.9).
     """
 
     block: tuple[InternalAction, ...]
@@ -129,12 +134,12 @@ _Internal = (
     | Annotated[Block, Tag("block")]
 )
 InternalAction = Annotated[_Internal, by_key("assign", "tell", "emit", "withdraw", "log", "if", "block")]
-"""Actions of a transition."""
+"""The internal actions as the field type of a transition's actions."""
 Choose.model_rebuild()
 Block.model_rebuild()
 
 Internal = Assign | Tell | Emit | Withdraw | Log | Choose | Block
-"""The internal actions as a union of types, for tests of an action's kind."""
+"""The internal actions as a union of types, for `isinstance`."""
 
 Action = Annotated[
     Annotated[Trigger, Tag("trigger")]
@@ -144,11 +149,11 @@ Action = Annotated[
     | _Internal,
     by_key("trigger", "set", "switch", "send", "assign", "tell", "emit", "withdraw", "log", "if", "block"),
 ]
-"""Actions of entry and exit; internal ones only in dialect `scxml` (SCXML 3.8)."""
+"""An action in entry or exit; internal actions are allowed there only in dialect `scxml` (SCXML 3.8)."""
 
 
 def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalAction | Internal]:
-    """Yield all actions, also those inside branches and blocks."""
+    """Yield all actions, including the actions inside branches and blocks."""
     for action in actions:
         yield action
         if isinstance(action, Choose):
@@ -158,7 +163,7 @@ def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalActio
 
 
 def component_of(action: ExternalAction | Internal) -> str | None:
-    """Return the name of the component that an action acts on, or `None`."""
+    """Return the name of the component that an action reaches; `None` for an internal action."""
     match action:
         case Trigger(trigger=port) | Configure(set=port) | Send(send=port):
             return port.partition(".")[0]

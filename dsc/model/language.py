@@ -1,7 +1,7 @@
-"""Conditions, terms and effects as fields of a model: written as text in the one language, kept parsed.
+"""Conditions, terms and effects as fields of a model: written as text, stored parsed.
 
-A field accepts text or a parsed value and is written back as text. A plot read from YAML, built in Python or dumped to
-JSON is therefore the same plot.
+A field accepts text or a parsed value, and is written back as text. A plot from YAML, from Python or from JSON is
+therefore equal to the original.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _SYMBOL = re.compile(r"[a-z0-9_][a-z0-9_\-#~.]*", re.IGNORECASE)
 
 
 class Frozen(Form):
-    """Base of all model values: immutable, without unknown keys; aliased fields accept both spellings."""
+    """Base of all values of the model: immutable, without unknown keys; a field with an alias accepts both names."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, arbitrary_types_allowed=True, allow_inf_nan=False
@@ -36,28 +36,28 @@ class Frozen(Form):
 
 
 class Written(Frozen):
-    """Base of the values of whole files: remembers the places of its parts in the text it was read from."""
+    """Base of values that are read from a whole file; stores the place of each part in the file's text."""
 
     _places: Mapping[FormPath, Place] = PrivateAttr(default_factory=dict)
 
     def written_at(self, places: Mapping[FormPath, Place]) -> Self:
-        """Return this value with the places of its parts."""
+        """Store the places of this value's parts by path, and return this value."""
         self._places = places
         return self
 
     def place(self, path: FormPath) -> Place | None:
-        """Return the place in the text of the part at `path`, or of the closest known part around it."""
+        """Return the place of the part at `path`, or of the closest outer part with a known place; else `None`."""
         known: FormPath = ()
         for element in path:
             if (*known, element) in self._places:
                 known = (*known, element)
-            elif not isinstance(element, int):  # the short form of a list has no position
+            elif not isinstance(element, int):  # a list of one may be written without brackets
                 break
         return self._places.get(known)
 
 
 def by_key(*keys: str) -> Discriminator:
-    """Return a discriminator for unions whose members each have one distinctive key."""
+    """Return a pydantic discriminator for a union in which each member has one of these distinctive keys."""
     return Discriminator(
         kind_by_key(*keys),
         custom_error_type=UNKNOWN_FORM,
@@ -67,7 +67,7 @@ def by_key(*keys: str) -> Discriminator:
 
 
 def kind_by_key(*keys: str) -> Callable[[Any], str | None]:
-    """Return a function that finds the first of the keys that the data have."""
+    """Return a function that returns the first of `keys` in a mapping or model value, or `None` if none is in it."""
 
     def kind(value: Any) -> str | None:
         present = value if isinstance(value, Mapping) else _written_keys(type(value))
@@ -82,7 +82,7 @@ def _written_keys(kind: Any) -> set[str]:
 
 
 def _read(read: Callable[[Any], _Read], value: Any) -> _Read:
-    """Return the result of a reader of the language; its errors become errors of validation."""
+    """Return the result of the parser `read` for a value; raise `ValueError` for pydantic if the parser fails."""
     try:
         return read(value)
     except InputError as error:
@@ -131,7 +131,10 @@ _texts: IdentityCache[Expression | Effect, str] = IdentityCache()
 
 
 def _text_out(part: Expression | Effect) -> str:
-    """Return the text of a condition or effect, cached by identity: a plot and its expansion share conditions."""
+    """Return the text of a condition or effect.
+
+    The text is cached by the identity of the object, because a plot and its expansion share conditions.
+    """
     return _texts.find(part, None) or _texts.keep(part, None, to_text(part))
 
 
@@ -140,7 +143,7 @@ def _term_out(term: Term) -> Any:
 
 
 def constant(value: Value) -> Constant:
-    """Return a value as a term; quote a text that is not a name."""
+    """Return a value as a constant term; a text that is not a name is quoted."""
     return Constant(value, quoted=isinstance(value, str) and not _SYMBOL.fullmatch(value))
 
 
@@ -153,7 +156,7 @@ def _setting(value: object) -> Value:
 
 
 Setting = Annotated[Value, PlainValidator(_setting), WithJsonSchema({"type": ["string", "number", "boolean"]})]
-"""A constant value."""
+"""Field type of a constant value."""
 
 ConditionField = Annotated[
     Expression,
@@ -161,7 +164,7 @@ ConditionField = Annotated[
     PlainSerializer(_text_out),
     WithJsonSchema({"type": "string", "description": "a condition, e.g. (and (on ?o table) (cup ?o))"}),
 ]
-"""A condition; chart variables, parameters and event attributes bind all its variables."""
+"""Field type of a condition; each free variable must be a chart variable, a parameter or an event attribute."""
 
 TermField = Annotated[
     Term,
@@ -174,7 +177,7 @@ TermField = Annotated[
         }
     ),
 ]
-"""A value: a constant, a variable, or arithmetic over them."""
+"""Field type of a term: a constant, a variable or arithmetic."""
 
 EffectField = Annotated[
     Effect,
@@ -188,4 +191,4 @@ EffectField = Annotated[
         }
     ),
 ]
-"""A change of the knowledge base in the form of a PDDL effect."""
+"""Field type of a change of the knowledge base, written as a PDDL effect."""

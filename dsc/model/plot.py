@@ -28,15 +28,15 @@ from knowledge_base.errors import UnknownNameError
 from knowledge_base.spelling import is_plain_name
 
 Path = FormPath
-"""Path of a part in a plot's form, e.g. `("states", "look", "on", "recognised")`."""
+"""Path of a part in the written form of a plot, e.g. `("states", "look", "on", "recognised")`."""
 
 
 _STATE_NAME = re.compile(r"[^/#][^/]*")
-# Paths contain state names between slashes; in a stored state, a name that begins with # is a region's index.
+# Slashes separate state names in paths. In a stored state, a name that begins with # identifies a region.
 
 
 class _Declaration(Frozen):
-    """A typed name; the type alone is its short form."""
+    """A declaration of a type; the type alone is the short form of the declaration."""
 
     type: str
 
@@ -47,16 +47,16 @@ class _Declaration(Frozen):
 
 
 class PlotParameter(_Declaration):
-    """A one-way parameter with its role (S1.11).
+    """An input parameter of a plot, with the roles that may set its value (S1.11).
 
     Attributes:
         type: a type of the knowledge base's schema, or `number`, `boolean`, `text`, `symbol`.
-        default: its value without another setting.
-        least, most: the range of a number.
+        default: value if no role sets another value; `None` makes the parameter required.
+        least, most: lower and upper bound of a number, inclusive; `None` means no bound.
         among: the allowed values; empty means any.
-        changed_by: the last role that may set another value; all roles before it may, too. In order: `nobody`;
-            `profile`, before a run; `operator`, during a run; `rules` and handlers that use the plot; all `plots` that
-            use it.
+        changed_by: the last role that may set the value; all earlier roles may set it, too. In order: `nobody`;
+            `profile`, before a run; `operator`, during a run; `rules` and handlers that use the plot; `plots` that use
+            the plot.
     """
 
     default: TermField | None = None
@@ -67,42 +67,42 @@ class PlotParameter(_Declaration):
 
     @property
     def range(self) -> Range:
-        """The allowed values."""
+        """The allowed values of the parameter."""
         return Range(self.type, self.least, self.most, self.among)
 
     @property
     def bounded(self) -> bool:
-        """Return whether its range is narrower than its type."""
+        """Whether the parameter has a bound or a list of allowed values."""
         return self.least is not None or self.most is not None or bool(self.among)
 
 
 class PlotVariable(_Declaration):
-    """A variable or output in the plot's scope; it ends with the plot (S0.7)."""
+    """A variable or output of a plot; its value exists only while the plot runs (S0.7)."""
 
     initial: TermField | None = None
 
 
 class ActionPlot(Written):
-    """An action plot.
+    """An action plot: a state chart with parameters, variables, outcome events and rules.
 
     Attributes:
-        name: its name in the library (`plot`).
-        parameters: input values.
-        variables: its own variables.
-        receives: events from outside (an operator, a user interface) that it accepts, with their attributes.
-        outputs: typed values that it returns (S2.1). Inside, they are assigned and read like variables. At the final
-            state they become the attributes of the holder's `done`.
-        emits: outcome events with their attributes and types; the holder of the plot must wire them all.
-        when: as a candidate, the condition under which it fits (bottom-up, S0.4).
-        implements: the planning action that it executes; its parameters are named as that action's.
-        effects: whether the action's effects must be `observed` before the next step, or are `assumed`.
-        confirm: seconds to wait for them to be observed.
-        states: the top-level states by name; names are unique in the whole plot.
-        initial: the state to enter first; by default the first one.
+        name: name of the plot in the library (`plot`).
+        parameters: input parameters by name.
+        variables: variables of the plot by name.
+        receives: accepted events from outside, e.g. from an operator, with the types of their attributes.
+        outputs: typed values that the plot returns (S2.1). The plot assigns and reads them like variables. At the
+            plot's end they become the attributes of the host state's `done` event.
+        emits: outcome events with the types of their attributes; the host state must handle every outcome event.
+        when: condition under which the plot fits as a candidate of a dynamic state (bottom-up, S0.4).
+        implements: name of the planning action that the plot executes; both must have equal names of parameters.
+        effects: treatment of the planning action's effects: `observed` before the next step, or `assumed`.
+        confirm: seconds to wait until the effects are observed.
+        states: top-level states by name; names must be unique in the whole plot.
+        initial: name of the state to enter first; by default the first state in the file that is not a history.
         rules: contingency rules, in order of priority.
         handlers: event handlers, in order of priority.
-        generated: whether it was made from a plan.
-        dialect: `dsc`, or `scxml` for charts with features of SCXML alone: transitions across borders, history,
+        generated: whether the plot was made from a plan.
+        dialect: `dsc`, or `scxml` for charts with features that only SCXML has: transitions across borders, history,
             events matched by prefix, internal actions in entry and exit.
     """
 
@@ -126,11 +126,11 @@ class ActionPlot(Written):
     _text: str | None = PrivateAttr(default=None)
 
     def with_default(self, name: str, value: object, who: Who) -> ActionPlot:
-        """Return the plot with another default of a parameter.
+        """Return a copy of the plot with another default of a parameter, set by the role `who`.
 
         Raises:
-            UnknownNameError: it has no such parameter.
-            InputError: the value is of another type or out of range, or `who` may not set it.
+            UnknownNameError: the plot has no parameter of that name.
+            InputError: the value is of another type or out of range, or `who` may not set the parameter.
         """
         if name not in self.parameters:
             raise UnknownNameError(f"plot '{self.name}' has no parameter '{name}'", found=name, valid=self.parameters)
@@ -171,7 +171,7 @@ class ActionPlot(Written):
                     raise PydanticCustomError(LOCATED, "'{name}' is declared twice: as {other} and as {kind}", context)
 
     def _variable_paths(self) -> Iterator[Path]:
-        """Yield the paths of all names that conditions and terms read as `?name` or `?event.name`."""
+        """Yield the path of each name that a condition or term can read as `?name` or `?event.name`."""
         yield from (("parameters", name) for name in self.parameters)
         yield from (("variables", name) for name in self.variables)
         yield from (("outputs", name) for name in self.outputs)
@@ -179,11 +179,11 @@ class ActionPlot(Written):
             yield from ((group, event, name) for event, attributes in events.items() for name in attributes or ())
 
     def walk(self) -> Iterator[tuple[str, AnyState, Path]]:
-        """Yield all states in document order, with their names and paths."""
+        """Yield name, state and path of every state at any depth, in document order."""
         yield from _walk(self.states, ("states",))
 
     def scopes(self) -> Iterator[Scope]:
-        """Yield the scopes: the plot, each composite and region; each transition stays in one."""
+        """Yield the scopes: the plot, then each composite state and region. A transition must not leave its scope."""
         yield self
         for _, state, _ in self.walk():
             if isinstance(state, CompositeState):
@@ -192,7 +192,7 @@ class ActionPlot(Written):
                 yield from state.regions.values()
 
     def state(self, name: str) -> AnyState:
-        """Return the state of that name anywhere in the plot.
+        """Return the state of that name, at any depth of the plot.
 
         Raises:
             KeyError: the plot has no such state.
@@ -200,11 +200,11 @@ class ActionPlot(Written):
         return next(state for found, state, _ in self.walk() if found == name)
 
     def uses(self) -> frozenset[str]:
-        """Return the names of the plots it refers to."""
+        """Return the names of all plots to which this plot refers."""
         return frozenset(name for _, name in self.references())
 
     def references(self) -> Iterator[tuple[Path, str]]:
-        """Yield each reference to another plot: its path and the plot's name."""
+        """Yield path and plot name of each reference to another plot."""
         for _, state, path in self.walk():
             if isinstance(state, SubmachineState) and not state.use.startswith("?"):
                 yield (*path, "use"), state.use
@@ -216,31 +216,31 @@ class ActionPlot(Written):
                     yield (group, number, "do", "use"), do.use
 
     def to_form(self) -> dict[str, Any]:
-        """Return the plot as plain data in its written form; `ActionPlot.model_validate` reads it."""
+        """Return the written form of the plot as plain data, which `ActionPlot.model_validate` reads."""
         form: dict[str, Any] = json.loads(self.text)
         return form
 
     @property
     def text(self) -> str:
-        """`to_form` as JSON, cached, because a trace needs it whenever a plot is bound."""
+        """The written form as JSON text, cached, because the trace records this text at each binding of the plot."""
         if self._text is None:
             self._text = json.dumps(self.model_dump(mode="json", by_alias=True, exclude_defaults=True))
         return self._text
 
     @property
     def digest(self) -> str:
-        """A hash of the content, including the order of states: equal plots have equal digests."""
+        """Hash of the content as 12 hexadecimal digits; equal plots, with equal order of states, have equal digests."""
         return hashlib.sha256(self.text.encode()).hexdigest()[:12]
 
     def __eq__(self, other: object) -> bool:
-        """Compare the contents, without the places in text."""
+        """Compare the contents of two plots, without the places in their files."""
         return self is other or (isinstance(other, ActionPlot) and self.text == other.text)
 
     def __hash__(self) -> int:
         return hash(self.text)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """See pydantic; the copy drops the cached text and digest."""
+        """Return a copy with updated fields, as pydantic does; the copy drops the cached text and digest."""
         copied = super().model_copy(update=update, deep=deep)
         copied._text = None  # noqa: SLF001  a plot, like this one
         return copied
@@ -259,10 +259,10 @@ def _walk(states: Mapping[str, AnyState], path: Path) -> Iterator[tuple[str, Any
 
 
 Scope = ActionPlot | CompositeState | Region
-"""A part that contains states and has an initial one."""
+"""A part of a plot that contains states and has an initial state."""
 
 
 def initial_of(scope: Scope) -> str:
-    """Return the name of the state to enter first; in dialect `scxml` it may be deeper inside (SCXML 3.3)."""
+    """Return the name of a scope's initial state; in dialect `scxml` it may be at a deeper level (SCXML 3.3)."""
     proper = (name for name, state in scope.states.items() if not isinstance(state, HistoryState))
     return scope.initial or next(proper, next(iter(scope.states)))

@@ -1,4 +1,7 @@
-"""Roles of parameters: a builder's range, an integrator's default, and the roles that may set a value (S1.11)."""
+"""Ranges of parameters, and the roles that may set a parameter (S1.11).
+
+The builder of a plot or component declares the range, and the integrator declares the default.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ _RANKS: tuple[Who, ...] = ("nobody", "profile", "operator", "rules", "plots")
 
 
 def may_change(who: Who, changed_by: Who) -> bool:
-    """Return whether the role `who` may set a value; `changed_by` is the last role that may."""
+    """Return whether the role `who` may set a value; `changed_by` is the last permitted role in the order of roles."""
     return _RANKS.index(who) <= _RANKS.index(changed_by)
 
 
@@ -30,8 +33,8 @@ class Range:
     """The allowed values of a parameter.
 
     Attributes:
-        type: `number` or `boolean`; anything else is a word.
-        least, most: the bounds of a number, inclusive.
+        type: `number` or `boolean`; every other type has words as values.
+        least, most: lower and upper bound of a number, inclusive; `None` means no bound.
         among: the allowed values; empty means any.
     """
 
@@ -41,7 +44,7 @@ class Range:
     among: tuple[Value, ...] = ()
 
     def __str__(self) -> str:
-        """Return the range in words."""
+        """Return the range in words, for messages."""
         if self.among:
             return "one of " + ", ".join(map(written, self.among))
         if self.least is not None and self.most is not None:
@@ -53,14 +56,14 @@ class Range:
         return f"{'an' if self.type[:1] in 'aeiou' else 'a'} {self.type}"
 
     def check(self, name: str, value: object) -> Value:
-        """Return the value if it is in the range.
+        """Return the value if the range contains it.
 
         Args:
-            name: the parameter's name in messages.
-            value: its new value.
+            name: name of the parameter, for messages.
+            value: new value of the parameter.
 
         Raises:
-            InputError: it is of another type or out of range; the message has the range and the nearest word.
+            InputError: the value is of another type or out of range; the message has the range and the nearest word.
         """
         if isinstance(value, str | int | float | bool) and self._fits(value):
             return value
@@ -68,7 +71,7 @@ class Range:
         raise InputError(message, found=str(value), valid=map(str, self.among))
 
     def problems(self) -> Iterable[str]:
-        """Yield the contradictions inside the range itself."""
+        """Yield a message for each contradiction between the range's fields; empty for a valid range."""
         if self.type != "number" and (self.least is not None or self.most is not None):
             yield f"`least` and `most` are about numbers, and this is a {self.type}"
         elif self.least is not None and self.most is not None and self.least > self.most:
@@ -84,7 +87,7 @@ class Range:
     def _fits(self, value: Value) -> bool:
         if kind_of(value) != self._kind or (self.among and value not in self.among):
             return False
-        if isinstance(value, float) and math.isnan(value):  # comparisons with NaN are all false
+        if isinstance(value, float) and math.isnan(value):  # every comparison with NaN is false
             return False
         too_low = self.least is not None and not isinstance(value, str) and value < self.least
         too_high = self.most is not None and not isinstance(value, str) and value > self.most
@@ -97,5 +100,5 @@ def kind_of(value: Value) -> str:
 
 
 def written(value: object) -> str:
-    """Return a value in its written form."""
+    """Return the text of a value as it is written in a file."""
     return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""Reading of written data as model values; errors name the path in the data and the nearest valid key."""
+"""Reading of data as values of the model; each error has the path in the data and the nearest valid key."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from pydantic_core import ErrorDetails
 from knowledge_base.errors import InputError, UnknownNameError, shortened
 
 UNKNOWN_FORM = "unknown_form"
-"""Type of the validation error for data without any of a union's distinctive keys."""
+"""Type of the validation error for data that have none of a union's distinctive keys."""
 LOCATED = "located"
-"""Type of the validation error whose context has the `path` of the wrong part inside the form."""
+"""Type of a validation error whose context contains the `path` of the wrong part in the data."""
 
 FormPath = tuple[str | int, ...]
-"""Names of keys and positions in lists."""
+"""Path of a part in data: keys of mappings and positions in lists, outermost first."""
 _Schema = Mapping[str, Any]
 _Location = tuple[str | int, ...]
-"""Location of a pydantic error: keys and positions, mixed with tags of unions."""
+"""Location of a pydantic error: keys and positions, with tags of union members between them."""
 
 
 class Form(BaseModel):
@@ -28,10 +28,10 @@ class Form(BaseModel):
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
-        """Return the data as a value of this class; options as of pydantic.
+        """Return data as a value of this class; `options` are the options of pydantic's `model_validate`.
 
         Raises:
-            InputError: the data do not match; the message names the path in the data and the nearest valid key.
+            InputError: the data do not match the class; the message has the path in the data and the nearest valid key.
         """
         try:
             return super().model_validate(obj, **options)
@@ -42,8 +42,8 @@ class Form(BaseModel):
 
 
 def misread(error: ValidationError, model: type[BaseModel], data: Any) -> tuple[InputError, FormPath]:
-    """Return a pydantic error about data for `model` as an `InputError`, with its path in the data."""
-    # The deepest error is the most specific one.
+    """Return a pydantic error about data for `model` as an `InputError`, with the path of the wrong part."""
+    # The error with the longest path is the most specific one.
     details = max(error.errors(include_url=False), key=lambda one: (one["type"] != "missing", len(one["loc"])))
     kind, loc, context = details["type"], details["loc"], details.get("ctx", {})
     schema = _schema(model)
@@ -77,7 +77,7 @@ _PLAIN = {
 
 @cache
 def _schema(model: type[BaseModel]) -> _Schema:
-    """Return the cached schema: its construction takes fifty times as long as reading a plot."""
+    """Return a model's JSON schema, cached: its construction takes fifty times as long as the reading of a plot."""
     return model.model_json_schema()
 
 
@@ -97,7 +97,7 @@ def _message(details: ErrorDetails) -> str:
 
 
 def in_yaml(value: Any) -> str:
-    """Return the value in its written form, or only its kind if it is a collection."""
+    """Return a value's text as in YAML, for messages; for a collection only its kind and size or keys."""
     if isinstance(value, bool | None):
         return {True: "true", False: "false", None: "nothing"}[value]
     if isinstance(value, Mapping):
@@ -108,7 +108,7 @@ def in_yaml(value: Any) -> str:
 
 
 def _said_by(error: ValueError) -> str:
-    """Return the language's message about a text in the file, with the place inside that text in words."""
+    """Return the parser's message about a text in the data, with line and column inside this text."""
     cause = error.__cause__
     if not isinstance(cause, InputError):
         return str(error)
@@ -118,9 +118,9 @@ def _said_by(error: ValueError) -> str:
 
 
 def _follow(loc: _Location, data: Any, schema: _Schema) -> tuple[FormPath, list[_Schema]]:
-    """Follow a pydantic location: return the data's keys along it, and the schemas at its end.
+    """Follow a pydantic location; return its path in the data and the schemas that describe the part at the path.
 
-    In a tagged union of the schema, the location's next element is the tag of a member instead of a key.
+    At a tagged union of the schema, the next element of the location is a member's tag instead of a key.
     """
     path: list[str | int] = []
     nodes = [schema]
@@ -131,7 +131,7 @@ def _follow(loc: _Location, data: Any, schema: _Schema) -> tuple[FormPath, list[
             continue
         if isinstance(data, list | tuple):
             data = dict(enumerate(data))
-        # The model keeps the keys of cases as text; in the file they may be numbers and truth values.
+        # The model stores the keys of `cases` as text; in the file these keys may be numbers and truth values.
         for key in data if isinstance(data, Mapping) else ():
             if element in {key, in_yaml(key)}:
                 data = data[key]
@@ -142,7 +142,7 @@ def _follow(loc: _Location, data: Any, schema: _Schema) -> tuple[FormPath, list[
 
 
 def _tagged(members: list[_Schema], tag: str, schema: _Schema) -> list[_Schema]:
-    """Return the members with that tag, by distinctive key or beginning of name; all if none matches."""
+    """Return the members whose distinctive key is the tag or whose title begins with the tag; all if none matches."""
     resolved = [_resolved(member, schema) for member in members]
     return [
         form for form in resolved if tag in form.get("properties", {}) or form["title"].lower().startswith(tag)
@@ -162,7 +162,7 @@ def _alternatives(node: _Schema, schema: _Schema) -> list[_Schema]:
 
 
 def _into(node: _Schema, element: str | int, schema: _Schema) -> list[_Schema]:
-    """Return the schemas one step further; none if the element is not a key."""
+    """Return the schemas of the part at a key or position; an empty list if the schema has no such part."""
     further = []
     for one in _alternatives(node, schema):
         if element in one.get("properties", {}):

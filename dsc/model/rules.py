@@ -1,4 +1,4 @@
-"""Contingency rules and event handlers: reactions of a plot besides its transitions (S1.4, S1.14)."""
+"""Contingency rules and event handlers: reactions of a plot in addition to its transitions (S1.4, S1.14)."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ RESPONSES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "after": (CONTINUE, RETRY, REPLAN, GIVE_UP),
     }
 )
-"""Responses besides a named state, by the place of the rule; the first is the default."""
+"""Continuations that need no named state, by the place of the rule; the first one is the default."""
 
 STEP = "step."
-"""Prefix of a step's arguments in rules: `?step.item`."""
+"""Prefix with which a rule reads a step's argument, e.g. `?step.item`."""
 
 Names = Annotated[tuple[str, ...], BeforeValidator(as_tuple)]
 Command = Annotated[
     Annotated[Configure, Tag("set")] | Annotated[Switch, Tag("switch")] | Annotated[Send, Tag("send")],
     by_key("set", "switch", "send"),
 ]
-"""A one-way command to a component."""
+"""A command to a component, without a result."""
 Commands = Annotated[tuple[Command, ...], BeforeValidator(as_tuple)]
 
 
 class Reaction(Frozen):
-    """Actions in answer to an event.
+    """Actions that a rule or handler executes, in the order of the attributes.
 
     Attributes:
-        tell: change the knowledge base first.
-        command: then configure components, switch them, send them messages.
-        use, arguments: then run this plot.
+        tell: change of the knowledge base.
+        command: commands to components: set a parameter, switch a mode, send a message.
+        use, arguments: name of the plot to run, and values for its parameters (`with`).
     """
 
     tell: EffectField | None = None
@@ -52,19 +52,19 @@ class Reaction(Frozen):
 
     @property
     def acts(self) -> bool:
-        """Return whether it needs a state."""
+        """Whether the reaction needs a state, because it has commands or runs a plot."""
         return bool(self.command or self.use)
 
 
 class Response(Reaction):
-    """A rule's answer to an outcome event, or before or after a step.
+    """The response of a rule: actions and a continuation.
 
     Attributes:
-        then: the continuation, regardless of the used plot's outcome; see `Rule.then` for the default. `retry` enters
-            the step again and chooses among its candidates. `continue` treats the step as done. `enter` enters the step
-            after a `before`. `replan` and `give_up` concern the plan. Any other word names a state of the plot.
-        passed: arguments (`pass`) for the step or state that is entered then, over its own `with`.
-        limit: upper bound of this rule's answers for one state while its plot is active.
+        then: the continuation, independent of the used plot's outcome; see `Rule.then` for the default. `retry` enters
+            the step again, which chooses among its candidates. `continue` treats the step as done. `enter` enters the
+            step after a `before` rule. `replan` and `give_up` concern the plan. Any other word is a state's name.
+        passed: arguments for the step or state that is entered next (`pass`); they override that state's `with`.
+        limit: upper bound of this rule's responses for one state while the plot is active; `None` means the default.
     """
 
     then: str | None = None
@@ -73,17 +73,17 @@ class Response(Reaction):
 
 
 class Rule(Frozen):
-    """A contingency rule: the plot that holds a state answers for it (S1.4).
+    """A contingency rule: a plot's response to an outcome event of a step, or before or after a step (S1.4).
 
-    A step is a state that holds another plot. A rule names it by its name, or by the planning action that all its
-    possible plots implement. Where steps are named, `?step.item` reads a step's argument.
+    A step is a state that contains another plot. A rule refers to a step by the state's name, or by the planning action
+    that all possible plots of the step implement. If the rule refers to steps, `?step.item` reads a step's argument.
 
     Attributes:
-        on: the outcome event of a step to answer.
-        before, after: the steps for an insertion before or after; a `before` rule may skip them.
+        on: outcome event of a step.
+        before, after: steps before or after which the response is inserted; a `before` rule may skip the step.
         when: condition over the event's attributes, the step's arguments and the knowledge base.
-        of: with `on`, only for these steps; empty means any.
-        do: the response.
+        of: steps to which an `on` rule applies; empty means all steps.
+        do: response of the rule.
     """
 
     on: str | None = None
@@ -105,49 +105,50 @@ class Rule(Frozen):
 
     @property
     def place(self) -> str:
-        """The place of its answer: `on`, `before` or `after`."""
+        """The place of the rule: `on`, `before` or `after`."""
         return next(key for key in RESPONSES if getattr(self, key))
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """The steps it names; an empty tuple means any."""
+        """The steps to which the rule applies; empty means all steps."""
         return self.of or self.before or self.after
 
     @property
     def then(self) -> str:
-        """The continuation: the written one, or the default for its place."""
+        """The continuation: the written one, or the default for the rule's place."""
         return self.do.then or RESPONSES[self.place][0]
 
     @property
     def leads_away(self) -> bool:
-        """Return whether a named state follows: a plan has no such state, so the rule leaves the plan."""
+        """Whether the continuation is a named state; a plan has no such state, so the rule leaves the plan."""
         return self.then not in RESPONSES[self.place]
 
     @property
     def outcome(self) -> str:
-        """The outcome with which it leaves a plan; its attributes are the arguments for the state that follows."""
+        """The outcome event with which the rule leaves a plan; it carries the arguments for the named state."""
         return f"{LED_AWAY}{self.then}" + (f"({','.join(sorted(self.do.passed))})" if self.do.passed else "")
 
     @property
     def label(self) -> str:
-        """A short name: the place and the response, e.g. `grasp_failed: reposition, retry`."""
+        """A short name of the rule: the place and the response, e.g. `grasp_failed: reposition, retry`."""
         about = self.on or f"{self.place} {', '.join(self.steps)}"
         then = None if self.then == RESPONSES[self.place][0] and self.on is None and self.do.acts else self.then
         return f"{about}: " + ", ".join(part for part in (self.do.use, then) if part)
 
 
 class Handler(Frozen):
-    """An event handler: the answer to an event at any time while the plot is active (S1.14).
+    """An event handler: a plot's response to an event at any time while the plot is active (S1.14).
 
-    A rule answers the outcome of a step and decides the continuation. A handler always returns to the interrupted
-    activity.
+    A rule responds to the outcome of a step and decides the continuation. A handler decides none: after an interrupting
+    handler, the interrupted state is entered again.
 
     Attributes:
-        on: the event: one that the plot `receives`, that a part of it fires, or that `listen` activates.
-        listen: activates a component's event while the plot is active.
+        on: name of an event that the plot `receives`, that a part of the plot fires, or that `listen` activates.
+        listen: action that activates a component's event while the plot is active.
         when: condition over the event's attributes, the plot's variables and the knowledge base.
-        interrupt: whether the present activity is exited and afterwards entered again; if not, both run in parallel.
-        do: the answer.
+        interrupt: whether the active state is exited and afterwards entered again; if not, the handler runs in
+            parallel.
+        do: actions of the handler.
     """
 
     on: str
@@ -158,5 +159,5 @@ class Handler(Frozen):
 
     @property
     def label(self) -> str:
-        """A short name: the event and the used plot, e.g. `handler low_bat: announce`."""
+        """A short name of the handler: the event and the used plot, e.g. `handler low_bat: announce`."""
         return f"handler {self.on}" + (f": {self.do.use}" if self.do.use else "")

@@ -1,4 +1,4 @@
-"""The kinds of states and connectors; a distinctive key such as `use` or `states` determines the kind."""
+"""States and connectors; a distinctive key, e.g. `use` or `states`, determines the kind of a state."""
 
 from __future__ import annotations
 
@@ -28,18 +28,19 @@ Actions = Annotated[tuple[Action, ...], BeforeValidator(as_tuple)]
 
 
 class State(TransitionSource):
-    """A simple state: a configuration of the skill layer, set in entry and reverted by exit (S0.15).
+    """A simple state: entry configures the skill layer, and exit reverts this configuration (S0.15).
 
     Attributes:
-        entry, exit, on_break: external actions; in dialect `scxml` internal ones too. `on_break` replaces `exit` when
-            the state is interrupted, which is an exit by another state's transition (S2.3). Without `on_break`,
-            `exit` runs then too.
-        at_least: seconds before the state's own transitions are enabled (S3.1). Until then an event for one of them is
-            kept, and then offered again. The upper bound is `after`.
-        on: event -> transitions, tried in order; `done` is the completion of the state's content.
-        after: timeouts.
-        every: periodic reactions while the state is active (S3.2).
-        always: transitions without trigger, taken as soon as their guard holds.
+        entry: external actions on entry; in dialect `scxml` also internal ones.
+        exit: actions on exit, of the same kinds.
+        on_break: actions on interruption, an exit by the transition of another state (S2.3). They replace `exit`; if
+            `on_break` is empty, `exit` is executed.
+        at_least: seconds after entry before the state's own transitions are enabled (S3.1). An event for these
+            transitions is kept, and is handled after this time. The upper bound is `after`.
+        on: transitions by event, tried in order; the event `done` reports the completion of the state's content.
+        after: transitions that a timer triggers after the entry.
+        every: transitions that a periodic timer triggers while the state is active (S3.2).
+        always: transitions without trigger, taken as soon as their guard is true.
     """
 
     entry: Actions = ()
@@ -52,13 +53,13 @@ class State(TransitionSource):
     always: Transitions = ()
 
     def blocks(self) -> Iterator[tuple[str, Actions]]:
-        """Yield its actions with their keys."""
+        """Yield each sequence of actions with its key, e.g. `entry`."""
         yield "entry", self.entry
         yield "exit", self.exit
         yield "on_break", self.on_break
 
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
-        """Yield every outgoing transition, with its path, e.g. `("on", "grasped", 0)`, and the label of its trigger."""
+        """Yield path, trigger and transition of each outgoing transition; a path is e.g. `("on", "grasped", 0)`."""
         for event, transitions in self.on.items():
             for number, transition in enumerate(transitions):
                 yield ("on", event, number), event, transition
@@ -70,7 +71,7 @@ class State(TransitionSource):
             yield ("always", number), "always", transition
 
     def redirected(self, change: Redirect) -> Self:
-        """See `TransitionSource`."""
+        """Return the state with changed transitions; see `TransitionSource`."""
         return self.model_copy(update={
             "on": {event: redirected(ways, change) for event, ways in self.on.items()},
             "after": redirected(self.after, change),
@@ -80,25 +81,25 @@ class State(TransitionSource):
 
 
 class CompositeState(State):
-    """States grouped for common transitions, without a separate scope of names (S0.2)."""
+    """A group of states with common transitions; state names stay unique in the whole plot (S0.2)."""
 
     states: dict[str, AnyState] = Field(min_length=1)
     initial: str | None = None
 
 
 class Region(Frozen):
-    """One of several parallel control flows (S0.3)."""
+    """One of several parallel control flows of an orthogonal state (S0.3)."""
 
     states: dict[str, AnyState] = Field(min_length=1)
     initial: str | None = None
 
 
 class OrthogonalState(State):
-    """Regions that are active together; the state is done when each has reached its final state.
+    """A state with regions that are active together; it is done when each region has reached a final state.
 
     Attributes:
-        regions: the regions by name.
-        connectors: histories of the whole (only in dialect `scxml`).
+        regions: regions by name.
+        connectors: history states of the whole orthogonal state, by name (only in dialect `scxml`).
     """
 
     regions: dict[str, Region] = Field(min_length=1)
@@ -108,7 +109,7 @@ class OrthogonalState(State):
 class SubmachineState(State):
     """A state whose content is another plot, used as a black box (S0.1, S0.2).
 
-    `use` names a plot of the library, or a variable (`?plan`) that holds a plot as a value.
+    `use` is the name of a plot in the library, or a variable (`?plan`) whose value is a plot as data.
     """
 
     use: str
@@ -116,21 +117,26 @@ class SubmachineState(State):
 
 
 class Budget(Frozen):
-    """Bounds of planning for one dynamic state: replans after the first plan, seconds for each search."""
+    """Bounds of planning for one dynamic state.
+
+    Attributes:
+        replans: largest number of new plans after the first plan.
+        seconds: longest time of each search.
+    """
 
     replans: int = Field(default=8, ge=0, strict=True)
     seconds: float = Field(default=10.0, gt=0, strict=True)
 
 
 class DynamicState(State):
-    """An empty hull that chooses its content on entry (S0.4), and may request it from a planner (S0.12).
+    """A state that chooses its content on its entry (S0.4), and may request the content from a planner (S0.12).
 
     Attributes:
-        dynamic: names of candidate plots in order of preference; each carries its own `when`.
+        dynamic: names of candidate plots, in order of preference; each candidate declares its condition in `when`.
         arguments: values for the candidates' parameters (`with`).
-        goal: the planning goal; planned for when no candidate fits. It adds the outcomes `no_plan` and `gave_up`, which
-            must be wired.
-        budget: bounds for planning.
+        goal: planning goal; if no candidate fits, a plan for the goal is made. The goal adds the outcomes `no_plan` and
+            `gave_up`, which the chart must handle.
+        budget: bounds of planning.
     """
 
     dynamic: tuple[str, ...] = ()
@@ -140,9 +146,9 @@ class DynamicState(State):
 
 
 class FinalState(Frozen):
-    """The end of its region or plot; its entry completes the state around it (S0.11, S2.2).
+    """The end of a region, composite state or plot; its entry completes the surrounding state (S0.11, S2.2).
 
-    `entry` holds internal actions, and only in dialect `scxml`.
+    `entry` is allowed only in dialect `scxml`, and contains internal actions.
     """
 
     about: str | None = None
@@ -153,13 +159,15 @@ class FinalState(Frozen):
 
 
 class HistoryState(Frozen):
-    """Stands for the states that were active at the last exit of the state around (SCXML 3.10; dialect `scxml` only).
+    """A history: represents the states that were active at the last exit from its parent (SCXML 3.10).
+
+    Histories exist only in dialect `scxml`.
 
     Attributes:
-        history: `shallow` remembers the states directly inside, `deep` the innermost ones. The content of a submachine
-            or dynamic state is not remembered: such a state starts again.
-        target: the state to enter (`to`) if the state around was never exited.
-        do: internal actions of that default.
+        history: `shallow` remembers the states directly inside, `deep` the innermost states. The content of a
+            submachine or dynamic state is not remembered: this content starts from the beginning.
+        target: name of the state to enter if the parent was never exited (`to`).
+        do: internal actions that precede the entry of `target`.
     """
 
     about: str | None = None

@@ -1,6 +1,6 @@
-"""Transitions, under the keys that name their triggers, and connectors.
+"""Transitions and connectors.
 
-Connectors are pseudostates that select a transition by conditions or by a value (S3.1). No connector is ever active.
+A connector is a pseudostate that selects a transition by conditions or by a value (S3.1). It is never active.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from knowledge_base.spelling import TRUTH_VALUES, is_number
 
 
 def as_tuple(value: Any) -> Any:
-    """Return a list unchanged, anything else as the only element: the short form of lists of one."""
+    """Return a list as a tuple, and any other value as a tuple of one, because a list of one has a short form."""
     return tuple(value) if isinstance(value, list | tuple) else (value,)
 
 
@@ -33,25 +33,26 @@ def _a_duration(value: Term) -> Term:
 
 
 Duration = Annotated[TermField, AfterValidator(_a_duration)]
-"""Seconds; a constant is a number of at least 0."""
+"""Field type of a time in seconds; a constant must be a number of at least 0."""
 
 
 class Transition(Frozen):
-    """An edge of the chart; the key around it names its trigger.
+    """A transition; the key under which it is written determines its trigger.
 
     Attributes:
-        target: name of the state to enter (`to`); without one, only the actions run.
-        guard: condition that must hold (`when`).
-        assign, tell, emit, arguments: internal actions in this order, written directly; `arguments` (`with`) are the
-            attributes of the emitted event.
-        do: more internal actions, before those.
-        passed: arguments (`pass`) for the plot of the target state, over its own `with` (S2.1). Event attributes and
-            this plot's parameters and variables are the sources.
-        clear: states whose histories are cleared; `*` after a name includes all levels below. These are Harel's
-            clear-history(state) and clear-history(state*); only in dialect `scxml`.
-        rule: label of the contingency rule that created the transition.
-        also: more targets, in other regions (only in dialect `scxml`).
-        internal: a composite source stays active if the target is inside it (SCXML 3.5; only in dialect `scxml`).
+        target: name of the state to enter (`to`); `None` means that only the actions are executed.
+        guard: condition that must be true (`when`).
+        assign, tell, emit, arguments: internal actions without a list, executed in this order; `arguments` (`with`) are
+            the attributes of the emitted event.
+        do: further internal actions, executed before `assign`, `tell` and `emit`.
+        passed: arguments for the plot inside the target state (`pass`); they override that state's `with` (S2.1). They
+            may read event attributes and this plot's parameters and variables.
+        clear: names of states whose histories are cleared; `*` after a name includes the histories of all inner states.
+            These are Harel's clear-history(state) and clear-history(state*); only in dialect `scxml`.
+        rule: label of the contingency rule whose expansion made the transition; `None` for any other transition.
+        also: names of further targets, in other regions (only in dialect `scxml`).
+        internal: whether a composite source stays active if the target is inside the source (SCXML 3.5; only in
+            dialect `scxml`).
     """
 
     target: str | None = Field(default=None, alias="to")
@@ -69,7 +70,7 @@ class Transition(Frozen):
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """All states to enter."""
+        """Names of all target states; empty without `target`."""
         if self.target is None:
             return ()
         return (self.target, *self.also) if self.also else (self.target,)
@@ -90,19 +91,22 @@ class Transition(Frozen):
 
     @property
     def emitted(self) -> tuple[str, ...]:
-        """The events that its actions fire."""
+        """Names of the events that the actions of the transition fire."""
         effect = self.effect  # most transitions have none, and large plots have many transitions
         return tuple(action.emit for action in flat(effect) if isinstance(action, Emit)) if effect else ()
 
 
 class TimedTransition(Transition):
-    """A transition taken `seconds` after the entry of its state, unless the state was exited before."""
+    """A transition that is taken `seconds` after the entry of its source, unless the source is exited earlier."""
 
     seconds: Duration
 
 
 class CyclicTransition(TimedTransition):
-    """A transition taken every `seconds` while its state is active (S3.2); 0 seconds would never end a macrostep."""
+    """A transition that is taken every `seconds` while its source is active (S3.2).
+
+    A period of 0 seconds is refused, because its macrostep would never end.
+    """
 
     @field_validator("seconds")
     @classmethod
@@ -113,7 +117,7 @@ class CyclicTransition(TimedTransition):
 
 
 def as_transition(value: Any) -> Any:
-    """Return a transition, or the name of its target: the short form."""
+    """Return the written form of a transition; a string is the short form, the name of the target."""
     return {"to": value} if isinstance(value, str) else value
 
 
@@ -127,39 +131,39 @@ CyclicTransitions = Annotated[tuple[CyclicTransition, ...], BeforeValidator(as_t
 
 
 Redirect = Callable[[Transition], Mapping[str, object]]
-"""Returns the new values of a transition's fields; nothing for a transition that stays."""
+"""Function that returns the new values of a transition's fields; an empty mapping leaves the transition unchanged."""
 
 
 def redirected(ways: Iterable[Transition], change: Redirect) -> tuple[Transition, ...]:
-    """Return changed transitions of the same kinds, e.g. timed ones."""
+    """Return the transitions with the fields that `change` returns; each transition keeps its class."""
     return tuple(way.model_copy(update=fields) if (fields := change(way)) else way for way in ways)
 
 
 class TransitionSource(Frozen):
-    """The source of transitions: a state or a connector."""
+    """A source of transitions: a state or a connector."""
 
     about: str | None = None
 
     @abstractmethod
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
-        """Yield every outgoing transition in order, with its path inside the source and the label of its trigger."""
+        """Yield path inside the source, label of the trigger and transition of each outgoing transition, in order."""
 
     @abstractmethod
     def redirected(self, change: Redirect) -> Self:
-        """Return the source with changed transitions."""
+        """Return the source with the transition fields that `change` returns."""
 
     def transitions(self) -> Iterator[tuple[str, Transition]]:
-        """Yield every outgoing transition with the label of its trigger."""
+        """Yield label of the trigger and transition of each outgoing transition, in order."""
         for _, trigger, transition in self.placed_transitions():
             yield trigger, transition
 
 
 CHOICE = "choice"
-"""Label of the transitions of connectors, which have no trigger."""
+"""Label in place of a trigger for the transitions of connectors."""
 
 
 class Connector(TransitionSource):
-    """A pseudostate on the way to a state; its transitions are tried in order, and the last one always holds."""
+    """A pseudostate that selects the first transition whose guard is true; the last transition has no guard."""
 
     @model_validator(mode="after")
     def _leads_on(self) -> Connector:
@@ -171,17 +175,17 @@ class Connector(TransitionSource):
 
 
 class ChoiceState(Connector):
-    """Selects by conditions: `choice: [{when: G, to: a}, z]`; the last branch has no `when`."""
+    """A connector that selects by conditions: `choice: [{when: G, to: a}, z]`; the last branch has no `when`."""
 
     choice: Transitions = Field(min_length=1)
 
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
-        """Yield the branches in order; paths are `("choice", number)`."""
+        """Yield the branches in order, with the paths `("choice", number)`."""
         for number, branch in enumerate(self.choice):
             yield ("choice", number), CHOICE, branch
 
     def redirected(self, change: Redirect) -> Self:
-        """See `TransitionSource`."""
+        """Return the connector with changed transitions; see `TransitionSource`."""
         return self.model_copy(update={"choice": redirected(self.choice, change)})
 
 
@@ -189,13 +193,13 @@ def _as_cases(value: Any) -> Any:
     if not isinstance(value, Mapping):
         return value
     cases = {_case_text(key): as_transition(case) for key, case in value.items()}
-    if len(set(map(case_value, cases))) < len(value):  # to Python and YAML, 1 and true are the same key
+    if len(set(map(case_value, cases))) < len(value):  # in Python and YAML, 1 and true are equal keys
         raise ValueError(f"two cases have the same value; found {', '.join(map(str, value))}")
     return cases
 
 
 def _case_text(key: Any) -> str:
-    """Return the key as text, with one spelling for each number, so that writing and reading keep the plot equal."""
+    """Return a key of `cases` as text; each number has one spelling, so that a written and read plot stays equal."""
     if isinstance(key, bool):
         return "true" if key else "false"
     if isinstance(key, str) and not is_number(key):
@@ -207,7 +211,7 @@ def _case_text(key: Any) -> str:
 
 
 def case_value(key: str) -> Value:
-    """Return the constant of a case's key: `1` a number, `true` a truth value, `"1"` and `cup` texts."""
+    """Return the constant for a key of `cases`: number for `1`, truth value for `true`, text for `"1"` or `cup`."""
     if is_number(key):
         return _number(key)
     quoted = len(key) > 1 and key[0] == key[-1] == '"'
@@ -216,19 +220,19 @@ def case_value(key: str) -> Value:
 
 def _number(text: str) -> int | float:
     try:
-        return int(text)  # a large one has more digits than a float can hold
+        return int(text)  # a float would lose digits of a large whole number
     except ValueError:
         number = float(text)
     return int(number) if number.is_integer() else number
 
 
 class SelectState(Connector):
-    """Selects by value: `select: ?event.kind`, `cases: {cup: wash, can: throw}`, `else: ask`.
+    """A connector that selects by value: `select: ?event.kind`, `cases: {cup: wash, can: throw}`, `else: ask`.
 
     Attributes:
-        select: the value to compare.
-        cases: constant -> transition. Keys are kept as text, the only kind in JSON; `case_value` reads them. A `when`
-            in a case must hold as well.
+        select: the term whose value is compared with the cases.
+        cases: transitions by constant. The model stores the constants as text, because JSON allows no other keys;
+            `case_value` returns the constant. A `when` in a case must be true as well.
         otherwise: the transition for all other values (`else`).
     """
 
@@ -237,16 +241,16 @@ class SelectState(Connector):
     otherwise: Annotated[Transition, BeforeValidator(as_transition)] = Field(alias="else")
 
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
-        """Yield the cases as guarded transitions, then the rest; paths are `("cases", key)` and `("else",)`."""
+        """Yield the cases as guarded transitions, then `otherwise`; the paths are `("cases", key)` and `("else",)`."""
         for key, case in self.cases.items():
             value = case_value(key)
-            # YAML reads a whole number or a truth value as a key of that type.
+            # In YAML, a key that is a whole number or a truth value has this type.
             place = value if isinstance(value, int) else key
             yield ("cases", place), CHOICE, self._guarded(value, case)
         yield ("else",), CHOICE, self.otherwise
 
     def redirected(self, change: Redirect) -> Self:
-        """See `TransitionSource`."""
+        """Return the connector with changed transitions; see `TransitionSource`."""
         *cases, otherwise = redirected((*self.cases.values(), self.otherwise), change)
         return self.model_copy(update={"cases": dict(zip(self.cases, cases, strict=True)), "otherwise": otherwise})
 
