@@ -1,1 +1,1 @@
-"""Kept runs: one transaction a macrostep in the file of the knowledge, with everything that a restart needs."""
+"""Kept runs: one transaction per macrostep in the file of the knowledge, with every value that a restart needs."""

@@ -1,4 +1,4 @@
-"""`RunArchive` reads the runs of a store as values, also while a writer appends."""
+"""Read access to the runs of a store, as values, also while a writer appends (`RunArchive`)."""
 
 from __future__ import annotations
 
@@ -29,15 +29,17 @@ class RunRow:
     """A run in a store.
 
     Attributes:
-        number: the first is 1.
-        plot, arguments: the plot that the run executes, and its arguments.
-        version: that of the knowledge at the beginning.
+        number: the run's number; the first run is 1.
+        plot: name of the plot that the run executes.
+        arguments: arguments of that plot.
+        version: version of the knowledge at the beginning of the run.
         header: plain data of the run's program.
-        plots: the hashes of all plots of its library by name.
-        domain: other things that plots rely on, as text by name.
-        ended: its end (`finished`, `problem`); `None` while it has none.
-        first, last: its macrosteps follow place `first`, up to place `last`.
-        digest: digest of its row.
+        plots: hashes of all plots of the run's library, by name.
+        domain: other definitions that plots depend on, as text by name.
+        ended: the end of the run (`finished`, `problem`); `None` before the end.
+        first: place in the table `steps` before the run's first macrostep.
+        last: place of the run's last macrostep.
+        digest: digest of the run's row.
     """
 
     number: int
@@ -58,13 +60,14 @@ class StepRow:
     """A macrostep of a run.
 
     Attributes:
-        number: the first is 1.
+        number: the macrostep's number in the run; the first is 1.
         time: seconds of run time.
-        before, version: those of the knowledge, before and after it.
-        serials: the last serial number that was given out.
-        message: the message that it took, as `encoding.message_form`; the first macrostep is the start.
-        configuration: paths of the active states after it.
-        records: of the trace, since the macrostep before.
+        before: version of the knowledge before the macrostep.
+        version: version of the knowledge after the macrostep.
+        serials: the last serial number that the run has used.
+        message: the handled message, as from `encoding.message_form`; empty for the start and the end of the run.
+        configuration: paths of the active states after the macrostep.
+        records: trace records since the macrostep before.
     """
 
     number: int
@@ -78,7 +81,7 @@ class StepRow:
 
 
 class _StoredStep(NamedTuple):
-    """The row of a macrostep as stored; `made` is the digest of its version in the knowledge's own tables."""
+    """The row of a macrostep as stored; `made` is the digest of its version in the tables of the knowledge."""
 
     place: int
     run: int
@@ -97,9 +100,10 @@ class _StoredStep(NamedTuple):
 
 
 class RunArchive:
-    """The runs of a store, for readers; use it inside `archive`.
+    """The runs of a store, for readers; use the archive inside a block of `archive`.
 
-    It checks each row of runs and macrosteps by its digest. Methods raise `DamagedStoreError`, which names the row.
+    The archive checks each row of runs and macrosteps by its digest. For a row that differs, methods raise
+    `DamagedStoreError` with the row's name.
     """
 
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
@@ -110,13 +114,13 @@ class RunArchive:
         self._worlds: dict[int, bytes] | None = None
 
     def runs(self) -> list[RunRow]:
-        """All runs in order; read once."""
+        """Return all runs in order; the table is read only at the first call."""
         if self._runs is None:
             self._runs = self._read_runs()
         return list(self._runs)
 
     def run(self, number: int | None = None) -> RunRow:
-        """The run of that number, or the last one; raises `StoreError` if it is missing."""
+        """Return the run of that number, or the last run; raise `StoreError` if it is missing."""
         found = self.runs()
         for one in reversed(found):
             if number in (None, one.number):
@@ -125,38 +129,41 @@ class RunArchive:
         raise StoreError(f"there is no run {number or 1}; {there}", place=Place(str(self.path)))
 
     def steps(self, run: int) -> Iterator[StepRow]:
-        """The macrosteps of a run, in order."""
+        """Iterate over the macrosteps of a run, in order."""
         return map(_step, self._steps(run))
 
     def last(self, run: int) -> StepRow:
-        """The last macrostep of a run."""
+        """Return the last macrostep of a run."""
         return _step(next(self._latest_steps(run)))
 
     def records(self, run: int, after: int = 0) -> Iterator[Record]:
-        """The kept trace records of a run, in order; only those with a higher number than `after`."""
+        """Iterate over the kept trace records of a run, in order, from the record after number `after`."""
         for _, line in self.lines(run):
             if (record := Record.from_line(line)).seq > after:
                 yield record
 
     def lines(self, run: int, since: int = 0) -> Iterator[tuple[int, str]]:
-        """The lines of a run's trace from the macrostep at place `since` of the file on, each with its place there."""
+        """Iterate over the lines of a run's trace, each with the place of its macrostep in the table `steps`.
+
+        Lines of macrosteps before place `since` are skipped.
+        """
         return ((row.place, line) for row in self._steps(run, since) for line in row.records.split("\n") if line)
 
     def latest_snapshot(self) -> RunSnapshot:
-        """The snapshot after the last macrostep of all runs."""
+        """Return the snapshot after the last macrostep of the last run."""
         return latest_snapshot(step.change for step in self._latest_steps(self.run().number))
 
     def under_way(self) -> list[tuple[Start, float]]:
-        """The skills of the unfinished run that have not ended, with the second at which they were started."""
+        """Return the skills of the unfinished run that have not ended, each with its start in seconds of run time."""
         rows = [SnapshotRow(*row) for _, row in sorted(self.latest_snapshot().pending.items())]
         return [(Start(**row.what), row.at) for row in rows if row.kind == Start.__name__ and not row.cancelled]
 
     def serials_before(self, run: int) -> int:
-        """The last serial number given out before a run: no two runs of a store have an action id in common."""
+        """Return the last serial number that the earlier runs have used, so that all action ids in a store differ."""
         return self.last(run - 1).serials if run > 1 else 0
 
     def form(self, digest: str) -> Any:
-        """The plot of that hash, as data; always the same object."""
+        """Return the plot of that hash, as data; repeated calls return one object."""
         if digest not in self._forms:
             row = self.connection.execute("SELECT form FROM forms WHERE hash = ?", (digest,)).fetchone()
             if row is None or hashlib.sha256(str(row[0]).encode()).hexdigest() != digest:
@@ -165,7 +172,7 @@ class RunArchive:
         return self._forms[digest]
 
     def require_all(self) -> list[RunRow]:
-        """Read every row; all runs.
+        """Read and check every row; return all runs.
 
         Raises:
             DamagedStoreError: a row differs from the written one.
@@ -178,7 +185,7 @@ class RunArchive:
         return self.runs()
 
     def _steps(self, number: int, since: int = 0) -> Iterator[_StoredStep]:
-        """The macrosteps of a run in order, from place `since` of the file on."""
+        """Yield the macrosteps of a run in order, from place `since` in the table `steps` on."""
         run = self._with_steps(number)
         place = max(run.first, since - 1)
         digest: object = run.digest
@@ -194,7 +201,7 @@ class RunArchive:
             raise damaged(self.path, f"macrostep {place + 1 - run.first} of run {number} is missing")
 
     def _latest_steps(self, number: int) -> Iterator[_StoredStep]:
-        """The macrosteps of a run, the last one first."""
+        """Yield the macrosteps of a run, the last one first."""
         run = self._with_steps(number)
         rows = self.connection.execute(
             f"{_STEPS} WHERE place > ? AND place <= ? ORDER BY place DESC", (run.first, run.last)
@@ -254,7 +261,7 @@ class RunArchive:
             if self._worlds is None:
                 self._worlds = dict(self.connection.execute("SELECT version, head FROM snapshots").fetchall())
             made = self._worlds.get(row.version)
-            if made is None and row.version < min(self._worlds, default=0):  # forgotten since
+            if made is None and row.version < min(self._worlds, default=0):  # its version was forgotten since
                 return
         if made != row.knowledge:
             raise damaged(self.path, f"version {row.version} of the knowledge is not the one after {name}")
@@ -262,11 +269,12 @@ class RunArchive:
 
 @contextmanager
 def archive(path: Path, *, again: bool = False) -> Iterator[RunArchive]:
-    """Read a store's runs as they are now; later writes are not seen.
+    """Open a store's runs in their present state; later writes are not visible.
 
     Args:
         path: the store.
-        again: whether its pages were read before; else all pages of a store that is not closed are checked.
+        again: whether the store's pages were checked before. Otherwise, all pages of a store that was not closed are
+            checked.
 
     Raises:
         StoreError: the file is missing, not a store, damaged, or cannot be read.
@@ -282,12 +290,12 @@ def archive(path: Path, *, again: bool = False) -> Iterator[RunArchive]:
 def records_of(
     path: Path | str, run: int | None = None, after: int = 0
 ) -> tuple[Mapping[str, Any], tuple[Record, ...]]:
-    """Header and records of a kept run so far, as its trace file would have them; also during the run.
+    """Return header and records of a kept run, as in a trace file; during the run, the records so far.
 
     Args:
         path: the store, which is only read.
-        run: its number; the last one by default.
-        after: number of the last record that is not wanted.
+        run: the run's number; by default the last run.
+        after: number of the last record to skip.
 
     Raises:
         StoreError: the file is missing, not a store, or has no such run.
@@ -298,7 +306,7 @@ def records_of(
 
 
 def has_run(path: Path) -> bool:
-    """Whether a run was begun in that file; raises `StoreError` if it is there and no store, or damaged."""
+    """Return whether the file has a run; raise `StoreError` if the file exists and is damaged or not a store."""
     if not is_there(place := located(path)):
         return False
     with reading(place) as connection:
@@ -306,7 +314,7 @@ def has_run(path: Path) -> bool:
 
 
 def is_unfinished(path: Path) -> bool:
-    """Whether a run was begun in that file that has not come to its end; raises `StoreError` as `has_run`."""
+    """Return whether the file has an unfinished run; errors equal those of `has_run`."""
     if not has_run(path):
         return False
     with archive(path) as runs:
@@ -314,7 +322,7 @@ def is_unfinished(path: Path) -> bool:
 
 
 def unfinished(runs: RunArchive) -> RunRow:
-    """The run that has not come to its end; raises `StoreError` if there is none."""
+    """Return the unfinished run; raise `StoreError` if there is none."""
     for run in reversed(runs.runs()):
         if run.ended is None:
             return run

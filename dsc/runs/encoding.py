@@ -1,7 +1,7 @@
-"""Messages, pending items and frames of a machine as plain JSON values, and back.
+"""Encoding of messages, pending items and frames of a machine as plain JSON values, and their decoding.
 
-A plot that is a value (a plan, in a variable or an attribute) is long and recurs. It is kept once, by
-its hash, with `{"$form": hash}` in its place.
+A plot that is a value (e.g. a plan, in a variable or an attribute) is long and occurs repeatedly. So it is stored one
+time, by its hash; `{"$form": hash}` replaces each occurrence.
 """
 
 from __future__ import annotations
@@ -28,8 +28,10 @@ from dsc.runs.tables import Form
 from knowledge_base.exchange import delta_form, delta_of
 
 Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode | SendMessage
-"""Pending items: a restart needs them. A parameter or mode is in effect until it is set again; a message is pending
-until the component has taken it."""
+"""Pending items, which a restart needs.
+
+A parameter or mode is effective until it is set again. A message is pending until the component has received it.
+"""
 
 _BY_HASH = "$form"
 _MOST_REMEMBERED = 256
@@ -38,27 +40,27 @@ _EVERYBODY = [Event._field_defaults[name] for name in _VISIBILITY]
 
 
 class Shortener:
-    """Replaces plots by hashes; `put` receives each new plot as text."""
+    """Function that replaces plots by hashes; `put` receives the hash and text of each new plot."""
 
     def __init__(self, put: Callable[[str, str], None]) -> None:
         self._put = put
-        self._known: dict[int, tuple[Any, str]] = {}  # by identity; the value is kept, so that none takes its place
+        self._known: dict[int, tuple[Any, str]] = {}  # by identity; the kept value prevents a reuse of its id
 
     def __call__(self, values: Mapping[str, Any]) -> Form:
-        """The values, with hashes in the places of plots."""
+        """Return the values, with plots replaced by hashes."""
         return {name: self.short(value) if isinstance(value, dict) else value for name, value in values.items()}
 
     def short(self, value: Any) -> Any:
-        """The hash of a plot, any other value unchanged."""
+        """Return the hash form of a plot, or any other value unchanged."""
         if not isinstance(value, Mapping) or not ({"plot", "states"} <= value.keys() or _BY_HASH in value):
             return value
         return {_BY_HASH: self.hash(value)}
 
     def hash(self, value: Mapping[str, Any]) -> str:
-        """Store a plot; its hash."""
+        """Store a plot, and return its hash."""
         known = self._known.get(id(value))
         if known is None:
-            text = json.dumps(value)  # the order of states counts
+            text = json.dumps(value)  # the order of states is significant
             known = value, hashlib.sha256(text.encode()).hexdigest()
             self._put(known[1], text)
             if len(self._known) >= _MOST_REMEMBERED:
@@ -68,7 +70,7 @@ class Shortener:
 
 
 def full(values: Mapping[str, Any], form: Callable[[str], Any]) -> Form:
-    """The inverse of `Shortener`; `form` finds the plot of a hash."""
+    """Return the values with hashes replaced by plots; `form` returns the plot of a hash."""
     return {name: _full(value, form) for name, value in values.items()}
 
 
@@ -80,7 +82,7 @@ def _full(value: Any, form: Callable[[str], Any]) -> Any:
 
 
 def message_form(message: Message, short: Shortener) -> Form:
-    """A message; a skill's refers to the action by its id."""
+    """Return a message as plain data; a skill's message refers to its action by the id."""
     match message:
         case Event() | KnowledgeMessage() | ParameterMessage():
             return _outside_form(message, short)
@@ -98,7 +100,7 @@ def message_form(message: Message, short: Shortener) -> Form:
 
 
 def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Callable[[str], Any]) -> Message:
-    """The inverse of `message_form`; `action` finds the start of an id."""
+    """Return the message of a form from `message_form`; `action` returns the start of an action id."""
     match form:
         case {"action": action_id}:
             outcome = Outcome(form["outcome"], full(form["attributes"], find), delta_of(form["observed"]))
@@ -134,7 +136,7 @@ def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOuts
 
 
 def awaited_form(what: Awaited, short: Shortener) -> Form:
-    """A pending item."""
+    """Return a pending item as plain data."""
     match what:
         case Start():
             return _plain(what) | {"arguments": short(what.arguments), "names": dict(what.names)}
@@ -150,7 +152,7 @@ def awaited_form(what: Awaited, short: Shortener) -> Form:
 
 
 def awaited_of(kind: str, form: Mapping[str, Any], find: Callable[[str], Any]) -> Awaited:
-    """The inverse of `awaited_form`; `kind` is the name of its class."""
+    """Return the pending item of a form from `awaited_form`; `kind` is the name of the item's class."""
     match kind:
         case "Start":
             return Start(**{**form, "arguments": full(form["arguments"], find)})
@@ -174,7 +176,7 @@ def _later_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> SendLater:
 
 
 def _event_form(event: Event, short: Shortener) -> Form:
-    """Omits defaults: most events have only a name."""
+    """Return an event as plain data without default values, as most events have only a name."""
     name, attributes, *visibility = event
     form: Form = {"name": name}
     if attributes:
@@ -189,12 +191,12 @@ def _event_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> Event:
 
 
 def events_form(events: Iterable[Event], short: Shortener) -> list[Form]:
-    """Several events."""
+    """Return events as plain data."""
     return [_event_form(event, short) for event in events]
 
 
 def events_of(forms: Iterable[Mapping[str, Any]], find: Callable[[str], Any]) -> tuple[Event, ...]:
-    """The inverse of `events_form`."""
+    """Return the events of forms from `events_form`."""
     return tuple([_event_of(form, find) for form in forms])
 
 
@@ -202,7 +204,7 @@ def events_of(forms: Iterable[Mapping[str, Any]], find: Callable[[str], Any]) ->
 
 
 def frame_news(before: FrameState | None, frame: FrameState, short: Shortener) -> Form:
-    """The change of a frame, or all of it if there was none; frames inside are named by their numbers."""
+    """Return the change of a frame, or the whole frame if it is new; its child frames appear as serial numbers."""
     if before is None or before.compiled is not frame.compiled:
         return {
             **frame._replace(children=NOTHING).to_json(),
@@ -213,7 +215,7 @@ def frame_news(before: FrameState | None, frame: FrameState, short: Shortener) -
     news: Form = {}
     if frame.configuration is not before.configuration:
         news.update(frame.configuration.form)
-    if frame.variables is not before.variables:  # 1 and 1.0 are equal, and not the same
+    if frame.variables is not before.variables:  # 1 and 1.0 are equal, but not identical
         news["variables"] = short(frame.variables)
     if frame.activations is not before.activations and frame.activations != before.activations:
         news["activations"] = dict(frame.activations)
@@ -225,7 +227,7 @@ def frame_news(before: FrameState | None, frame: FrameState, short: Shortener) -
 
 
 def frame_form(serial: int, frames: Mapping[int, Form], find: Callable[[str], Any]) -> Form:
-    """The frame of that number with all frames inside, as `FrameState.to_json` gives it."""
+    """Return the frame with that serial number and all frames inside it, in the form of `FrameState.to_json`."""
     form = dict(frames[serial])
     form["children"] = {host: frame_form(child, frames, find) for host, child in form["children"].items()}
     form["form"] = _full(form["form"], find)
@@ -238,5 +240,5 @@ def _inside(frame: FrameState) -> dict[str, int]:
 
 
 def _plain(value: Any) -> Form:
-    """A frozen dataclass of plain fields; `asdict` copies deeply, which is slower."""
+    """Return a frozen dataclass of plain fields as a mapping; `asdict` would copy deeply, which is slower."""
     return {name: getattr(value, name) for name in value.__dataclass_fields__}

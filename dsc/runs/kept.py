@@ -1,4 +1,4 @@
-"""A kept run as a restart resumes it, if the plots and the domain are those with which it began."""
+"""Kept runs in the form that a restart resumes, and the check that plots and domain are unchanged."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from knowledge_base.errors import Place
 
 @dataclass(frozen=True, slots=True)
 class Pending:
-    """A pending item: an action, timer or message without its end yet, or a parameter or mode in effect.
+    """A pending item: an unfinished action, a timer, a message, or an effective parameter or mode.
 
     Attributes:
-        place: of the row.
-        what: the output of the machine that asked for it, or a message from outside with a later time.
-        step: number of the macrostep that asked.
-        at: second of run time at which a skill was started, or at which another item is due.
-        reports: number of intermediate events of a skill so far; of a parameter or mode, 1 once it is in effect.
+        place: the item's number in `RunSnapshot.pending`.
+        what: the output of the machine that requested the item, or a scheduled message from outside.
+        step: number of the macrostep that requested the item.
+        at: second of run time at which a skill was started, or for which another item is scheduled.
+        reports: number of a skill's intermediate events so far; for a parameter or mode, 1 as soon as it is effective.
         cause: number of the trace record about a skill's start.
         cancelled: whether the last macrostep has cancelled the skill.
     """
@@ -48,14 +48,17 @@ class Kept:
     """A run after its last macrostep.
 
     Attributes:
-        run: its row, with plot and arguments.
-        number: that of the macrostep.
-        time: its second of run time.
-        state: of the machine.
-        emitted, in_vain, problem, settings: as of `Reactor`.
-        pending: in the order in which it was asked for.
-        memory: of components, by name.
-        records: of the trace, so far.
+        run: the run's row, with plot and arguments.
+        number: number of the last macrostep.
+        time: second of run time of the last macrostep.
+        state: state of the machine.
+        emitted: as in `Reactor`.
+        in_vain: as in `Reactor`.
+        problem: as in `Reactor`.
+        settings: the values of `Reactor.settings`.
+        pending: pending items, in the order of their requests.
+        memory: memories of components, by component name.
+        records: trace records so far.
     """
 
     run: RunRow
@@ -72,15 +75,15 @@ class Kept:
 
     @property
     def last_record(self) -> int:
-        """Number of the last kept record."""
+        """Number of the last kept record; 0 without records."""
         return self.records[-1].seq if self.records else 0
 
 
 def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
-    """The unfinished run after its last kept macrostep.
+    """Return the unfinished run after its last kept macrostep.
 
     Raises:
-        UnknownNameError: the library lacks one of the plots, or a plot one of the states.
+        UnknownNameError: the library lacks a plot, or a plot lacks a state.
         DamagedStoreError: the run differs from the written one.
     """
     find = runs.form
@@ -110,14 +113,14 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
 
 
 def require_unchanged(runs: RunArchive, run: RunRow, library: Library, domain: Mapping[str, str]) -> None:
-    """Raise `ChangedError` if a plot, or another thing that plots rely on, has changed since the run began."""
+    """Raise `ChangedError` if a plot, or a definition that plots depend on, has changed since the run began."""
     found = [*_changed_plots(runs, run, library), *_changed_statements(run.domain, domain)]
     if found:
         raise ChangedError(found, place=Place(str(runs.path)))
 
 
 def plots_of(runs: RunArchive, run: RunRow) -> Library:
-    """The plots with which the run was begun."""
+    """Return the plots with which the run began."""
     return Library(ActionPlot.model_validate(runs.form(digest)) for digest in run.plots.values())
 
 

@@ -1,4 +1,4 @@
-"""`RunState` holds every value that a restart needs; each macrostep writes its change of them."""
+"""State of a run: every value that a restart needs; each macrostep writes its change (`RunState`)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from dsc.runs.tables import Form, SnapshotRow
 from dsc.trace import text_of
 
 _Key = tuple[str, str]
-"""Kind and name of something pending."""
+"""Kind and name of a pending item."""
 
 
 class ReactorState(Protocol):
@@ -38,8 +38,8 @@ class ReactorState(Protocol):
         machine: the chart's state.
         emitted: outcome events of the plot so far.
         in_vain: periods without any effect since the last other message.
-        problem: the reason for which the run cannot continue, if any.
-        settings: parameters of plots that an operator has set, by plot and parameter.
+        problem: the reason why the run cannot continue, or `None`.
+        settings: an operator's settings of plot parameters, by plot and parameter.
         caused_by: numbers of the trace records about started skills, by action id.
     """
 
@@ -52,30 +52,30 @@ class ReactorState(Protocol):
 
 
 class RunState:
-    """Frames, pending actions and timers, and parameters and modes in effect.
+    """Frames, pending actions and timers, and effective parameters and modes.
 
     Args:
-        short: stores each plot once, and puts its hash in its place.
+        short: stores each plot one time, and replaces it by its hash.
     """
 
     def __init__(self, short: Shortener) -> None:
         self._short = short
         self._frames: dict[int, FrameState] = {}
         self._root: FrameState | None = None
-        self._remembered: tuple[Any, ...] = ()  # by the reactor
+        self._remembered: tuple[Any, ...] = ()  # values of the reactor
         self._rows: dict[int, SnapshotRow] = {}  # pending items by place; the earliest first
         self._places: dict[_Key, list[int]] = {}  # the earliest first
         self._activations: dict[int, set[_Key]] = {}
         self._cancelled: list[int] = []  # places of items that the last macrostep cancelled
         self._in_effect: dict[_Key, int] = {}  # places of parameters and modes
-        self._outbox: dict[int, Told] = {}  # by place: commands that a component may not have taken
+        self._outbox: dict[int, Told] = {}  # by place: commands that a component may not have received
         self._last_place = 0
         self._memories: dict[str, str] = {}
         self._reactor: Form = {}
         self._news: Form = {}
 
     def restore(self, kept: Kept) -> None:
-        """Take over the state of a kept run."""
+        """Load the state of a kept run."""
         self._root = kept.state.root
         self._frames = _by_serial(self._root)
         self.remember(kept.memory.items())
@@ -91,12 +91,12 @@ class RunState:
                 self._cancelled += self._places.pop(_key(one.what))
 
     def update(self, reactor: ReactorState) -> None:
-        """Note the machine's frames and the other state of the reactor after a macrostep."""
+        """Store the machine's frames and the other state of the reactor after a macrostep."""
         state = reactor.machine.state
         if state.root is not self._root:
             self._update_frames(state.root)
         serial = None if state.root is None else state.root.serial
-        # Most events change none of this; of outcome events there are only ever more.
+        # Most events change none of these values; the list of outcome events only grows.
         settings = reactor.settings.values()
         typed = tuple([(one, type(one.value)) for one in settings]) if settings else ()  # 1 and 1.0 are equal
         remembered = (
@@ -107,14 +107,17 @@ class RunState:
             self._reactor = self._news["reactor"] = _reactor_form(reactor, self._short)
 
     def remember(self, memories: Iterable[tuple[str, Any]]) -> None:
-        """Note the memories of components by name; as text, since a component may change the object later."""
+        """Store the memories of components by name, as text, since a component may change the object later."""
         for component, memory in memories:
             text = text_of(memory)
             if self._memories.get(component) != text:
                 self._memories[component] = self._news.setdefault("memory", {})[component] = text
 
     def change(self, *, whole: bool = False) -> str:
-        """The change since the last call as a line of JSON, or with `whole` the whole state; empty without a change."""
+        """Return the change since the last call as a line of JSON; empty without a change.
+
+        With `whole`, return the whole state instead.
+        """
         news, self._news = self._news, {}
         if whole:
             frames = {serial: frame_news(None, frame, self._short) for serial, frame in self._frames.items()}
@@ -123,7 +126,7 @@ class RunState:
         return f"{text_of(news)}\n" if news else ""
 
     def take(self, message: Message) -> None:
-        """Drop the pending item that the message ends, or count a report of it."""
+        """Remove the pending item that the message ends, or count a report of it."""
         match message:
             case Event():  # no pending item waits for it
                 pass
@@ -139,7 +142,7 @@ class RunState:
                 self._forget(_key(message), 1)
 
     def dispatched(self, under_way: Collection[Told], refused: Collection[Told] = ()) -> None:
-        """Note that earlier commands have left; components took all but `under_way` and `refused`."""
+        """Register that earlier commands were received, except those in `under_way` and `refused`."""
         for place in self._cancelled:
             self._drop_row(place)
         self._cancelled.clear()
@@ -148,7 +151,7 @@ class RunState:
                 del self._outbox[place]
                 if any(told is one for one in refused):
                     self._drop_row(place)
-                    if self._in_effect.get(_key(told)) == place:  # again, after a restart
+                    if self._in_effect.get(_key(told)) == place:  # the command was repeated after a restart
                         del self._in_effect[_key(told)]
                 elif isinstance(told, SendMessage):
                     self._drop_row(place)
@@ -156,7 +159,7 @@ class RunState:
                     self._put_in_effect(_key(told), place)
 
     def ask(self, output: Iterable[Output], step: int, now: float, reactor: ReactorState) -> None:
-        """Note the actions, timers and commands that a macrostep starts or cancels."""
+        """Store the actions, timers and commands that a macrostep starts, and remove or mark those that it cancels."""
         for one in output:
             match one:
                 case Start():
@@ -210,7 +213,7 @@ class RunState:
             self._activations.setdefault(what.activation, set()).add(key)
 
     def _cancel(self, key: _Key) -> None:
-        """Drop a timer; keep a cancelled action, since a restart may have to cancel it again."""
+        """Remove a timer; keep a cancelled action, since a restart may have to cancel it again."""
         if key[0] != Start.__name__:
             self._forget(key)
             return
@@ -219,17 +222,17 @@ class RunState:
             self._cancelled.append(place)
 
     def _put_in_effect(self, key: _Key, place: int) -> None:
-        """A component took the command: it replaces the one in effect before."""
+        """Register that a component received the command, which replaces the one effective before."""
         before = self._in_effect.get(key)
         self._in_effect[key] = place
-        if before == place:  # sent again after a restart
+        if before == place:  # repeated after a restart
             return
         if before is not None:
             self._drop_row(before)
         self._put_row(place, self._rows[place]._replace(reports=1))
 
     def _forget(self, key: _Key, most: int | None = None) -> None:
-        """Drop the pending items of that key, or only the earliest `most`."""
+        """Remove the pending items of that key, or only the earliest `most`."""
         places = self._places.pop(key, [])
         if most is not None and places[most:]:
             self._places[key] = places[most:]
@@ -256,7 +259,7 @@ def _reactor_form(reactor: ReactorState, short: Shortener) -> Form:
 
 
 def _key(what: Awaited) -> _Key:
-    """Kind and name of a pending item; only repeated `SendLater` of a chart share a key."""
+    """Return kind and name of a pending item; only a chart's repeated `SendLater` share a key."""
     match what:
         case Start():
             name = what.action_id
@@ -268,8 +271,8 @@ def _key(what: Awaited) -> _Key:
             name = str(what.number)
         case SetParameter():
             name = f"{what.component} {what.parameter}"
-        case SwitchMode():  # life and mode are in effect together
+        case SwitchMode():  # life cycle state and mode are effective together
             name = f"{what.component} {'life' if what.mode in (Life.INIT, Life.SHUTDOWN) else 'mode'}"
-        case SendMessage():  # each item by itself
+        case SendMessage():  # each item separately
             name = f"{what.component} {what.port}"
     return type(what).__name__, name

@@ -1,6 +1,6 @@
-"""A run in the file of its knowledge: one transaction a macrostep, with everything that a restart needs.
+"""Store of a run in the file of its knowledge: one transaction per macrostep, with every value that a restart needs.
 
-`RunWriter` has the transactions, with a fence against a second writer, and listeners at their boundaries.
+`RunWriter` provides the transactions, a fence against a second writer, and listeners at the boundaries of transactions.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from knowledge_base.journal.integrity import NOTHING, Tip, link, put_ends
 from knowledge_base.store import KnowledgeBase
 
 WHOLE_EVERY = 256
-"""Macrosteps from one that writes the whole state to the next: a restart reads at most as many."""
+"""Number of macrosteps between two that write the whole state; a restart reads at most this number."""
 _RIGHT = "SELECT 1 FROM fence WHERE epoch = ?"
 _STEP = "INSERT INTO steps SELECT NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM fence WHERE epoch = ?"
 _LAST = """SELECT run, number, time, before, version, serials, message, configuration, change, records, knowledge,
@@ -39,24 +39,28 @@ _BEGIN = """INSERT INTO runs (run, plot, arguments, version, header, plots, doma
     VALUES (?, ?, ?, ?, ?, ?, ?, ?)"""
 _END = "UPDATE runs SET ended = ?, steps = ?, seal = ? WHERE run = ?"
 Boundary = Literal["before commit", "after commit"]
-"""Points at which a crash makes a difference: nothing of the macrostep is kept, or none of its actions has left."""
+"""Points at which a crash makes a difference.
+
+Before the commit, nothing of the macrostep is stored. After the commit, none of its actions is dispatched yet.
+"""
 
 
 class RunWriter:
-    """A context manager for one transaction after the other; a new writer takes the right of all earlier ones away.
+    """Context manager for consecutive transactions; a new writer revokes the right of all earlier writers.
 
     Args:
         knowledge: the knowledge base of the run, opened at `path`.
-        path: its file.
+        path: the file of the knowledge base.
 
     Attributes:
-        connection: to write with, inside; call `require_right` before other writes than a macrostep.
+        connection: the connection for writes inside the block. Call `require_right` before writes other than a
+            macrostep.
         before: version of the knowledge when the transaction began.
         begun: whether a transaction was committed.
-        lost: whether a write failed: memory is ahead of the file.
+        lost: whether a write failed, so that memory has changes that the file lacks.
 
     Raises:
-        StoreError: on entering or leaving, the file cannot be written.
+        StoreError: the file cannot be written, at the beginning or the end of the block.
     """
 
     def __init__(self, knowledge: KnowledgeBase, path: Path) -> None:
@@ -69,7 +73,7 @@ class RunWriter:
         self._listeners: list[Callable[[Boundary], None]] = []
         self._together = knowledge.together()
         with self._together as self.connection:
-            self._cursor = self.connection.cursor()  # `Connection.execute` makes one each time
+            self._cursor = self.connection.cursor()  # `Connection.execute` creates one at each call
             if not require_tables_of_runs(self.connection, path):
                 for statement in TABLES.values():
                     self.connection.execute(statement)
@@ -80,7 +84,7 @@ class RunWriter:
             self.connection.execute("INSERT INTO fence VALUES (?, ?)", (self._epoch, FORMAT))
 
     def listen(self, listener: Callable[[Boundary], None]) -> None:
-        """Call `listener` before and after each commit from now on."""
+        """Call `listener` before and after each later commit."""
         self._listeners.append(listener)
 
     def __enter__(self) -> None:
@@ -106,12 +110,12 @@ class RunWriter:
                 listener("after commit")
 
     def require_right(self) -> None:
-        """Raise `StoreError` if another sequencer has taken the run over."""
+        """Raise `StoreError` if another sequencer owns the run."""
         if self.connection.execute(_RIGHT, (self._epoch,)).fetchone() is None:
             raise self._taken_over()
 
     def begin(self, *row: Any) -> int:
-        """Write the row of a run without its number, and return that; errors as for `require_right`."""
+        """Write the row of a run without its number, and return the number; errors equal those of `require_right`."""
         self.require_right()
         last, seal = self.connection.execute(_SEAL).fetchone() or (0, NOTHING)
         self._digest = link(seal, last + 1, *row)
@@ -120,7 +124,7 @@ class RunWriter:
         return int(last) + 1
 
     def step(self, *row: Any) -> None:
-        """Write the row of a macrostep without its place; errors as for `require_right`, which it includes."""
+        """Write the row of a macrostep without its place; check the right, with the errors of `require_right`."""
         knowledge = self._knowledge.digest
         before = (self._digest or self._continued()) + knowledge
         digest = link(before, *row)
@@ -130,7 +134,7 @@ class RunWriter:
         self._digest = digest
 
     def more(self, change: str = "", records: str = "") -> None:
-        """Add to the last macrostep; errors as for `require_right`."""
+        """Append to the row of the last macrostep; errors equal those of `require_right`."""
         self.require_right()
         self._digest = self._digest or self._continued()
         before, row = self._last
@@ -140,7 +144,7 @@ class RunWriter:
         self._last = before, row
 
     def end(self, run: int, ended: str, records: str) -> None:
-        """Write the end of a run, with the last records; errors as for `require_right`."""
+        """Write the end of a run, with the last records; errors equal those of `require_right`."""
         self.more(records=records)
         (steps,) = self.connection.execute("SELECT max(place) FROM steps").fetchone()
         seal = link(self._digest, steps, ended)
@@ -148,7 +152,7 @@ class RunWriter:
         put_ends(self.connection, [(CHAIN, Tip(steps, seal))])
 
     def _continued(self) -> bytes:
-        """The digest of the last macrostep, which an earlier process has written."""
+        """Return the digest of the last macrostep, which an earlier process has written."""
         *row, knowledge, place = self.connection.execute(_LAST).fetchone()
         (before,) = self.connection.execute(_BEFORE, (place - 1, row[0], row[0])).fetchone()
         self._last = before + knowledge, tuple(row)
@@ -167,17 +171,17 @@ class RunWriter:
 
 
 class RunStore:
-    """Keeps one run of one sequencer; methods that write are called inside `with store.writing`.
+    """Store of one run of one sequencer; call the writing methods inside `with store.writing`.
 
     Args:
         knowledge: the knowledge base of the run, opened at `path`.
-        path: its file.
+        path: the file of the knowledge base.
         header: plain data of the run's program.
-        domain: other things that plots rely on, as text by name ("planning action 'go'").
+        domain: other definitions that plots depend on, as text by name ("planning action 'go'").
 
     Attributes:
         writing: one transaction, `with store.writing`, for the knowledge and for the methods below.
-        hear: takes a record of the trace, to be kept with the next macrostep.
+        hear: receives a record of the trace, which is written with the next macrostep.
         last_late: the highest number of a pending `LateMessage`.
 
     Raises:
@@ -205,22 +209,22 @@ class RunStore:
 
     @property
     def begun(self) -> bool:
-        """Whether a run is kept here."""
+        """Whether this store has begun or resumed a run."""
         return self.writing.begun
 
     @property
     def lost(self) -> bool:
-        """Whether a write failed: memory is ahead of the file."""
+        """Whether a write failed, so that memory has changes that the file lacks."""
         return self.writing.lost
 
     def begin(self, plot: str, arguments: Mapping[str, Any], library: Library) -> int:
         """Begin a new run with the present knowledge.
 
         Returns:
-            The last serial number that earlier runs have given out.
+            The last serial number that earlier runs have used.
 
         Raises:
-            StoreError: another run is unfinished.
+            StoreError: another run is unfinished, or the file cannot be written.
         """
         self.writing.require_right()
         (open_runs,) = self.writing.connection.execute("SELECT count(*) FROM runs WHERE ended IS NULL").fetchone()
@@ -238,9 +242,9 @@ class RunStore:
         return serials
 
     def late(self, late: LateMessage, due: float) -> None:
-        """Keep a message from outside that comes at second `due` of run time."""
+        """Store a message from outside that is scheduled for second `due` of run time."""
         self._state.put(late, self._number, due)
-        if self._number:  # else it goes with the first macrostep
+        if self._number:  # else it is written with the first macrostep
             self.writing.more(change=self._state.change())
 
     def step(
@@ -253,16 +257,16 @@ class RunStore:
         refused: Collection[Told] = (),
         memories: Iterable[tuple[str, Any]] = (),
     ) -> None:
-        """Keep a macrostep; `message` is `None` for the start of the plot and for leaving it.
+        """Write a macrostep.
 
         Args:
             now: second of run time.
-            message: the message that it took.
-            output: its actions, for after the commit.
-            reactor: its state after the macrostep.
-            under_way: earlier commands that components have not taken yet.
-            refused: earlier commands that components did not take.
-            memories: of components, by name.
+            message: the handled message; `None` for entering and for leaving the plot.
+            output: the macrostep's actions, which are dispatched after the commit.
+            reactor: the reactor's state after the macrostep.
+            under_way: earlier commands that components have neither received nor refused yet.
+            refused: earlier commands that components refused.
+            memories: memories of components, by component name.
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
@@ -278,18 +282,18 @@ class RunStore:
             self._run, self._number, float(now), self.writing.before, version, state.serials, text_of(form),
             _paths_text(state.configuration()), change, self._new_records(),
         )  # fmt: skip
-        self.writing.before = version  # the next macrostep may be part of the same transaction
+        self.writing.before = version  # the next macrostep may be part of this transaction
 
     def end(self, *, finished: bool, problem: str | None) -> None:
-        """Keep the end of the run."""
+        """Write the end of the run."""
         self.writing.end(self._run, text_of({"finished": finished, "problem": problem}), self._new_records())
 
     def take_up(self, library: Library) -> Kept:
-        """Load the unfinished run, to be resumed; call it outside `writing`.
+        """Load the unfinished run, to be resumed; call this method outside of `writing`.
 
         Raises:
-            StoreError: there is none, or it cannot be read.
-            ChangedError: the plots or the domain are not those with which it was begun.
+            StoreError: there is no unfinished run, or it cannot be read.
+            ChangedError: the plots or the domain differ from those with which the run began.
         """
         with archive(self.path, again=True) as runs:  # the knowledge was opened before
             run = unfinished(runs)
@@ -303,7 +307,7 @@ class RunStore:
         return kept
 
     def _new_records(self) -> str:
-        """The records since the last call, one a line."""
+        """Return the lines of the records since the last call."""
         lines = [record.to_line() for record in self._records]
         self._records.clear()
         return "\n".join(lines) + "\n" if lines else ""
@@ -314,5 +318,5 @@ class RunStore:
 
 @lru_cache(maxsize=256)
 def _paths_text(configuration: tuple[str, ...]) -> str:
-    """Cached: most runs come back to the same few configurations."""
+    """Return the paths as text; cached, as most runs return to a few configurations."""
     return text_of(configuration)

@@ -1,15 +1,15 @@
-"""Rows of runs in the file of a knowledge store: the tables, their format, and the changes in their rows.
+"""Tables of runs in the file of a knowledge store: their format, and the changes in their rows.
 
-`runs` holds a row a run; `steps` a row a macrostep: its message, its change of the state, its trace records. `forms`
-holds plots by hash; `fence` names the writer. A commit writes whole pages, so a macrostep is one row of one table,
-without an index.
+Table `runs` has a row for each run. Table `steps` has a row for each macrostep: its message, its change of the state,
+its trace records. Table `forms` has plots by hash, and table `fence` has the writer's epoch. A commit writes whole
+pages, so a macrostep is one row of one table, without an index.
 
-Runs and macrosteps are one chain of digests (`journal.integrity`). A run's row follows the end of the run before
-(`seal`); its macrosteps follow the row. Its end follows the last of them, whose place is in `steps`. A macrostep's
-`knowledge` is the digest of the version after it, so that runs and knowledge of two stores never fit.
+Runs and macrosteps form one chain of digests (`journal.integrity`). A run's row follows the end of the run before
+(`seal`), and its macrosteps follow the row. Its end follows the last macrostep, whose place is in column `steps`. A
+macrostep's `knowledge` is the digest of the version after it, so that runs and knowledge of two stores never match.
 
-A macrostep writes its change of the state as a line of JSON. Periodically it writes the whole state (`whole`), which
-bounds the rows that a reader needs.
+A macrostep writes its change of the state as a line of JSON. Periodically, it writes the whole state (`whole`), which
+bounds the number of rows that a reader needs.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ TABLES = {
     "fence": "CREATE TABLE fence (epoch INTEGER NOT NULL, format INTEGER NOT NULL)",
 }
 FORMAT = 4
-"""Of these tables; the first had no number."""
+"""Format number of these tables; the first format had no number."""
 CHAIN = "steps"
 """Name of the chain of runs and macrosteps in the store's table of ends."""
 Form = dict[str, Any]
 
 
 def require_tables_of_runs(connection: sqlite3.Connection, path: Path) -> bool:
-    """Whether the store has room for runs; raises `StoreError` if that is damaged or of another format."""
+    """Return whether the store has tables of runs; raise `StoreError` if they are damaged or have another format."""
     ends = Ends(connection, path)
     require_own_log(path, ends.identity)
     if CHAIN in ends.chains:
@@ -70,7 +70,7 @@ def _require_format(connection: sqlite3.Connection, path: Path) -> None:
 
 
 class SnapshotRow(NamedTuple):
-    """A pending item as plain data, see `encoding.Pending`."""
+    """A pending item as plain data, see `kept.Pending`."""
 
     kind: str
     step: int
@@ -86,10 +86,10 @@ class RunSnapshot:
     """State of a run, as plain data.
 
     Attributes:
-        reactor: its state besides the machine's frames.
-        frames: running plots by serial number, as `encoding.frame_news` gives them.
-        pending: pending items by number, as `SnapshotRow`.
-        memory: of components, as text by name.
+        reactor: state of the reactor besides the machine's frames.
+        frames: running plots by serial number, as `encoding.frame_news` returns them.
+        pending: pending items by place, as `SnapshotRow`.
+        memory: memories of components, as text by component name.
     """
 
     reactor: Form = field(default_factory=dict)
@@ -98,7 +98,7 @@ class RunSnapshot:
     memory: dict[str, str] = field(default_factory=dict)
 
     def apply(self, change: Form) -> None:
-        """Apply a change: new values, `None` for those that are gone."""
+        """Apply a change: new values, and `None` for removed ones."""
         if "reactor" in change:
             self.reactor = change["reactor"]
         for serial, news in change.get("frames", {}).items():
@@ -109,13 +109,16 @@ class RunSnapshot:
         self.memory.update(change.get("memory", {}))
         for place, row in change.get("pending", {}).items():
             if row is None:
-                self.pending.pop(int(place), None)  # it may have come and gone in one macrostep
+                self.pending.pop(int(place), None)  # it may have begun and ended in one macrostep
             else:
                 self.pending[int(place)] = row
 
 
 def latest_snapshot(latest_first: Iterable[str]) -> RunSnapshot:
-    """The snapshot after the first of these macrosteps, each lines of changes; reads no more than needed."""
+    """Return the snapshot after the first of these macrosteps, each given as its lines of changes.
+
+    Only the macrosteps back to the last whole state are read.
+    """
     needed: list[Form] = []
     for text in latest_first:
         changes = [json.loads(line) for line in text.split("\n") if line]
