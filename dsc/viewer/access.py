@@ -1,4 +1,4 @@
-"""Address of a page, and access to it: token, one-time code or cookie; other requests get `403` and a reason."""
+"""Address of a page, and access by token, one-time code or cookie; other requests receive `403` and a reason."""
 
 from __future__ import annotations
 
@@ -17,11 +17,14 @@ from knowledge_base.errors import InputError
 
 MUST_HAVE_ORIGIN = frozenset({"POST", "PUT", "PATCH", "DELETE"})
 CODE_LIFE_S = 60.0
-"""Seconds; enough for a browser that starts slowly."""
+"""Seconds for which the one-time code is valid, also for a browser that starts slowly."""
 COOKIE = "dsc-view-"
-"""Prefix of the cookie's name before the port: browsers share cookies among the ports of a machine."""
+"""Prefix of the cookie's name; the port follows, as browsers share cookies among the ports of a machine."""
 MOST_WRONG_CODES = 20
-"""Upper bound of wrong codes: restored tabs send codes of ended programs; more are guesses."""
+"""Number of wrong codes after which the code expires.
+
+Restored tabs send codes of ended programs; a larger number of wrong codes indicates guesses.
+"""
 MOST_PARAMETERS = 20
 MISSING = "the token is missing or wrong; open the address that was printed"
 USED = (
@@ -37,7 +40,7 @@ class PageAddress:
     Attributes:
         listening: the socket; early connections wait for the server.
         token: a key that opens the page any number of times.
-        code: a key that opens the page once, soon after the server's start.
+        code: a key that opens the page one time, soon after the server's start.
     """
 
     listening: socket.socket
@@ -46,10 +49,10 @@ class PageAddress:
 
     @classmethod
     def on(cls, port: int = 0) -> PageAddress:
-        """Listen on the port, with new keys; port 0 picks a free one.
+        """Listen on the port, with new keys; port 0 selects a free one.
 
         Raises:
-            InputError: another program listens there.
+            InputError: the port is in use, or this user may not listen on it.
         """
         made = socket.socket()
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -63,33 +66,33 @@ class PageAddress:
 
     @property
     def port(self) -> int:
-        """The port's number."""
+        """Number of the port."""
         number: int = self.listening.getsockname()[1]
         return number
 
     @property
     def url(self) -> str:
-        """The address for people; it works any number of times."""
+        """The address for people; it is valid any number of times."""
         return f"http://127.0.0.1:{self.port}/?token={self.token}"
 
     @property
     def one_time_url(self) -> str:
-        """The address for a browser's command line, which others can read: it works once."""
+        """The address for a browser's command line, which other users can read; it is valid one time."""
         return f"http://127.0.0.1:{self.port}/?code={self.code}"
 
 
 class Keys:
     """The keys of one page: a token for people and programs, a code for one browser, a cookie for every browser.
 
-    The code exists because every user of a machine can read its command lines, and a browser gets its address there.
+    The code exists because every user of a machine can read command lines, and a browser receives its address in one.
 
     Args:
-        token: opens any number of times.
-        code: opens once, within `CODE_LIFE_S` from now; `None` if no browser is opened.
+        token: opens the page any number of times.
+        code: opens the page one time, within `CODE_LIFE_S` from now; `None` if no browser is opened.
         now: returns the seconds of a monotonic clock.
 
     Attributes:
-        cookie: the value of the cookie; it opens any number of times, and differs from the token.
+        cookie: the value of the cookie, which differs from the token; it opens the page any number of times.
     """
 
     def __init__(self, token: str, code: str | None, now: Callable[[], float] = time.monotonic) -> None:
@@ -99,15 +102,15 @@ class Keys:
         self._wrong = 0
 
     def is_token(self, given: str) -> bool:
-        """Return whether this is the token."""
+        """Return whether `given` is the token."""
         return _same(given, self._token)
 
     def is_cookie(self, given: str) -> bool:
-        """Return whether this is the value of the cookie."""
+        """Return whether `given` is the value of the cookie."""
         return _same(given, self.cookie)
 
     def redeem(self, given: str) -> bool:
-        """Return whether this is the valid code; the code expires by use, and after too many wrong ones."""
+        """Return whether `given` is the valid code; the code expires by use, and after `MOST_WRONG_CODES` errors."""
         alive = self._code is not None and self._now() < self._ends
         right = _same(given, self._code or "") and alive
         self._wrong += not right
@@ -117,10 +120,10 @@ class Keys:
 
 
 class Access:
-    """Checks key, Host and Origin before an application, for HTTP and sockets alike.
+    """Check of key, Host and Origin before an application, for HTTP and WebSocket requests.
 
-    A foreign web page can make a browser send requests here, also under another host name (DNS rebinding). Host and
-    Origin are therefore checked besides the keys.
+    A foreign web page can make a browser send requests to this server, also under another host name (DNS rebinding).
+    Host and Origin are therefore checked besides the keys.
     """
 
     def __init__(self, app: ASGIApp, keys: Keys, port: int) -> None:
@@ -130,7 +133,7 @@ class Access:
         self._cookie = f"{COOKIE}{port}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass the request on, or refuse it."""
+        """Pass the request to the application, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -140,7 +143,7 @@ class Access:
         if reason is None:
             await self._app(scope, receive, self._with_headers(headers, send, with_cookie=not has_cookie))
         elif scope["type"] == "websocket":
-            await receive()  # the connect message; a close before the accept answers 403
+            await receive()  # the connect message; a close before the accept is answered by 403
             await send({"type": "websocket.close", "code": 1008, "reason": reason})
         else:
             await _refuse(send, reason)
@@ -206,7 +209,7 @@ def _parameters(scope: Scope) -> dict[str, list[str]]:
 
 
 def _same(given: str, wanted: str) -> bool:
-    """Compare in constant time, which hides the position of a difference."""
+    """Compare in constant time, so that the duration does not reveal the position of a difference."""
     return hmac.compare_digest(given.encode(errors="replace"), wanted.encode())
 
 

@@ -1,4 +1,4 @@
-"""Broadcast of records to browsers: rounds of at most 30 a second, each browser's socket at its own pace."""
+"""Broadcast of records to browsers: at most 30 rounds per second, each browser's socket at its own speed."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from dsc.viewer.records import MOST_RECORDS, RecordLog
 
 FORMAT = "dsc-view/1"
 UNSUPPORTED = 1003
-"""Close code of a socket after a message that the page protocol does not have."""
+"""Close code of a socket after a message that the page protocol does not define."""
 
 
 class BrowserStream:
-    """Sends records and status to one browser.
+    """Sender of records and status to one browser.
 
-    The stream reads records from the log when the socket has room for them, and sends only the latest status. A slow or
-    vanished browser therefore delays no other one.
+    The stream reads records from the log when the socket can send them, and sends only the latest status. So a slow or
+    vanished browser delays no other browser.
     """
 
     def __init__(self, socket: WebSocket, log: RecordLog, rounds: Broadcast, *, control: bool) -> None:
@@ -61,7 +61,7 @@ class BrowserStream:
             self._rounds.wake()
 
     def offer(self, status: dict[str, Any]) -> None:
-        """Start sending new records and the status, unless the last message is still in transit."""
+        """Start sending new records and the status, unless the last message is still being sent."""
         if self._sending is None and (news := self._news(status)):
             self._sending = asyncio.create_task(self._send(news))
             self._sending.add_done_callback(self._sent)
@@ -78,7 +78,7 @@ class BrowserStream:
     def _news(self, status: dict[str, Any]) -> list[str]:
         """Return the next messages; empty if nothing is new."""
         last = len(self._log)
-        # The records show the progress of the run, unless one message cannot carry all of them.
+        # The records show the progress of the run, unless one message cannot include all of them.
         behind = self._cursor is None or last - self._cursor >= MOST_RECORDS
         said = (status, last if behind else None)
         news = []
@@ -92,19 +92,19 @@ class BrowserStream:
 
 
 INTERVAL_S = 1 / 30
-"""Least time between two rounds of a live run; readers could not see more."""
+"""Minimum number of seconds between two rounds of a live run; people could not see more."""
 Sleep = Callable[[float], Awaitable[object]]
 
 
 class Served(Protocol):
-    """A browser's stream, which may still be busy with its last message."""
+    """A browser's stream, which may still be sending its last message."""
 
     def offer(self, status: dict[str, Any]) -> None:
-        """Start sending news; must not wait."""
+        """Start sending new records and the status; must not wait."""
 
 
 class Broadcast:
-    """Offers news to all browsers, at most 30 times a second during a live run.
+    """Offer of new records to all browsers, at most 30 times per second during a live run.
 
     Args:
         log: the records.
@@ -126,7 +126,7 @@ class Broadcast:
 
     @contextmanager
     def serving(self, one: Served) -> Iterator[None]:
-        """Offer news to this stream during the block; in the loop's thread, as `wake`."""
+        """Offer new records to this stream during the block; call it in the loop's thread, like `wake`."""
         self._served.append(one)
         if self._going is None:
             self._going = asyncio.create_task(self._go_on())
@@ -140,7 +140,7 @@ class Broadcast:
                 self._going = None
 
     def wake(self) -> None:
-        """Announce new records, or room in a socket."""
+        """Start a round, as there are new records, or a socket can send again."""
         self._more.set()
 
     async def _go_on(self) -> None:
@@ -162,10 +162,10 @@ class Broadcast:
             forget()
 
     async def _round(self) -> None:
-        """Serve browsers in sequence, spread over the interval, to bound the load on the processor."""
+        """Serve browsers in sequence, distributed over the interval, to bound the load on the processor."""
         served = tuple(self._served)
         status = {"type": "status", "live": self._log.live, **self._status()}
         for one in served:
-            if one in self._served:  # it may have left meanwhile
+            if one in self._served:  # the browser may have left meanwhile
                 one.offer(status)
             await self._sleep(INTERVAL_S / len(served) if self._log.live else 0)

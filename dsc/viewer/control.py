@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 AUTHOR = "viewer"
 MOST_SECONDS = 10
-"""Upper bound of a command's wait for the run, which may be computing."""
+"""Seconds that a command waits for the run at most, as the run may be computing."""
 MOST_WORK = 20_000
-"""Facts and objects that a browser's condition or effect may read: about 20 ms of the run's thread."""
+"""Number of facts and objects that a browser's condition or effect may read: about 20 ms of the run's thread."""
 MOST_STATEMENTS = 1000
 MOST_BREAKS = 50
-"""Upper bound: the run evaluates all breakpoints' conditions after every macrostep."""
+"""Maximum number of breakpoints, as the run evaluates all their conditions after every macrostep."""
 KINDS = ("state", "event", "condition", "plan_step")
 
 
@@ -39,27 +39,30 @@ class Hands(Protocol):
         """The reason of a pause, or `None`."""
 
     def obey(self, command: Mapping[str, Any]) -> dict[str, Any]:
-        """Execute a page's command; raise `InputError` for an invalid one."""
+        """Execute a page's command, and return its result; raise `InputError` for an invalid command."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Breakpoint:
-    """A condition for a pause: a state entered, an event taken, a condition true, or a plan's step begun."""
+    """A condition for a pause.
+
+    It is the entry of a state, the handling of an event, a condition that becomes true, or the start of a plan step.
+    """
 
     kind: str
     text: str
     condition: Expression | None = None
 
     def __str__(self) -> str:
-        """Return a short name: `state clear/execute`."""
+        """Return a short name, e.g. `state clear/execute`."""
         return f"{self.kind.replace('_', ' ')} {self.text}"
 
 
 class Control:
-    """Commands from the page's thread to a run in another; the run executes them before its next event.
+    """Commands from the page's thread to a run in another thread; the run executes them before its next event.
 
-    During a pause simulated time stops. Real time continues: skills run and timers expire, and the run takes their
+    During a pause, simulated time stops. Real time continues: skills run and timers expire, and the run handles their
     events after the pause.
     """
 
@@ -79,16 +82,16 @@ class Control:
         """The reason of a pause, or `None`."""
 
     def attach(self, sequencer: Sequencer) -> None:
-        """Attach to a run before its start, in the loop that calls this."""
+        """Attach to a run before its start; call this method in the run's loop."""
         self._sequencer, self._loop, self._go = sequencer, asyncio.get_running_loop(), asyncio.Event()
         sequencer.listen(self._after_step)
         sequencer.wait_before_events(self._before_event)
 
     def obey(self, command: Mapping[str, Any]) -> dict[str, Any]:
-        """Execute a page's command.
+        """Execute a page's command, and return its result.
 
         Raises:
-            InputError: it names an unknown element, or the run is over.
+            InputError: the command refers to an unknown element, or the run has ended.
         """
         verbs: dict[str, Callable[[Mapping[str, Any]], object]] = {
             "event": self._event, "tell": self._tell, "retract": self._tell, "set": self._set, "pause": self._pause,
@@ -122,7 +125,7 @@ class Control:
         if command["do"] == "tell":
             delta = told(statements, known, "FACT", Bounds(work=MOST_WORK))
         else:
-            delta = retracted(statements, known, "FACT")  # a statement retracts only the facts that it names
+            delta = retracted(statements, known, "FACT")  # a statement retracts only the facts that it states
         self._in_run(lambda run: run.change(delta, AUTHOR))
 
     def _set(self, command: Mapping[str, Any]) -> None:
@@ -169,7 +172,7 @@ class Control:
         return self._sequencer
 
     def _in_run(self, act: Callable[[Sequencer], None]) -> None:
-        """Let the run's own thread act; pass errors back to the page."""
+        """Execute `act` in the run's own thread; raise its errors in the page's thread."""
         run, loop = self._run(), self._loop
 
         async def acting() -> None:
@@ -197,7 +200,7 @@ class Control:
         for number, one in tuple(self._breaks.items()):
             try:
                 met = self._is_met(number, one, step)
-            except InputError as error:  # it has become too expensive, or names a removed element
+            except InputError as error:  # its condition has become too expensive, or reads a removed element
                 self._drop(number, f"{one}: {error}")
                 continue
             if met:
@@ -205,7 +208,7 @@ class Control:
                 self.paused = str(one)
 
     def _drop(self, number: int, why: str) -> None:
-        """Drop a breakpoint without a pause; the next command from the page gets the reason."""
+        """Drop a breakpoint without a pause; the result of the page's next command has the reason."""
         self._breaks.pop(number, None)
         self._was_true.discard(number)
         self._dropped = [*self._dropped, why][-MOST_BREAKS:]
@@ -226,7 +229,7 @@ class Control:
         return rose
 
     async def _before_event(self) -> None:
-        """Wait for the end of a pause."""
+        """Wait until a pause ends; return immediately without a pause."""
         if self._steps != 0 or self._go is None:
             return
         self.paused = self.paused or "on request"

@@ -1,4 +1,4 @@
-"""Page of a live run. A separate process serves it, so that the run only pays for the transfer of records."""
+"""Page of a live run, served by a separate process, so that the run only transfers its records."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ if TYPE_CHECKING:
 
 COMMAND = (sys.executable, "-P", "-m", "dsc.viewer.page_process")
 TELL_EVERY_S = 1 / 30
-"""Least time between two transfers of a run's lines: a page shows no more."""
+"""Minimum number of seconds between two transfers of a run's lines, as a page shows no more."""
 STOPPING_S = 5.0
 _NO_MORE = ""
 
 
 class LivePage:
-    """A live run in the browser: receives its records from the beginning, answers at `url` from `start` to `close`.
+    """Page of a live run in the browser: receives all records of the run, and answers at `url` from `start` to `close`.
 
-    The run's thread converts records to lines. Kept records would cost more, because the garbage collector would scan
-    them repeatedly. A separate thread writes the queued lines; the run never waits for the page.
+    The run's thread converts records to lines. Stored record objects would cost more, because the garbage collector
+    would scan them repeatedly. A separate thread writes the queued lines, so that the run never waits for the page.
 
     Args:
         first_line: the header of the run's trace.
-        entrance: the page's address; the page takes it over.
+        entrance: the page's address, whose socket this page then owns.
         control: whether the page may change the run.
 
     Attributes:
         control: the control to attach to the run; `None` for a read-only page.
         url: the address for people.
         one_time_url: the address for a browser's command line.
-        port: of the address.
+        port: the port of the address.
         token: the permanent key in the address for people.
     """
 
@@ -57,7 +57,7 @@ class LivePage:
         self._threads: list[Thread] = []
         self._gone = False
         socket = entrance.listening.fileno()
-        # Keys go through the pipe: every user of the machine can read command lines.
+        # Keys pass through the pipe: every user of the machine can read command lines.
         keys = {"token": entrance.token, "code": entrance.code}
         self._tell({"begin": first_line, "socket": socket, **keys, "control": control})
 
@@ -69,7 +69,7 @@ class LivePage:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             pass_fds=[socket.fileno()],
-            process_group=0,  # an interrupt from the terminal is for the run
+            process_group=0,  # an interrupt from the terminal is for the run only
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             encoding="utf-8",
             errors="backslashreplace",  # JSON escapes half a surrogate pair in just this form; UTF-8 cannot encode it
@@ -81,7 +81,7 @@ class LivePage:
             thread.start()
 
     def hear(self, record: Record) -> None:
-        """Receive a record; a `Listener` of a trace."""
+        """Queue a record for the page; the method is a `Listener` of a trace."""
         if not self._gone:
             self._lines.put(record.to_line())
 
@@ -90,12 +90,12 @@ class LivePage:
         self._tell({"end": True})
 
     def wait(self) -> None:
-        """Wait until the page is closed; an interrupt gets through."""
+        """Wait until the page is closed; a `KeyboardInterrupt` ends the wait."""
         if self._process is not None:
             self._process.wait()
 
     def close(self) -> None:
-        """Stop answering; the socket delivers all records, then its end informs the browsers."""
+        """Stop answering; all records are delivered, then the end of the socket notifies the browsers."""
         process, self._process = self._process, None
         if process is None:
             self._entrance.listening.close()
@@ -110,7 +110,7 @@ class LivePage:
             thread.join(STOPPING_S)
 
     def _tell(self, said: dict[str, Any]) -> None:
-        """Send a message other than a record; a record begins with its number."""
+        """Queue a message other than a record; a record begins with its number."""
         self._lines.put(json.dumps(said))
 
     def _tell_paused(self) -> None:
@@ -123,7 +123,7 @@ class LivePage:
             more = True
             while more:
                 lines = [self._lines.get()]
-                time.sleep(TELL_EVERY_S)  # lines of the meantime go together
+                time.sleep(TELL_EVERY_S)  # lines that arrive meanwhile are sent together
                 while not self._lines.empty():
                     lines.append(self._lines.get())
                 more = _NO_MORE not in lines
@@ -132,7 +132,7 @@ class LivePage:
         self._gone = True
 
     def _obey(self, commands: IO[str]) -> None:
-        """Execute the page's commands; one that waits for the run delays no other."""
+        """Execute the page's commands; a command that waits for the run delays no other command."""
         with commands, ThreadPoolExecutor(thread_name_prefix="viewer") as hands:
             for line in commands:
                 asked = json.loads(line)

@@ -1,11 +1,11 @@
-"""Process that serves the page of a run in another process: lines of its trace come in, commands go out.
+"""Process that serves the page of a run in another process: it reads lines of the trace, and writes commands.
 
 Lines on standard input are records as in a trace, or messages:
 
-- `begin` comes first, with the `socket` to serve, its keys `token` and `code`, and whether there is `control`.
-- `paused`, an `answer` to a command, and `end` follow.
+- `begin` is the first message, with the `socket` to serve, its keys `token` and `code`, and whether there is `control`.
+- Later messages are `paused`, an `answer` to a command, and `end`.
 
-Lines on standard output are the page's commands, with a number. The end of the input ends the page.
+Lines on standard output are the page's commands, each with a number. The end of the input ends the page.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from dsc.viewer.server import Viewer
 from knowledge_base.errors import InputError
 
 NICENESS = 5
-"""The run has priority over its page on a busy processor."""
+"""Niceness of the page's process, so that the run has priority over its page on a busy processor."""
 _RECORD = '{"seq": '
 
 
@@ -45,7 +45,7 @@ class FarHands:
         self.paused: str | None = None
 
     def obey(self, command: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the run's answer to a command; raise `InputError` if the run refuses it."""
+        """Return the run's answer to a command; raise `InputError` if the run refuses the command."""
         number = next(self._numbers)
         answer = self._asked[number] = Future()
         self._to.write(json.dumps({"number": number, "command": command}) + "\n")
@@ -53,12 +53,12 @@ class FarHands:
         return answer.result()
 
     def hold(self, why: str | None) -> None:
-        """Record that the run pauses, or continues."""
+        """Store the reason of a pause; `None` means that the run continues."""
         self.paused = why
         self._changed()
 
     def answer(self, number: int, said: dict[str, Any] | None, wrong: str) -> None:
-        """Record the answer to a command."""
+        """Store the answer to a command, which resumes the waiting caller."""
         asked = self._asked.pop(number)
         if said is not None:
             asked.set_result(said)
@@ -67,7 +67,7 @@ class FarHands:
 
 
 def take_in(lines: Iterable[str], log: RecordLog, hands: FarHands) -> None:
-    """Read all messages of a run."""
+    """Handle all messages of a run, until the input ends."""
     for line in lines:
         if line.startswith(_RECORD):
             log.append(line.rstrip("\n"))

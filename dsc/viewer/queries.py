@@ -1,4 +1,4 @@
-"""Requests of the page: JSON of bounded size and depth, and queries of the knowledge at a record, within bounds.
+"""Requests of the page: JSON of bounded size and depth, and bounded queries of the knowledge at a record.
 
 The knowledge is replayed from records, with checkpoints.
 """
@@ -29,21 +29,21 @@ from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
 
 CHECKPOINT_EVERY = 500
-"""Upper bound of records replayed to reach a moment."""
+"""Maximum number of records that are replayed to compute a state."""
 
 _TYPE = re.compile(r'"type": "([^"]*)"')
 _S = TypeVar("_S")
 
 
 class RecordReplay(Generic[_S]):
-    """A state derived from records, at any record.
+    """A state derived from records, available at any record.
 
     Args:
         log: the records.
         types: the relevant types of records.
         begin: the state before the first record.
         copy: returns an equal, independent state.
-        advance: returns the state after a record from the state before, which it may change.
+        advance: returns the state after a record; it may change the state that it receives.
     """
 
     def __init__(
@@ -61,10 +61,10 @@ class RecordReplay(Generic[_S]):
         self._lock = Lock()
 
     def at(self, seq: int) -> _S:
-        """Return the state after the record with that number.
+        """Return the state after the record with number `seq`.
 
         Raises:
-            InputError: there is no such record.
+            InputError: there is no such record, or a record up to this one is damaged.
         """
         if not 0 <= seq <= len(self._log):
             raise InputError(f"there is no record {seq}; the last one is {len(self._log)}")
@@ -86,7 +86,7 @@ class RecordReplay(Generic[_S]):
             raise InputError(f"record {seq} is damaged, so later knowledge is unknown: {error!r}") from None
 
     def _scan(self, seq: int) -> None:
-        """Find the relevant records up to `seq`; a line begins with its type."""
+        """Find the relevant records up to `seq`; the type is near the beginning of a line."""
         while self._scanned < seq:
             self._scanned += 1
             found = _TYPE.search(self._log.line(self._scanned), 0, 120)
@@ -121,16 +121,16 @@ def _known(before: Known, record: Mapping[str, Any]) -> Known:
 
 Form = Mapping[str, Any]
 Left = Callable[[], bool]
-"""Returns whether the browser has left."""
+"""Function that returns whether the browser has left."""
 
 MOST_TEXT = 10_000
-"""Characters of an expression or statement from a browser."""
+"""Maximum number of characters of an expression or statement from a browser."""
 MOST_SECONDS = 5.0
-"""Upper bound of an answer's time; then the query is abandoned."""
+"""Maximum number of seconds for an answer; then the query is abandoned."""
 MOST_ANSWERS = 10_000
-"""Upper bound of answers, facts and numbers in one message; `more` marks an incomplete one."""
+"""Maximum number of answers, facts or values in one message; `more` marks an incomplete message."""
 MOST_EXPLAINED = 1.0
-"""Seconds for the explanation of an answer, which is otherwise omitted."""
+"""Maximum number of seconds for the explanation of an answer; then the explanation is omitted."""
 
 
 def _still_there() -> bool:
@@ -138,9 +138,9 @@ def _still_there() -> bool:
 
 
 class PageQueries:
-    """Answers to one page's queries, each a JSON value; an invalid query is an `InputError`.
+    """Answers to the queries of one page, each as a JSON value; an invalid query raises `InputError`.
 
-    A query takes `MOST_SECONDS` at most, and ends when `left` reports that the browser has left.
+    A query takes at most `MOST_SECONDS`, and ends when `left` reports that the browser has left.
     """
 
     def __init__(self, log: RecordLog) -> None:
@@ -148,7 +148,10 @@ class PageQueries:
         self._knowledge = knowledge(log)
 
     def query(self, asked: Form, left: Left = _still_there) -> dict[str, Any]:
-        """Return the bindings that make the expression true, or its truth value with a reason."""
+        """Return the bindings that make the expression true.
+
+        An expression without variables has no bindings; its truth value and a reason are returned instead.
+        """
         view = self._view(asked)
         params = asked.get("params") or {}
         condition = parse_condition(_text(asked, "expression"), "EXPR")
@@ -217,16 +220,16 @@ def require_short(text: str, name: str) -> None:
 
 
 MOST_BYTES = 1 << 20
-"""Upper bound of a request's body."""
+"""Maximum number of bytes of a request's body."""
 Fields = Mapping[str, tuple[Callable[[Any], bool], str]]
-"""Optional fields of a request: the test of a value, and the words for its type."""
+"""Optional fields of a request: the test of a value, and a description of its type."""
 
 
 def asked(body: bytes | str, form: Fields = MappingProxyType({})) -> dict[str, Any]:
-    """Return the request in a text.
+    """Return the request in `body`.
 
     Raises:
-        InputError: it is not a JSON object, is nested too deeply, or a field has a value of another type.
+        InputError: the body is not a JSON object, is nested too deeply, or a field has a value of another type.
     """
     try:
         request = from_json(body, allow_inf_nan=False)

@@ -22,7 +22,7 @@ LOOK_EVERY_S = 0.2
 
 @contextmanager
 def followed(log: RecordLog, look: Callable[[], bool]) -> Iterator[RecordLog]:
-    """Poll `look` during the block, which adds to the log, until it returns false or fails."""
+    """Poll `look` during the block, until it returns false or raises an error; `look` appends records to the log."""
     over = Event()
 
     def looking() -> None:
@@ -45,7 +45,7 @@ def followed(log: RecordLog, look: Callable[[], bool]) -> Iterator[RecordLog]:
 
 @contextmanager
 def following_run(path: Path) -> Iterator[RecordLog]:
-    """Yield the records of the last run in a store; add new ones during the block.
+    """Yield the records of the last run in a store; append new records during the block.
 
     Raises:
         StoreError: the file is missing, not a store, has no run, or cannot be read.
@@ -59,7 +59,7 @@ def following_run(path: Path) -> Iterator[RecordLog]:
         nonlocal place
         with archive(path, again=True) as runs:
             for here, line in runs.lines(run.number, place):
-                if (record := _record(line, len(log), path)).seq > len(log):  # a macrostep may get more at its end
+                if (record := _record(line, len(log), path)).seq > len(log):  # the last macrostep may get more records
                     log.hear(record)
                 place = here
             return runs.run(run.number).ended is None
@@ -81,13 +81,13 @@ def _record(line: str, last: int, path: Path) -> Record:
 
 @contextmanager
 def following_store(path: Path) -> Iterator[RecordLog]:
-    """Yield the records of a store; add changes of other programs during the block.
+    """Yield the records of a knowledge store; append the changes of other programs during the block.
 
-    Time begins with the first kept change. The log ends when the store is compacted beyond the changes read, or its
-    schema grows.
+    Time begins with the first kept change. The log ends when the store drops changes that were not read yet, or when
+    the store's schema grows.
 
     Raises:
-        StoreError: it is missing, is not a store, or cannot be read.
+        StoreError: the file is missing, is not a store, or cannot be read.
     """
     with KnowledgeBase.open(None, path, read_only=True) as kb:
         changes = kb.changes(kb.oldest)
@@ -118,9 +118,9 @@ def _header(path: Path, changes: list[Change]) -> str:
 
 @contextmanager
 def records_of(path: Path) -> Iterator[RecordLog]:
-    """Yield the records in a file by its kind; for a store, add new ones during the block.
+    """Yield the records in a trace or store; for a store, append new records during the block.
 
-    A store with runs gives its last run; another one gives the changes of its knowledge.
+    For a store with runs, these are the records of its last run; for another store, the changes of its knowledge.
 
     Raises:
         InputError: the file is missing, or it is neither a trace nor a store.

@@ -1,4 +1,4 @@
-"""Records of a run as the lines of its trace: one writer appends during the run, readers read at any position."""
+"""Records of a run as the lines of its trace: one writer appends, readers read at any position."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from knowledge_base.pddl.files import read_lines
 
 MOST_RECORDS = 2000
 MOST_CHARACTERS = 400_000
-"""Upper bound of one message: a browser handles it without a visible delay."""
+"""Maximum number of characters of one message, so that a browser handles it without a visible delay."""
 DAMAGED = "damaged"
 """Type of a record that replaces an unreadable one."""
 MOST_SHOWN = 200
-"""Characters shown of a damaged line."""
+"""Maximum number of characters that are shown of a damaged line."""
 _T = re.compile(r'"t": (-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)')
 _NO_CHARACTER = re.compile("[\ud800-\udfff]")
 MAX_TRACE_BYTES = 1024 * 1024 * 1024
-"""Upper bound of a trace: all its lines are kept in memory."""
+"""Maximum number of bytes of a trace, as all its lines are kept in memory."""
 MAX_LINE_BYTES = 64 * 1024 * 1024
-"""Upper bound of one line of a trace: the longest record is the first, the whole world."""
+"""Maximum number of bytes of one line of a trace; the longest record is the first, with the whole world."""
 
 
 class RecordLog:
     """The lines of a trace; the record with number `seq` is line `seq`, counted from 1 after the header.
 
-    One thread appends, any thread reads. Records are never removed, so that readers need no queues.
+    One thread appends records, any thread reads them. Records are never removed, so that readers need no queues.
 
     Attributes:
         header: the first line of the trace, as data.
-        complaints: the damages found in the file, one line each.
+        complaints: the damages found in the file, one line for each.
     """
 
     def __init__(
@@ -62,11 +62,11 @@ class RecordLog:
 
     @property
     def live(self) -> bool:
-        """Whether more records may come."""
+        """Whether more records may be appended."""
         return self._live
 
     def hear(self, record: Record) -> None:
-        """Receive a record; a `Listener` of a trace."""
+        """Append a record; the method is a `Listener` of a trace."""
         self.append(record.to_line())
 
     def append(self, line: str) -> None:
@@ -80,7 +80,7 @@ class RecordLog:
         self.wake()
 
     def on_more(self, waker: Callable[[], None]) -> Callable[[], None]:
-        """Call `waker` for new records, from any thread; the returned function ends that."""
+        """Call `waker` after new records, from any thread; the returned function ends these calls."""
         with self._lock:
             self._wakers = (*self._wakers, waker)
 
@@ -92,7 +92,7 @@ class RecordLog:
 
     def wake(self) -> None:
         """Notify all readers of new records."""
-        for waker in self._wakers:  # the tuple is immutable: no record needs a lock
+        for waker in self._wakers:  # the tuple is immutable: appending a record needs no lock
             waker()
 
     def batch(self, seq: int) -> tuple[str, int]:
@@ -103,7 +103,7 @@ class RecordLog:
             end += 1
             characters += len(self._lines[end - 1])
         kept = self._batch
-        if kept[:2] != (seq, end):  # browsers at the same position share one message
+        if kept[:2] != (seq, end):  # browsers at equal positions share one message
             # The lines are already JSON: a second encoding would cost more than the rest of the viewer.
             lines = ",\n".join(self._lines[seq - 1 : end])
             text = f'{{"type":"records","from":{seq},"records":[\n{lines}\n]}}'
@@ -111,7 +111,7 @@ class RecordLog:
         return kept[2], end + 1
 
     def line(self, seq: int) -> str:
-        """Return the record as its line.
+        """Return the line of a record.
 
         Raises:
             InputError: there is no such record.
@@ -121,7 +121,11 @@ class RecordLog:
         return self._lines[seq - 1]
 
     def record(self, seq: int) -> dict[str, Any]:
-        """Return the record as data; errors as for `line`, and if the line is not JSON."""
+        """Return a record as data.
+
+        Raises:
+            InputError: there is no such record, or its line is not JSON.
+        """
         try:
             found: dict[str, Any] = json.loads(self.line(seq))
         except (ValueError, RecursionError) as error:
@@ -130,11 +134,13 @@ class RecordLog:
 
 
 def read_trace(path: Path) -> RecordLog:
-    """Return the records of a trace file; a damaged line becomes a record of type `damaged` and one of `complaints`.
+    """Return the records of a trace file.
+
+    A damaged line becomes a record of type `damaged`, and is listed in `complaints`.
 
     Raises:
         InputError: the file is missing, or cannot be read.
-        ParseError: it is not a trace, has another version, or its records are missing, doubled or in another order.
+        ParseError: the file is not a trace, has another version, or its records are missing, duplicated or reordered.
     """
     lines = read_lines(path, MAX_TRACE_BYTES, MAX_LINE_BYTES, errors="surrogateescape")
     first = next(lines, "")
@@ -150,7 +156,7 @@ def damaged(seq: int, t: float, line: int, why: str, text: str) -> str:
 
 
 def _numbered(lines: Iterable[str], path: Path, complaints: list[str]) -> Iterator[str]:
-    """Yield the lines of records without a gap; damaged records replace lost ones."""
+    """Yield the lines of records without a gap; records of type `damaged` replace lost ones."""
     last, before, lost = 0, "", list[tuple[int, str]]()
 
     def substitutes(count: int) -> Iterator[str]:
@@ -174,7 +180,7 @@ def _numbered(lines: Iterable[str], path: Path, complaints: list[str]) -> Iterat
         elif line.strip():
             lost.append((number, line))
     for place, (number, line) in enumerate(lost, 1):
-        if _seq_of(line, 0) is not None:  # a sound record in a wrong place: the damage exceeds single lines
+        if _seq_of(line, 0) is not None:  # a sound record at a wrong position: the damage exceeds single lines
             raise ParseError(f"this is not record {last + place} of a trace", place=Place(str(path), number))
     yield from substitutes(len(lost))
 
@@ -203,7 +209,7 @@ def _why_unreadable(line: str) -> str:
 
 
 def _parsed(line: str) -> Any:
-    """Return the line's object, the reason if it is not JSON, else `None`."""
+    """Return the object in the line, or the reason if the line is not JSON; `None` for other JSON."""
     try:
         parsed = from_json(line)
     except (TypeError, ValueError) as error:  # TypeError: half a surrogate pair

@@ -35,25 +35,25 @@ if TYPE_CHECKING:
 
 STATIC = Path(__file__).parent / "static"
 MOST_HEADER_BYTES = 1 << 20
-"""Upper bound: browsers send the cookies of all programs of this machine."""
+"""Maximum number of header bytes, as browsers send the cookies of all programs of this machine."""
 MOST_DIGITS = 15
-"""Upper bound of a record number's digits."""
+"""Maximum number of digits of a record number."""
 COMPLAIN_EVERY_S = 10.0
-"""Least time between two messages about failures."""
+"""Minimum number of seconds between two messages about failures."""
 
 
 class Viewer:
-    """A run in the browser: answers at `url` from `start` to `close`.
+    """Page of a run in the browser; it answers at `url` from `start` to `close`.
 
     Args:
         log: the records.
-        entrance: the page's address; the viewer takes it over.
-        control: the run's control, if the page may change it.
+        entrance: the page's address, whose socket the viewer then owns.
+        control: the run's control; `None` if the page may not change the run.
 
     Attributes:
         url: the address for people.
         one_time_url: the address for a browser's command line.
-        port: of the address.
+        port: the port of the address.
         token: the permanent key in the address for people.
     """
 
@@ -73,14 +73,14 @@ class Viewer:
             ws_max_size=1 << 16,
             ws_per_message_deflate=False,  # local transfer needs no compression
             log_config=None,
-            log_level=logging.CRITICAL + 1,  # invalid requests from strangers do not belong on the terminal
+            log_level=logging.CRITICAL + 1,  # invalid requests of other programs must not appear on the terminal
             access_log=False,
         )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._serve, daemon=True)
 
     def application(self) -> ASGIApp:
-        """Return the application behind the access check."""
+        """Return the application, which the access check protects."""
         return Access(self._calm, self._keys, self.port)
 
     def _routed(self) -> ASGIApp:
@@ -102,12 +102,12 @@ class Viewer:
         self._thread.start()
 
     def wait(self) -> None:
-        """Wait until the page is closed; an interrupt gets through."""
+        """Wait until the page is closed; a `KeyboardInterrupt` ends the wait."""
         while self._thread.is_alive():
             self._thread.join(timeout=0.5)
 
     def close(self) -> None:
-        """Stop answering; the end of the socket informs the browsers."""
+        """Stop answering; the end of the socket notifies the browsers."""
         self._server.should_exit = True
         self._server.force_exit = True
         if self._thread.is_alive():
@@ -163,14 +163,17 @@ class Viewer:
 
 
 class Calm:
-    """An application whose failures cost one request and at times a line on the terminal, never a traceback."""
+    """Wrapper of an application that contains its failures.
+
+    A failure ends one request, and may print a line on the terminal, but never a traceback.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
         self._complained = -COMPLAIN_EVERY_S
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let the application answer; after a failure it has answered 500."""
+        """Pass the request to the application; after a failure, the application has answered 500."""
         try:
             await self._app(scope, receive, send)
         except (ClientDisconnect, OSError):
@@ -179,7 +182,7 @@ class Calm:
             self.complain(error)
 
     def complain(self, error: BaseException | None) -> None:
-        """Print a failure on one line, unless another one was printed recently."""
+        """Print a failure on one line, unless another one was printed in the last `COMPLAIN_EVERY_S` seconds."""
         if error is not None and time.monotonic() - self._complained >= COMPLAIN_EVERY_S:
             self._complained = time.monotonic()
             sys.stderr.write(f"the page: {type(error).__name__}: {error}"[:300].replace("\n", " ") + "\n")
@@ -189,7 +192,7 @@ class _Protocol(H11Protocol):
     """uvicorn's HTTP protocol, which also accepts sockets with large cookies of other programs."""
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        """Remove foreign cookies before the switch to the socket protocol, which accepts lines of 8 KB at most."""
+        """Remove foreign cookies before the change to the socket protocol, which accepts lines of at most 8 KB."""
         self.headers = [(name, _own(value) if name == b"cookie" else value) for name, value in self.headers]
         super().handle_websocket_upgrade(event)
 
@@ -201,7 +204,10 @@ def _own(cookie: bytes) -> bytes:
 async def _while_there(
     request: Request, answer: Callable[[Mapping[str, Any], Left], Any], said: Mapping[str, Any]
 ) -> Any:
-    """Return the result of `answer`, run in a separate thread that learns whether the browser has left."""
+    """Return the result of `answer`, executed in a separate thread.
+
+    Its second argument returns whether the browser has left.
+    """
     left = threading.Event()
 
     async def watch() -> None:
@@ -226,7 +232,10 @@ async def _body(request: Request) -> bytes:
 
 
 def _json(said: Any, status: int = 200) -> Response:
-    """Return JSON in ASCII, because UTF-8 lacks half surrogate pairs; numbers that JSON lacks are as in a trace."""
+    """Return a response as JSON in ASCII, because UTF-8 lacks half surrogate pairs.
+
+    Numbers that JSON lacks are written as in a trace.
+    """
     return Response(json.dumps(said), status_code=status, media_type="application/json")
 
 
