@@ -1,5 +1,6 @@
 """A planner small enough to be trusted: breadth-first search over the posed problem; the shortest plan, or a proof."""
 
+from knowledge_base import Fact
 from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable
 
 MOST_STATES = 20_000
@@ -16,7 +17,8 @@ class BreadthFirst:
         if problem.unreachable:
             return ProvenUnsolvable("breadth", "unreachable")
         start = frozenset(problem.init)
-        ways, agenda = {start: ()}, [start]
+        ways: dict[frozenset[Fact], tuple[int, ...]] = {start: ()}
+        agenda = [start]
         for state in agenda:
             if all(fact in state for fact in problem.goal):
                 return PlanFound(problem.plan(ways[state]), "breadth", 0.0, problem.simulated_seconds)

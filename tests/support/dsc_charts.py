@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator as op
 import textwrap
 from collections.abc import Mapping
+from typing import Any
 
 from hypothesis import settings
 
@@ -41,7 +42,7 @@ class FakeSituation:
         self.facts = set(facts)
         self.numbers = dict(numbers)
         self.choices = choices
-        self.asked = []
+        self.asked: list[Any] = []
 
     def holds(self, expression, bindings):
         match expression:

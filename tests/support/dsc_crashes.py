@@ -11,6 +11,7 @@ import sqlite3
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from dsc_charts import plot
 from dsc_runs import SCHEMA
@@ -24,7 +25,7 @@ from dsc.runs.tables import CHAIN
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
-from dsc.trace import Trace
+from dsc.trace import Record, Trace
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.journal.integrity import Tip, link, put_ends
 from knowledge_base.store import KnowledgeBase
@@ -98,7 +99,7 @@ class Run:
     ):
         self.path = folder / "run.kb"
         self.robot = robot or Robot(done, crash=lambda: crash("done"))
-        self.records = []
+        self.records: list[Record] = []
         self.library = Library(map(plot, plots))
         with KnowledgeBase.open(SCHEMA, self.path) as kb:
             store = RunStore(kb, self.path)
@@ -160,11 +161,11 @@ class Crashes:
         self.plots = plots
         self._make = make
         self._prepare = prepare
-        self.copies = []
+        self.copies: list[tuple[str, dict[str, int], Path]] = []
         alive = folder / "alive"
         alive.mkdir()
 
-        robot = []
+        robot: list[Any] = []
 
         def crash(what):
             self.copies.append((what, dict(robot[0].done), copied(alive, folder / f"copy{len(self.copies)}")))

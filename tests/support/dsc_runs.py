@@ -15,7 +15,7 @@ from dsc.dynamic.library import Library
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
-from dsc.trace import Trace
+from dsc.trace import Record, Trace
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
@@ -110,7 +110,7 @@ class Ran:
         self.kb = KnowledgeBase(SCHEMA)
         self.kb.apply(Delta(nodes=dict.fromkeys(things, "item"), added=tuple(facts)), "test")
         self.arm = arm or Arm()
-        self.records = []
+        self.records: list[Record] = []
         library = Library([plot(text), *map(plot, inner)])
 
         async def main():

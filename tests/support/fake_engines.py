@@ -52,7 +52,7 @@ def lights_out(size):
 
 def descendants(pid):
     """All processes that it has started, and those that they have, by what Linux tells; zombies are dead."""
-    children = {}
+    children: dict[int, list[int]] = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             _, _, rest = stat.read_text().rpartition(")")

@@ -29,6 +29,11 @@ def _database(path: Path) -> None:
     connection.close()
 
 
+def _to_a_text(path: Path) -> None:
+    path.with_name("notes").write_text("mine\n")
+    path.symlink_to("notes")
+
+
 def _to_a_pipe(path: Path) -> None:
     os.mkfifo(path.with_name("elsewhere"))
     path.symlink_to("elsewhere")
@@ -47,7 +52,7 @@ STRANGERS: dict[str, Callable[[Path], object]] = {
     "circular link": lambda path: path.symlink_to(path.name),
 }
 LINKS_TO_TEXT: dict[str, Callable[[Path], object]] = {
-    "link": lambda path: (path.with_name("notes").write_text("mine\n"), path.symlink_to("notes")),
+    "link": _to_a_text,
 }
 
 

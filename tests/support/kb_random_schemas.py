@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from hypothesis import strategies as st
 from kb_strategies import brute
@@ -50,10 +51,12 @@ def changes(of: Language) -> st.SearchStrategy[Delta]:
     """Facts, numbers and things that come and go; names not there any more are an error when applied."""
     thing, number = st.sampled_from(THINGS), st.sampled_from(NUMBERS)
     facts = st.one_of(
-        st.builds(lambda *a, p=p: Fact(p, a), *(number if kind == "number" else thing for kind in kinds))
-        for p, kinds in of.predicates.items()
+        [
+            st.builds(lambda *a, p=p: Fact(p, a), *(number if kind == "number" else thing for kind in kinds))
+            for p, kinds in of.predicates.items()
+        ]
     )
-    fluents = st.one_of(st.builds(lambda *a, f=f: Fact(f, a), *[thing] * n) for f, n in of.functions.items())
+    fluents = st.one_of([st.builds(lambda *a, f=f: Fact(f, a), *[thing] * n) for f, n in of.functions.items()])
     some = st.lists(facts, max_size=4).map(tuple)
     return st.builds(
         Delta,
@@ -69,7 +72,7 @@ def conditions(of: Language) -> st.SearchStrategy[ex.Expression]:
     variable = st.sampled_from(OBJECTS)
     thing = st.builds(ex.Variable, variable) | st.builds(ex.Constant, st.sampled_from(THINGS))
     numeral = st.builds(ex.Constant, st.sampled_from(NUMBERS))
-    calls = st.one_of(st.builds(lambda *a, f=f: ex.Call(f, a), *[thing] * arity) for f, arity in of.functions.items())
+    calls = st.one_of([st.builds(lambda *a, f=f: ex.Call(f, a), *[thing] * arity) for f, arity in of.functions.items()])
     number = st.one_of(st.just(ex.Variable(NUMBER)), numeral, calls)
     total = number | st.builds(ex.Arithmetic, st.sampled_from("+-*"), st.tuples(number, number))
     atoms = st.one_of(
@@ -102,16 +105,16 @@ def conditions(of: Language) -> st.SearchStrategy[ex.Expression]:
 
 
 @st.composite
-def parameters(draw, e: ex.Expression, schema: Schema) -> dict:
+def parameters(draw, e: ex.Expression, schema: Schema) -> dict[str, Any]:
     """Values for the variables that need one, and for some others."""
     free = ex.free_variables(e)
     chosen = [name for name in sorted(free) if name in only_tested(e, schema) or draw(st.integers(0, 2)) == 0]
     return {name: draw(st.sampled_from(NUMBERS if name == NUMBER else THINGS)) for name in chosen}
 
 
-def brute_witnesses(e: ex.Expression, params: dict, world) -> list[dict]:
+def brute_witnesses(e: ex.Expression, params: dict[str, Any], world) -> list[dict[str, Any]]:
     """All choices for the free variables that make it true."""
-    found: list[dict] = [{}]
+    found: list[dict[str, Any]] = [{}]
     for name in sorted(ex.free_variables(e) - params.keys()):
         values = NUMBERS if name == NUMBER else world.objects("object")
         found = [{**one, name: value} for one in found for value in values]

@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from random import Random
 
@@ -120,7 +121,7 @@ class Soak:
         undone = random.random() < 0.1
         with contextlib.suppress(UndoneError), self.kb.transaction(author=worker) as tx:
             (here,) = tx.query("(at ?w ?c)", {"w": worker})
-            counted = [int(self.kb.value("count", (worker,))), int(self.kb.value("total", ()))]
+            counted = [self._number("count", worker), self._number("total")]
             if counted[0] != commits:
                 self.failures.append(f"{worker} reads {counted[0]} commits of its own after {commits}")
             tx.retract("at", worker, here["c"])
@@ -142,11 +143,16 @@ class Soak:
         if not kb.ask(INVARIANT):
             self.failures.append(f"at version {kb.version}: {kb.explain(INVARIANT).deciding}")
 
+    def _number(self, name: str, *things: str) -> int:
+        found = self.kb.value(name, things)
+        assert isinstance(found, int | float)
+        return int(found)
+
     def _answer(self, change: Change) -> None:
         """A listener that commits: every fiftieth change is answered."""
         if change.author != "answer" and change.version % 50 == 0:
             with self.kb.transaction(author="answer") as tx:
-                tx.set("answers", int(self.kb.value("answers", ())) + 1)
+                tx.set("answers", self._number("answers") + 1)
 
     async def _watch(self, ready: asyncio.Event, limit: int, pause_s: float) -> None:
         with self.kb.watch(limit=limit) as changes:
@@ -220,6 +226,10 @@ def soak(path: Path | None, go_on: Callable[[int], bool], limit_s: float) -> Soa
     return done
 
 
+def _is_before(end: float, _: int) -> bool:
+    return time.monotonic() < end
+
+
 def main(seconds: float) -> int:
     """Soak in memory and on a file, half of the time each; prints what happened."""
     from tempfile import TemporaryDirectory
@@ -228,7 +238,7 @@ def main(seconds: float) -> int:
     with TemporaryDirectory() as folder:
         for path in (None, Path(folder) / "world.kb"):
             end = time.monotonic() + seconds / 2
-            done = soak(path, lambda _, end=end: time.monotonic() < end, seconds + 60)
+            done = soak(path, partial(_is_before, end), seconds + 60)
             kind = "in memory" if path is None else "journaled"
             print(
                 f"{kind}: {sum(done.acknowledged.values())} commits of {len(done.acknowledged)} threads, "

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import operator
+from collections.abc import Callable
+from typing import Any
 
 from hypothesis import strategies as st
 
@@ -89,8 +91,10 @@ def any_effects() -> st.SearchStrategy[eff.Effect]:
     )
 
 
-def _compound(leaf, variables):
-    def compound(inner):
+def _compound(
+    leaf: st.SearchStrategy[ex.Expression], variables: st.SearchStrategy[tuple[ex.TypedVariable, ...]]
+) -> st.SearchStrategy[ex.Expression]:
+    def compound(inner: st.SearchStrategy[ex.Expression]) -> st.SearchStrategy[ex.Expression]:
         some = st.lists(inner, max_size=3).map(tuple)
         return (
             st.builds(ex.Not, inner)
@@ -168,8 +172,10 @@ def _same(left, right) -> bool:
     return left == right and isinstance(left, bool) == isinstance(right, bool)
 
 
-_COMPARE = {"=": _same, "!=": lambda left, right: not _same(left, right), "<": operator.lt, "<=": operator.le, ">": operator.gt,
-            ">=": operator.ge}  # fmt: skip
+_COMPARE: dict[str, Callable[[Any, Any], bool]] = {
+    "=": _same, "!=": lambda left, right: not _same(left, right),
+    "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
+}  # fmt: skip
 _COMPUTE = {"+": operator.add, "-": operator.sub, "*": operator.mul}
 
 
@@ -205,6 +211,7 @@ def brute(e, world, b) -> bool:  # noqa: PLR0911  one line a form, as in the tex
             return any(brute(body, world, {**b, **c}) for c in brute_choices(variables, world))
         case ex.Forall(variables, body):
             return all(brute(body, world, {**b, **c}) for c in brute_choices(variables, world))
+    raise AssertionError(e)
 
 
 def brute_choices(variables, world):

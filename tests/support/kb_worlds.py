@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import networkx as nx
 from hypothesis import settings
 from kb_strategies import SCHEMA
@@ -23,17 +25,17 @@ class Ticks:
         return self.now
 
 
-def everything(view) -> tuple:
+def everything(view) -> tuple[Any, ...]:
     """All that a view or knowledge base says, with its version; the order counts, and 1 is not 1.0 nor True."""
     return view.version, repr(view.nodes()), repr(view.facts()), repr(view.values())
 
 
-def unordered(view) -> tuple:
+def unordered(view) -> tuple[Any, ...]:
     """All that it says, whatever the order."""
     return view.version, view.nodes(), set(view.facts()), view.values()
 
 
-def graph_content(graph: nx.MultiDiGraph) -> tuple[dict, set[Fact], dict[Fact, float]]:
+def graph_content(graph: nx.MultiDiGraph[Any]) -> tuple[dict[str, Any], set[Fact], dict[Fact, float]]:
     """Things, facts and numbers as the documented form of the graph says them."""
     said = [(node, data.get("value")) for node, data in graph.nodes(data=True) if isinstance(node, Fact)]
     for start, end, key, data in graph.edges(keys=True, data=True):

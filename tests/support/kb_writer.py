@@ -11,6 +11,7 @@ from random import Random
 
 from knowledge_base import Delta, Fact, KnowledgeBase, Schema, fact
 from knowledge_base.journal import journal
+from knowledge_base.journal.file import Durability
 
 SCHEMA = Schema.parse(
     "(define (domain d) (:types cup) (:predicates (quiet) (level ?c - cup ?n - number)) (:functions (time)))"
@@ -34,7 +35,7 @@ def cups_of(version: int) -> tuple[str, ...]:
     return tuple(f"cup-{version}-{n}" for n in range(count))
 
 
-def write(path: str, durability: str, acknowledge: Connection) -> None:
+def write(path: str, durability: Durability, acknowledge: Connection) -> None:
     """Commit one version after the other, with snapshots and, now and then, compaction; never return."""
     journal.SNAPSHOT_AFTER = 20_000
     with KnowledgeBase.open(SCHEMA, path, durability) as kb:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from domains.clean_up_table.deployment import deploy, resumed
 from domains.clean_up_table.scenario import Scenario
@@ -20,7 +21,7 @@ def live(store: str, seed: int, faults: float, say) -> None:
     say.send("end")
 
 
-def told(path: Path) -> tuple:
+def told(path: Path) -> tuple[Any, ...]:
     """What is in the store of each macrostep; the records are left out, of which a new life makes some anew."""
     with archive(path) as runs:
         run = runs.run()

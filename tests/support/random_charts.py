@@ -7,8 +7,10 @@ later ones. In dialect `scxml`, where borders are crossed, some go round all the
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import count
+from typing import Any
 
 from dsc_charts import marked
 from hypothesis import strategies as st
@@ -36,14 +38,14 @@ class Grower:
         quiet: whether states and transitions mostly have no actions, so that steps are mere moves; drawn.
     """
 
-    pick: object
+    pick: Callable[[Any], Any]
     scxml: bool = False
     private: bool = True
     depth: int = 3
     bare: bool = False
     quiet: bool = False
-    plots: list = field(default_factory=list)
-    names: object = field(default_factory=count)
+    plots: list[Any] = field(default_factory=list)
+    names: Iterator[int] = field(default_factory=count)
 
     def chance(self, one_in):
         """True now and then; what shrinks becomes false."""
@@ -69,8 +71,8 @@ class Inside:
 
     grower: Grower
     plot: str
-    form: dict = field(default_factory=dict)
-    states: dict = field(default_factory=dict)
+    form: dict[str, Any] = field(default_factory=dict)
+    states: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self):
         self.pick, self.chance = self.grower.pick, self.grower.chance
@@ -212,7 +214,7 @@ class Inside:
         on |= {"j": self._listed(anywhere, emits=("k",))} if self.chance(4) else {}
         on |= {"k": [self._effect({})]} if self.chance(3) else {}
         on |= {self._error(): self.pick(later)} if later and self.chance(3) else {}
-        ways = {"on": on}
+        ways: dict[str, Any] = {"on": on}
         if later and not self.grower.bare and self.chance(2):
             on["done"] = [{"to": self.pick(later), **({"assign": {"v": 1}} if self.chance(2) else {})}]
         if later and self.chance(4):
@@ -223,12 +225,12 @@ class Inside:
         return "error.execution" if self.grower.scxml else "error"
 
     def _heard(self):
-        events = PREFIXES if self.grower.scxml else EVENTS
+        events: Sequence[str] = PREFIXES if self.grower.scxml else EVENTS
         events = events if self.grower.private else [one for one in events if one != "*"]
         return [event for event in events if self.chance(2 if len(events) == 3 else 4)]
 
     def _times(self, anywhere):
-        ways = {}
+        ways: dict[str, Any] = {}
         if self.grower.bare or (self.grower.quiet and self.pick(range(5))):
             return ways
         if self.chance(5):
@@ -370,13 +372,13 @@ def _renamed(form, variable, plot):
 
 
 @st.composite
-def libraries(draw, **features):
+def libraries(draw: st.DrawFn, /, **features):
     """Plots; the first one is the outermost."""
     return Grower(lambda options: draw(st.sampled_from(options)), **features).library()
 
 
 @st.composite
-def happenings(draw, **features):
+def happenings(draw: st.DrawFn, /, **features):
     """What happens to a chart."""
     return some_happenings(lambda options: draw(st.sampled_from(options)), **features)
 
@@ -385,5 +387,5 @@ def some_happenings(pick, scxml=False):
     """Things that happen, as (what, to which of those it can happen to, attributes)."""
     events = SENT_IN_SCXML if scxml else EVENTS
     kinds = (*events, *events, "leave", "to", "time", "time")
-    attributes = ({}, {"n": 1}, {"n": 2})
+    attributes: tuple[dict[str, int], ...] = ({}, {"n": 1}, {"n": 2})
     return [(pick(kinds), pick(range(8)), pick(attributes)) for _ in range(pick(range(4, 11)))]

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from reference_tree import Node, NoValueError, grow, holds, told, value
 
@@ -45,7 +46,7 @@ class Occurrence:
     """An event: for one entry (`visit`) into a node, or for one running plot, or for everybody."""
 
     name: str
-    attributes: dict = field(default_factory=dict)
+    attributes: dict[str, Any] = field(default_factory=dict)
     to: Node | None = None
     visit: object = None
     exact: bool = False
@@ -58,7 +59,7 @@ class Way:
     """A transition of a node; which one, `place` says."""
 
     node: Node
-    place: tuple
+    place: tuple[Any, ...]
     transition: object
 
     @property
@@ -71,11 +72,11 @@ class Report:
     """What one macrostep did."""
 
     handled: bool = False
-    microsteps: list = field(default_factory=list)
-    modes: list = field(default_factory=list)
-    emitted: list = field(default_factory=list)
+    microsteps: list[Any] = field(default_factory=list)
+    modes: list[Any] = field(default_factory=list)
+    emitted: list[Any] = field(default_factory=list)
     errors: int = 0
-    told: dict = field(default_factory=dict)
+    told: dict[str, Any] = field(default_factory=dict)
 
 
 class Reference:
@@ -137,7 +138,7 @@ class Reference:
     def _begin(self):
         self.report = Report()
         self.exited, self.entered = [], []
-        self.queue = deque()
+        self.queue: deque[Occurrence] = deque()
         self.event = None
         self.turn = 0
         self.broken = set()
@@ -187,7 +188,7 @@ class Reference:
     # -- which transitions: selectTransitions, removeConflictingTransitions ------------------------------
 
     def _select(self, event):
-        found = {}
+        found: dict[tuple[Node, tuple[Any, ...]], Way] = {}
         leaves = [node for node in self._in_order(self.active) if not any(kid in self.active for kid in node.kids)]
         for leaf in leaves:
             way = self._first_enabled(leaf, event)
@@ -233,7 +234,7 @@ class Reference:
             return False
 
     def _without_conflicts(self, enabled):
-        filtered = []
+        filtered: list[Way] = []
         for way in enabled:
             rivals = [other for other in filtered if self._conflict(way, other)]
             if all(way.node.inside(other.node) for other in rivals):
@@ -392,15 +393,18 @@ class Reference:
 
     def _entry_set_of(self, plot):
         """A plot with its default content."""
-        nodes, defaults = set(), {}
+        nodes: set[Node] = set()
+        defaults: dict[Node, Any] = {}
         self._add_descendants(plot, nodes, defaults)
         return nodes, defaults
 
     def _entry_set(self, taken):
-        entering, defaults = set(), {}
+        entering: set[Node] = set()
+        defaults: dict[Node, Any] = {}
         for way in taken:
             if way.transition.targets:
-                nodes, domain = set(), self._domain(way)
+                nodes: set[Node] = set()
+                domain = self._domain(way)
                 for target in self._targets(way):
                     self._add_descendants(target, nodes, defaults)
                 for target in self._effective_targets(way):

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import operator
 from dataclasses import dataclass, field
+from typing import Any
 
-from dsc.model.plot import initial_of
+from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import CompositeState, FinalState, HistoryState, OrthogonalState, State
 from dsc.model.transitions import ChoiceState, SelectState
 from knowledge_base.language.syntax import effect as eff
@@ -28,11 +29,11 @@ class NoValueError(Exception):
 class Instance:
     """One running plot: its variables, what its histories remember, the state that holds it."""
 
-    plot: object
+    plot: ActionPlot
     host: Node | None
-    variables: dict = field(default_factory=dict)
-    remembered: dict = field(default_factory=dict)
-    nodes: dict = field(default_factory=dict)
+    variables: dict[str, Any] = field(default_factory=dict)
+    remembered: dict[str, Any] = field(default_factory=dict)
+    nodes: dict[str, Any] = field(default_factory=dict)
 
     @property
     def scxml(self):
@@ -52,12 +53,12 @@ class Node:
 
     kind: str
     name: str
-    model: object
+    model: Any
     instance: Instance
     parent: Node | None
-    position: tuple
-    kids: list = field(default_factory=list)
-    histories: list = field(default_factory=list)
+    position: tuple[Any, ...]
+    kids: list[Node] = field(default_factory=list)
+    histories: list[Node] = field(default_factory=list)
     first: str = ""
     visit: object = None
 

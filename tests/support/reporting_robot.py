@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from domains.clean_up_table.components import Arm, Base, Camera, Voice
 from domains.clean_up_table.observations import initial_knowledge
 from dsc.calls import Outcome, SkillCall
-from knowledge_base.facts import Delta, Fact, fact
+from knowledge_base.facts import Content, Delta, Fact, fact
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine
+    from collections.abc import Awaitable
 
     from domains.clean_up_table.table_world import TableWorld
 
@@ -37,7 +37,7 @@ class Robot:
         self.world = world
         self.clock = Clock()
         self.facts: set[Fact] = set()
-        self.values: dict[Fact, float] = {}
+        self.values: dict[Fact, Content] = {}
         self.types: dict[str, str] = dict.fromkeys(("none", "one", "two"), "room")
         self.components = [Base(world), Arm(world), Camera(world), Voice(world)]
         self.calls = 0
@@ -49,11 +49,11 @@ class Robot:
         self.values |= delta.values
 
     def lying(self, surface: str) -> list[str]:
-        return sorted(f.args[0] for f in self.facts if f.predicate == "lies-at" and f.args[1] == surface)
+        return sorted(str(f.args[0]) for f in self.facts if f.predicate == "lies-at" and f.args[1] == surface)
 
     def all(self, predicate: str, *last: str) -> list[str]:
         found = (f.args for f in self.facts if f.predicate == predicate)
-        return sorted(args[0] for args in found if args[1:] == last)
+        return sorted(str(args[0]) for args in found if args[1:] == last)
 
     def do(self, skill: str, **arguments: str) -> Outcome:
         self.calls += 1
@@ -77,13 +77,15 @@ class Robot:
         self.learn(Delta(removed=tuple(nowhere), added=tuple(fact("missing", item) for item in items)))
 
 
-def finish(skill: Coroutine[None, None, Outcome]) -> Outcome:
+def finish(skill: Awaitable[Outcome]) -> Outcome:
     """Run a skill that waits for nothing but the clock; much faster than an event loop of its own."""
+    steps = skill.__await__()
     while True:
         try:
-            skill.send(None)
+            steps.send(None)
         except StopIteration as done:
-            return done.value
+            outcome: Outcome = done.value
+            return outcome
 
 
 def changed(facts: set[Fact], delta: Delta) -> set[Fact]:

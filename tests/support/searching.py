@@ -5,11 +5,13 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections import deque
+from typing import Any
 
 
 def breadth_first(problem, most=20_000):
     """A shortest sequence of action numbers, or None."""
-    agenda, seen = deque([(_start(problem), ())]), {_key(*_start(problem))}
+    agenda: deque[tuple[Any, tuple[int, ...]]] = deque([(_start(problem), ())])
+    seen = {_key(*_start(problem))}
     while agenda:
         (state, numbers), taken = agenda.popleft()
         if _reached(problem, state, numbers):

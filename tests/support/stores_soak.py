@@ -19,6 +19,7 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -189,8 +190,8 @@ def _knowledge_stores(folder: Path, changes: int) -> list[Original]:
         for number in (1, 2):
             home = folder / f"store{number}"
             home.mkdir(parents=True)
-            clock = iter(range(10**6))
-            with KnowledgeBase.open(ITEMS, home / NAME, clock=lambda clock=clock: float(next(clock))) as kb:
+            clock = iter(map(float, range(10**6)))
+            with KnowledgeBase.open(ITEMS, home / NAME, clock=partial(next, clock)) as kb:
                 for n in range(changes):
                     kb.apply(
                         Delta(nodes={f"i{number}-{n}": "item"}, added=(fact("seen", f"i{number}-{n}"),)),
@@ -200,7 +201,7 @@ def _knowledge_stores(folder: Path, changes: int) -> list[Original]:
                     if n in (changes // 3, changes // 2):
                         earlier.append(copied(home, folder / f"earlier{number}-{n}"))
                 kb.apply(Delta(), "a", key="empty")
-            with KnowledgeBase.open(MORE, home / NAME, clock=lambda clock=clock: float(next(clock))) as kb:
+            with KnowledgeBase.open(MORE, home / NAME, clock=partial(next, clock)) as kb:
                 for n in range(changes // 3):
                     kb.apply(Delta(added=(fact("late", f"i{number}-{n}"),)), "b")
                 open_ = copied(home, folder / f"open{number}")
@@ -223,7 +224,8 @@ def _small_runs(folder: Path, times: int) -> list[Original]:
     alive.mkdir(parents=True)
     for _ in range(times - 1):
         Run(alive, [CHART])
-    copies, robot = [], Robot()
+    copies: list[tuple[dict[str, int], Path]] = []
+    robot = Robot()
 
     def crash(what: str) -> None:
         copies.append((dict(robot.done), copied(alive, folder / f"copy{len(copies)}")))
@@ -311,7 +313,7 @@ def flipped(path: Path, one: Original, others: list[Original], random: Random) -
     begin = random.randrange(len(content)) // PAGE * PAGE
     # the head of a page and the cells at its end say most
     within = random.choice([random.randrange(PAGE), random.randrange(120)])
-    bits = []
+    bits: list[int] = []
     for _ in range(random.choice([1, 1, 1, 4])):
         at = min(len(content) - 1, begin + within + random.randrange(8) * (len(bits) > 0))
         content[at] ^= 1 << random.randrange(8)
@@ -382,7 +384,7 @@ def _row(connection: sqlite3.Connection, table: str, random: Random) -> tuple[st
 
 
 def _column(connection: sqlite3.Connection, table: str, random: Random) -> str:
-    return random.choice([row[1] for row in connection.execute(f"PRAGMA table_info({table})")])
+    return random.choice([str(row[1]) for row in connection.execute(f"PRAGMA table_info({table})")])
 
 
 def _deleted(connection, table, one, others, random):
@@ -464,7 +466,7 @@ def _of_another(connection, table, one, others, random):
     return f"{table} of {source.name}"
 
 
-_EDITS = {
+_EDITS: dict[str, Callable[..., str]] = {
     name.__name__: name
     for name in (_deleted, _tail_deleted, _changed, _changed, _exchanged, _doubled, _dropped, _emptied, _of_another)
 }
@@ -503,8 +505,9 @@ class Judge:
             "commands": lambda path: self._commands(one, path), "viewer": lambda path: self._viewed(one, path),
             "writer": lambda path: self._written(one, path),
         }  # fmt: skip
-        if one.resume is not None:
-            questions["resume"] = lambda path: one.resume(path.parent)
+        resume = one.resume
+        if resume is not None:
+            questions["resume"] = lambda path: resume(path.parent)
         verdicts = []
         for question, ask in questions.items():
             copy = copied(folder, self._folder / f"asked{seed}")

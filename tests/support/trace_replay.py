@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import Any
 
 from knowledge_base.exchange import delta_of
 from knowledge_base.facts import Fact
@@ -17,6 +18,7 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.expression import And, Not, substitute
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
+from planning import PlanningDomain
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import standing
 from planning.plan import Plan, PlanStep
@@ -40,14 +42,14 @@ class Replay:
         works_for: whether the author of a change carries out a step.
     """
 
-    domain: object
+    domain: PlanningDomain
     world: Overlay
     goal: str
     works_for: Callable[[str, PlanStep], bool]
     steps: dict[int, PlanStep] = field(default_factory=dict)
     began: dict[int, float] = field(default_factory=dict)
     ended: dict[int, float] = field(default_factory=dict)
-    links: tuple = ()
+    links: tuple[Any, ...] = ()
     problems: list[str] = field(default_factory=list)
 
     def take(self, record):

@@ -115,7 +115,8 @@ class Far(Component):
 
 def execute(component, name, run=run_simulated, seconds=None, cancel_after=None, **arguments):
     """Outcome, reports, and what was given up."""
-    reports, given_up = [], []
+    reports: list[Outcome] = []
+    given_up: list[str] = []
 
     async def main():
         clock = LoopClock()
@@ -145,13 +146,13 @@ def test_what_a_thread_has_observed_is_known_even_if_it_breaks():
     ran = Ran(
         "{plot: p, states: {a: {entry: {trigger: arm.sees_and_breaks}, on: {ok: e}}, e: {final: true}}}", arm=Worker()
     )
-    assert "the bus is stuck" in ran.end.problem
+    assert "the bus is stuck" in (ran.end.problem or "")
     assert ran.kb.ask("(p)")
 
 
 def test_what_a_thread_raises_reaches_the_chart():
     ran = Ran("{plot: p, states: {a: {entry: {trigger: arm.raises}, on: {ok: e}}, e: {final: true}}}", arm=Worker())
-    assert "the bus is stuck" in ran.end.problem
+    assert "the bus is stuck" in (ran.end.problem or "")
 
 
 @pytest.mark.parametrize("run", [run_simulated, run_real])
@@ -182,7 +183,7 @@ def test_a_thread_that_does_not_stop_is_left_alone_and_said(monkeypatch):
     text = "{plot: p, states: {a: {entry: {trigger: arm.deaf, within: 0.05}, on: {ok: x, timed_out: e}}, x: {}, e: {final: true}}}"
     ran = Ran(text, arm=worker)
     assert ran.end.finished
-    assert "went on for 0.05 s after it was told to stop" in ran.end.problem
+    assert "went on for 0.05 s after it was told to stop" in (ran.end.problem or "")
     worker.release.set()
 
 
@@ -243,12 +244,14 @@ def test_a_process_ends_with_the_program_however_that_dies(tmp_path, blocks):
     with subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE) as running:
         assert running.stdout.readline() == b"begun\n"
         running.kill()
-        assert running.communicate(timeout=60) == (b"", None)  # the end of what all of its processes write to
+        # the end of what all of its processes write to
+        assert running.communicate(timeout=60) == (b"", None)  # type: ignore[comparison-overlap]
 
 
 def test_a_process_that_does_not_end_when_it_is_told_to_is_killed_and_nothing_goes_on(monkeypatch):
     monkeypatch.setattr(blocking, "STOPPING", 0.2)
-    reports, given_up = [], []
+    reports: list[Outcome] = []
+    given_up: list[str] = []
 
     async def main():
         begun = asyncio.Event()
@@ -285,7 +288,7 @@ SWALLOWS = """
 def test_a_skill_that_swallows_its_cancellation_holds_nothing_up_and_is_said(within):
     ran = Ran(SWALLOWS.replace("WITHIN", str(within)), arm=Worker())
     assert ran.end.finished
-    assert "skill 'arm.swallows' ignored its cancellation for 30 s and was abandoned" in ran.end.problem
+    assert "skill 'arm.swallows' ignored its cancellation for 30 s and was abandoned" in (ran.end.problem or "")
     assert ran.at == pytest.approx(105)
 
 

@@ -348,7 +348,8 @@ def test_a_host_bounds_what_it_keeps_of_one_action(monkeypatch):
     monkeypatch.setattr(hosts, "MOST_KEPT", 100)
 
     async def main():
-        transport, clock, heard = LocalTransport(), LoopClock(), []
+        transport, clock = LocalTransport(), LoopClock()
+        heard: list[Outcome] = []
         host = Host(Robot(), transport, clock)
         remote = await RemoteComponent.connect("robot", transport)
         await remote.execute("go", SkillCall("a1", clock, heard.append), {"steps": 2_000})

@@ -17,6 +17,7 @@ from dsc.components.behaviour_trees import action, condition, sequence, tree_ski
 from dsc.components.component import Component
 from dsc.components.ports import takes
 from dsc.dynamic.library import Library
+from dsc.events import Event
 from dsc.sequencer import dispatcher, message_checks, running_skills
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.sequencer.plot_skill import PlotComponent
@@ -48,25 +49,25 @@ class NoTextError(Exception):
 
 class Meta(type):
     @property
-    def __name__(cls):
+    def __name__(cls):  # type: ignore[override]
         raise RuntimeError("no name")
 
 
 class Nameless(BaseException, metaclass=Meta):
-    @property
+    @property  # type: ignore[misc]
     def __class__(self):
         raise RuntimeError("no class")
 
 
 class Garbage:  # noqa: PLW1641  # it has a hash that fails
-    @property
+    @property  # type: ignore[misc]
     def __class__(self):
         raise RuntimeError("no class")
 
     def __eq__(self, other):
         raise RuntimeError("no equality")
 
-    __hash__ = __repr__ = __bool__ = __str__ = __eq__
+    __hash__ = __repr__ = __bool__ = __str__ = __eq__  # type: ignore[assignment]
 
 
 class Unequal(str):
@@ -92,14 +93,14 @@ RAISED = {
 }
 RETURNED = {
     "garbage": Garbage,
-    "garbage as event": lambda: Outcome(Garbage()),
+    "garbage as event": lambda: Outcome(Garbage()),  # type: ignore[arg-type]
     "odd event": lambda: Outcome(Unequal("ok"), {Unequal("a"): 1}),
-    "event of no text": lambda: Outcome(["ok"]),
-    "garbage as attributes": lambda: Outcome("ok", Garbage()),
+    "event of no text": lambda: Outcome(["ok"]),  # type: ignore[arg-type]
+    "garbage as attributes": lambda: Outcome("ok", Garbage()),  # type: ignore[arg-type]
     "garbage as value": lambda: Outcome("ok", {"a": Garbage()}),
-    "garbage as observation": lambda: Outcome("ok", observed=Garbage()),
-    "garbage observed": lambda: Outcome("ok", observed=Delta(added=(fact("p", Garbage()),))),
-    "unhashable observed": lambda: Outcome("ok", observed=Delta(added=(fact("p", []),))),
+    "garbage as observation": lambda: Outcome("ok", observed=Garbage()),  # type: ignore[arg-type]
+    "garbage observed": lambda: Outcome("ok", observed=Delta(added=(fact("p", Garbage()),))),  # type: ignore[arg-type]
+    "unhashable observed": lambda: Outcome("ok", observed=Delta(added=(fact("p", []),))),  # type: ignore[arg-type]
     "nothing": lambda: None,
 }
 
@@ -365,7 +366,7 @@ class Needy(Hooked):
 
 @pytest.mark.parametrize("kind", EXITS)
 def test_needs_that_cannot_be_read_fail_the_skills_of_their_component_only(kind):
-    reasons = []
+    reasons: list[Event] = []
 
     def prepare(sequencer):
         sequencer.dispatcher.deploy(Needy("none", EXITS[kind]))
@@ -413,7 +414,7 @@ def test_a_skill_that_blocked_the_loop_past_its_limit_has_timed_out_in_real_time
         time.sleep(0.05)
         return Outcome("ok")
 
-    heard = []
+    heard: list[str] = []
 
     async def main():
         clock = LoopClock()

@@ -146,11 +146,11 @@ def a_class(relations=(), **declares):
         ),
         (Parameter("text", least=1), "`least` and `most` are about numbers, and this is a text"),
         (
-            Parameter("nmber", default=5),
+            Parameter("nmber", default=5),  # type: ignore[arg-type]
             "the type of parameter 'crane.lift' is 'nmber', which does not exist; did you mean 'number'?",
         ),
         (
-            Parameter("number", default=5, changed_by="operater"),
+            Parameter("number", default=5, changed_by="operater"),  # type: ignore[arg-type]
             "'operater', which is not a role; did you mean 'operator'?",
         ),
     ],
@@ -252,7 +252,7 @@ def test_a_profile_binds_what_relies_on_each_other_at_once():
         (Parameter("number", default=1, follows="2"), "has a default and follows from others"),
         (Parameter("number", follows="(* 2"), "is not a term"),
         (Parameter("number", follows="2", most=1), "'crane.lift' is 1 or less; found 2"),
-        (Parameter("number", default=1, depends_on="lift"), "is a tuple of names, not one text"),
+        (Parameter("number", default=1, depends_on="lift"), "is a tuple of names, not one text"),  # type: ignore[arg-type]
     ],
 )
 def test_a_dependency_that_cannot_be_meant_is_refused(declared, said):

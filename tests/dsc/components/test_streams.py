@@ -56,7 +56,7 @@ class Mapper(Component):
                 await self.scan.next(within=1.0)
             except NoAnswerError as silent:
                 return Outcome("blind", {"why": str(silent)})
-            self.seen.append((round(call.clock.now(), 3), self.scan.value["metres"], self.heat.value))
+            self.seen.append((round(call.clock.now(), 3), (self.scan.value or {})["metres"], self.heat.value))
 
 
 MAP = """
@@ -121,6 +121,7 @@ def test_who_comes_late_hears_the_newest():
         laser.scan.put(metres=1, points=[])
         laser.scan.put(metres=2, points=[])
         Wiring({"laser": laser, "mapper": mapper})
+        assert mapper.scan.value is not None
         assert mapper.scan.value["metres"] == 2
 
     run_simulated(main())
@@ -188,7 +189,7 @@ def test_a_stream_has_a_port_that_fits(source, values, kind, said):
 
 def test_ports_are_declared_rightly():
     for wrong in (
-        lambda: Push(["metres"]),
+        lambda: Push(["metres"]),  # type: ignore[arg-type]
         lambda: Push({"a b": None}),
         lambda: Push({}, period=0),
         lambda: Stream("laser", {}),
@@ -219,6 +220,8 @@ def test_two_ports_of_one_name_are_told_apart_over_a_transport():
         for n, laser in enumerate(lasers):
             laser.scan.put(metres=n, points=[])
         await asyncio.sleep(0.1)
+        assert fusion.left.value is not None
+        assert fusion.right.value is not None
         assert (fusion.left.value["metres"], fusion.right.value["metres"]) == (0, 1)
         for host in hosts:
             await host.close()

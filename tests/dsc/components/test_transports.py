@@ -27,16 +27,16 @@ class TestLocalInRealTime(TransportSuite):
     def transport(self):
         return LocalTransport()
 
-    test_a_call_has_a_timeout = None
-    test_a_timed_push_comes_again_and_its_silence_is_noticed = None
-    test_the_newest_value_arrives_and_time_never_runs_backwards = None
-    test_components_are_active_while_somebody_active_needs_them = None
-    test_a_silent_death_frees_what_the_dead_one_needed = None
-    test_a_silent_death_is_noticed_and_a_return_too = None
-    test_a_call_is_carried_out_once_and_answered = None
-    test_what_a_component_needs_is_waited_for_and_missed = None
-    test_a_stream_of_something_else_is_refused_with_the_reason = None
-    test_a_component_that_pushes_is_one_like_any_other = None
+    test_a_call_has_a_timeout = None  # type: ignore[assignment]
+    test_a_timed_push_comes_again_and_its_silence_is_noticed = None  # type: ignore[assignment]
+    test_the_newest_value_arrives_and_time_never_runs_backwards = None  # type: ignore[assignment]
+    test_components_are_active_while_somebody_active_needs_them = None  # type: ignore[assignment]
+    test_a_silent_death_frees_what_the_dead_one_needed = None  # type: ignore[assignment]
+    test_a_silent_death_is_noticed_and_a_return_too = None  # type: ignore[assignment]
+    test_a_call_is_carried_out_once_and_answered = None  # type: ignore[assignment]
+    test_what_a_component_needs_is_waited_for_and_missed = None  # type: ignore[assignment]
+    test_a_stream_of_something_else_is_refused_with_the_reason = None  # type: ignore[assignment]
+    test_a_component_that_pushes_is_one_like_any_other = None  # type: ignore[assignment]
 
 
 @pytest.mark.parametrize("seed", range(5))

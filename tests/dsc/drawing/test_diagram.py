@@ -122,7 +122,7 @@ def test_edges_begin_and_end_at_their_states_and_run_through_none(plot: ActionPl
                 assert all(apart(segment, core(inner)) for inner in box.boxes)
 
 
-def core(box: Box) -> tuple[float, ...]:
+def core(box: Box) -> tuple[float, float, float, float]:
     """What no edge may touch; a diamond does not reach into its corners."""
     if box.kind is not BoxKind.CHOICE:
         return area(box)

@@ -60,7 +60,9 @@ def _states(draw_: st.DrawFn, names: list[str], depth: int) -> tuple[str, dict[s
 @st.composite
 def _histories(draw_: st.DrawFn, names: list[str], first: int) -> dict[str, dict[str, object]]:
     targets = draw_(st.lists(st.sampled_from(names[first:]), max_size=1))
-    made = {f"h{len(names)}": {"history": draw_(st.sampled_from(["deep", "shallow"])), "to": to} for to in targets}
+    made: dict[str, dict[str, object]] = {
+        f"h{len(names)}": {"history": draw_(st.sampled_from(["deep", "shallow"])), "to": to} for to in targets
+    }
     names += made
     return made
 

@@ -93,7 +93,8 @@ def test_the_configuration_is_legal_after_every_step(plots, happened):
 @SOME
 @given(EVERY_KIND, happenings())
 def test_what_is_entered_was_not_active_and_what_is_left_was(plots, happened):
-    active, running = set(), set()
+    active: set[str] = set()
+    running: set[str] = set()
     for step in Played(*plots).steps(happened):
         for micro in step.microsteps:
             assert active >= set(micro.exited)
@@ -169,7 +170,7 @@ class Warm(Played):
         self.events = {}
         before = Played(*plots)
         before.library, before.machine.chart = self.library, self.library
-        before.made = self.made
+        before.made = self.made  # type: ignore[method-assign]
         assert all(step.state.serials for step in before.steps(happened))
 
     def made(self, what, attributes):
@@ -190,7 +191,8 @@ def test_a_mere_move_is_looked_up_as_it_would_be_worked_out(seed):
     """The same events come again and again, while the world changes in between."""
     pick = random.Random(seed).choice  # noqa: S311  # a chart, no secret
     plots = Grower(pick, bare=True, depth=2).library()
-    kinds, attributes = ("e", "f", "g", "e", "f", "g", "leave", "p", "q"), ({}, {"n": 1})
+    kinds = ("e", "f", "g", "e", "f", "g", "leave", "p", "q")
+    attributes: tuple[dict[str, int], ...] = ({}, {"n": 1})
     happened = [(pick(kinds), 0, pick(attributes)) for _ in range(60)]
     kept, forgotten = Warm(*plots, happened=happened), Forgetful(*plots)
     for a, b in zip(kept.steps(happened), forgotten.steps(happened), strict=True):

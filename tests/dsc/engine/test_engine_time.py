@@ -34,10 +34,14 @@ def timers(step):
     return [(one.event, one.index, one.seconds) for one in step.output if isinstance(one, StartTimer)]
 
 
+class Started(Run):
+    def __init__(self, *plots, **keys):
+        super().__init__(*plots, **keys)
+        self.first_step = self.start()
+
+
 def started(text, *inner, **keys):
-    run = Run(plot(text), *map(plot, inner), **keys)
-    run.first_step = run.start()
-    return run
+    return Started(plot(text), *map(plot, inner), **keys)
 
 
 # -- every -------------------------------------------------------------------------------------------------
@@ -110,7 +114,7 @@ def test_a_run_in_which_only_periods_pass_in_vain_ends_with_a_problem():
         "{plot: p, states: {a: {every: [{seconds: 1, when: (p), to: b}, {seconds: 3, emit: x}]}, b: {final: true}}}"
     )
     assert not ran.end.finished
-    assert "no skill, timer or event is pending" in ran.end.problem
+    assert "no skill, timer or event is pending" in (ran.end.problem or "")
     assert ran.at == 3.0
 
 

@@ -41,7 +41,7 @@ def test_a_transition_may_cross_borders_and_leaves_everything_up_to_the_common_c
 
 
 def test_an_internal_transition_does_not_leave_its_source():
-    inner = {"a1": {}, "a2": {}}
+    inner: dict[str, dict[str, object]] = {"a1": {}, "a2": {}}
     for internal, exited in ((True, ("a1",)), (False, ("a1", "a"))):
         run = Run(chart({"a": {"states": inner, "on": {"go": {"to": "a2", "internal": internal}}}}))
         run.start()

@@ -26,7 +26,17 @@ from dsc.model.transitions import ChoiceState, SelectState, Transition, case_val
 from dsc.text.plot_files import parse_plot, plot_to_yaml
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.effect import Add, When
-from knowledge_base.language.syntax.expression import TRUE, And, Arithmetic, Atom, Comparison, Constant, Not, Variable
+from knowledge_base.language.syntax.expression import (
+    TRUE,
+    And,
+    Arithmetic,
+    Atom,
+    Comparison,
+    Constant,
+    Expression,
+    Not,
+    Variable,
+)
 
 EVERYTHING = plot("""
     plot: everything
@@ -158,11 +168,12 @@ def test_parsed_values_are_as_good_as_text():
 
 
 def test_parsed_values_are_no_deeper_than_text_may_be():
-    deep = functools.reduce(lambda e, _: Not(e), range(100_000), Atom("free"))
+    free: Expression = Atom("free")
+    deep = functools.reduce(lambda e, _: Not(e), range(100_000), free)
     with pytest.raises(ValidationError, match="nested more than 100 deep"):
-        Transition(to="s", guard=deep)
+        Transition(to="s", guard=deep)  # type: ignore[call-arg]
     with pytest.raises(ValidationError, match="nested more than 100 deep"):
-        Transition(to="s", tell=When(deep, Add(Atom("free"))))
+        Transition(to="s", tell=When(deep, Add(Atom("free"))))  # type: ignore[call-arg]
 
 
 def test_a_list_of_effects_is_all_of_them():
@@ -483,7 +494,7 @@ SIMPLE = st.fixed_dictionaries(
     regions=st.lists(NAMES, max_size=2, unique=True),
 )
 def test_any_plot_survives_json_and_yaml(form, states, regions):
-    inner = {name: {"states": {f"in_{name}": {}}} for name in regions}
+    inner: dict[str, object] = {name: {"states": {f"in_{name}": {}}} for name in regions}
     form = {**form, "states": {**states, **({"both": {"regions": inner}} if inner else {})}}
     made = ActionPlot.model_validate(form)
     assert ActionPlot.model_validate(json.loads(json.dumps(made.to_form()))) == made

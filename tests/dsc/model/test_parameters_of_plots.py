@@ -140,7 +140,7 @@ def test_what_only_the_run_knows_is_checked_when_the_plot_is_entered():
     )
     ran = Ran(holder, WAIT.replace("WHO", "plots"))
     assert not ran.end.finished
-    assert "'wait.seconds' is from 1 to 60; found 70" in ran.end.problem
+    assert "'wait.seconds' is from 1 to 60; found 70" in (ran.end.problem or "")
 
 
 # -- while the run goes on ---------------------------------------------------------------------------------

@@ -102,7 +102,7 @@ def test_an_interrupted_run_with_a_damaged_macrostep_is_not_resumed(tmp_path):
 def test_the_chain_goes_on_over_restarts_and_what_is_added_to_a_macrostep(tmp_path):
     for _, run in Crashes(tmp_path, CHARTS["reports on the way"]).resumed():
         with archive(run.path) as runs:
-            assert [one.ended["finished"] for one in runs.require_all()] == [True]
+            assert [one.ended and one.ended["finished"] for one in runs.require_all()] == [True]
 
 
 def test_runs_do_not_go_with_the_knowledge_of_another_store(finished, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 
 import pytest
 from dsc_charts import plot
@@ -184,7 +185,8 @@ WATCHED = """
 
 
 def test_an_event_is_activated_again_and_what_holds_then_is_told(tmp_path):
-    alive, copies = tmp_path / "alive", []
+    alive = tmp_path / "alive"
+    copies: list[Path] = []
     alive.mkdir()
 
     def at(seconds, level):

@@ -130,6 +130,7 @@ def lived(tmp_path, crash_at):
                 sequencer.listen(listener)
                 task = sequencer.run("p")
             else:
+                assert kept is not None
                 task = sequencer.resume(kept)
             return await task
 

@@ -7,10 +7,11 @@ import json
 
 import pytest
 
+from dsc.calls import Outcome
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
 from dsc.messages import KnowledgeMessage, LateMessage, ParameterMessage, SkillMessage, TimerMessage
-from dsc.runs.encoding import Outcome, Shortener, awaited_form, awaited_of, full, message_form, message_of
+from dsc.runs.encoding import Shortener, awaited_form, awaited_of, full, message_form, message_of
 from knowledge_base.facts import Delta, fact
 
 PLOT = {"plot": "made", "states": {}}
@@ -63,7 +64,7 @@ def test_a_plot_among_values_is_put_away_once_and_found_again(forms, short):
 def test_a_message_comes_back(message, forms, short):
     form = written(message_form(message, short))
     assert json.dumps(PLOT) not in json.dumps(form)
-    assert message_of(form, {"r-2": START}.get, lambda digest: json.loads(forms[digest])) == message
+    assert message_of(form, {"r-2": START}.__getitem__, lambda digest: json.loads(forms[digest])) == message
 
 
 @pytest.mark.parametrize(

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from random_charts import happenings, libraries
 from test_engine_properties import Played
 
+from dsc.calls import Outcome
 from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import Cancel, Revoke, SendLater, SetParameter, Start, StartTimer
 from dsc.events import Event
 from dsc.messages import ParameterMessage, SkillMessage, TimerMessage
-from dsc.runs.encoding import Outcome, Shortener, frame_form
+from dsc.runs.encoding import Shortener, frame_form
 from dsc.runs.state import RunState
 from dsc.runs.tables import RunSnapshot, SnapshotRow, latest_snapshot
 
@@ -26,7 +27,8 @@ EVERY_KIND = st.one_of(libraries(depth=2), libraries(scxml=True, depth=2))
 @settings(PROPERTY, max_examples=40)
 @given(EVERY_KIND, happenings(), st.integers(min_value=2, max_value=5))
 def test_the_changes_are_enough_to_have_all_frames(plots, happened, whole_every):
-    forms, played, changes = {}, Played(*plots), []
+    played, changes = Played(*plots), []
+    forms: dict[str, str] = {}
     kept = RunState(Shortener(forms.__setitem__))
     for number, _ in enumerate(played.steps(happened)):
         state = played.machine.state
@@ -50,6 +52,7 @@ def reactor_of(machine):
 WORK = Start("r-2", 2, "robot", "work", {})
 LATER = SendLater(Event("go"), 5.0, id="x")
 TIMEOUT = StartTimer(2, 0, 9.0)
+NOBODY = SimpleNamespace(caused_by={})
 
 
 @pytest.mark.parametrize(
@@ -61,7 +64,7 @@ TIMEOUT = StartTimer(2, 0, 9.0)
         lambda state: state.take(LATER),
         lambda state: state.ask([Cancel(2)], 2, 1.0, NOBODY),
         lambda state: (state.ask([Cancel(2)], 2, 1.0, NOBODY), state.dispatched(())),
-        lambda state: state.ask([Revoke(LATER.event.frame, "x")], 2, 1.0, NOBODY),
+        lambda state: state.ask([Revoke(LATER.event.frame, "x")], 2, 1.0, NOBODY),  # type: ignore[arg-type]
         lambda state: (state.dispatched(()), state.ask([SetParameter("robot", "speed", 2)], 2, 1.0, NOBODY)),
         lambda state: state.ask([StartTimer(3, 0, 1.0), Cancel(3)], 2, 1.0, NOBODY),
     ],
@@ -75,9 +78,6 @@ def test_what_is_pending_is_the_same_by_changes_and_as_a_whole(happens):
     change = state.change()
     found.apply(json.loads(change))
     assert found.pending == latest_snapshot([state.change(whole=True)]).pending
-
-
-NOBODY = SimpleNamespace(caused_by={})
 
 
 def test_another_kind_of_number_is_another_setting():
@@ -101,7 +101,7 @@ def test_of_events_that_are_sent_alike_one_is_awaited_no_longer_when_one_comes()
     assert list(pending(state)) == [1, 2, 3]
     state.take(LATER)
     assert list(pending(state)) == [2, 3]
-    state.ask([Revoke(LATER.event.frame, "x")], 2, 1.0, NOBODY)
+    state.ask([Revoke(LATER.event.frame, "x")], 2, 1.0, NOBODY)  # type: ignore[arg-type]
     assert pending(state) == {}
 
 

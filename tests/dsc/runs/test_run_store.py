@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from types import MappingProxyType
 
 import pytest
@@ -19,7 +20,7 @@ from dsc.runs import store as store_module
 from dsc.runs.archive import archive, has_run, records_of
 from dsc.runs.store import RunStore
 from dsc.sequencer.replay import replay
-from dsc.sequencer.sequencer import RunEnd
+from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.skills import skill
 from knowledge_base.errors import Place, StoreError, UnknownNameError
 from knowledge_base.facts import Delta, fact
@@ -106,7 +107,7 @@ def test_nothing_is_started_that_is_not_committed(tmp_path):
 
     class Watching(Robot):
         @skill(outcomes={"did": {}}, after_crash="same_id")
-        async def work(self, call, seconds=0, observes=""):
+        async def work(self, call, seconds=0, observes=""):  # type: ignore[override]
             with archive(tmp_path / "run.kb") as runs:
                 seen.append((call.action_id, [start.action_id for start, _ in runs.under_way()]))
             return Outcome("did")
@@ -125,7 +126,7 @@ def test_events_that_let_nothing_leave_are_committed_together_and_with_what_leav
 
     class Watching(Robot):
         @skill(outcomes={"did": {}}, after_crash="same_id")
-        async def work(self, call):
+        async def work(self, call):  # type: ignore[override]
             seen.append(committed())
             return Outcome("did")
 
@@ -258,11 +259,11 @@ def test_an_old_sequencer_cannot_write_where_a_new_one_has_taken_over(tmp_path):
 
 
 def test_a_run_ends_with_an_error_when_it_cannot_be_kept_and_nothing_is_started(tmp_path):
-    running = []
+    running: list[Sequencer] = []
 
     class Talkative(Robot):
         @skill(outcomes={"did": {"n": None}}, after_crash="same_id")
-        async def work(self, call, seconds=0, observes=""):
+        async def work(self, call, seconds=0, observes=""):  # type: ignore[override]
             with running[0].knowledge.together() as connection:
                 connection.execute("PRAGMA max_page_count = 1")  # as large as it is now
             self.done[call.action_id] = 1
@@ -293,7 +294,7 @@ def test_a_run_that_is_cancelled_has_ended_with_its_components_at_rest(tmp_path)
 def test_texts_with_any_kind_of_line_break_are_kept_in_their_records(tmp_path):
     class Poet(Robot):
         @skill(outcomes={"did": {"n": None}}, after_crash="repeat")
-        async def work(self, call, seconds=0, observes=""):
+        async def work(self, call, seconds=0, observes=""):  # type: ignore[override]
             return Outcome("did", {"n": "one\u2028two\x85three\nfour\u2029five"})
 
     run = Run(tmp_path, [TWICE], robot=Poet())
@@ -446,7 +447,7 @@ def asked(tmp_path, after_crash, status):
             assert (skill_name, arguments) == ("fetch", {})
             return status
 
-    copies = []
+    copies: list[Path] = []
     run_with(
         new(tmp_path),
         ASKING,
@@ -520,7 +521,7 @@ class Stubborn(Robot):
 
 def cancelled(tmp_path):
     """Copies from after the macrostep that starts `fetch`, from after that which cancels it, and from after the next."""
-    copies = []
+    copies: list[Path] = []
     (tmp_path / "alive").mkdir()
     run_with(
         tmp_path / "alive",

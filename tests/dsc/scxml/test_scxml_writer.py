@@ -121,7 +121,9 @@ def test_connectors_are_passed_through_as_states_that_wait_for_nothing():
     assert read.initial == "first"
     assert [(one.target, len(one.effect)) for one in read.states["first"].always] == [("a", 1), ("b", 0)]
     assert [one.target for one in read.states["which"].always] == ["a", "b", "first"]
-    assert to_text(read.states["which"].always[0].guard) == '(and (= ?event.kind "cup") (> ?x 1))'
+    guard = read.states["which"].always[0].guard
+    assert guard is not None
+    assert to_text(guard) == '(and (= ?event.kind "cup") (> ?x 1))'
     assert to_scxml(read) == written
 
 

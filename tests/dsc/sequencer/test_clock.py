@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import time
 import weakref
+from functools import partial
+from typing import Any
 
 import pytest
 
@@ -135,7 +137,7 @@ def test_what_is_due_at_one_moment_comes_in_the_order_in_which_it_was_asked_for(
 
         await asyncio.gather(*map(sleeper, range(20)))
         for number in range(20):
-            clock.call_at(5.0, lambda number=number: woken.append(number))
+            clock.call_at(5.0, partial(woken.append, number))
         await clock.sleep_until(6.0)
         return woken
 
@@ -144,7 +146,8 @@ def test_what_is_due_at_one_moment_comes_in_the_order_in_which_it_was_asked_for(
 
 def test_what_is_due_may_cancel_what_is_due_with_it():
     async def main():
-        clock, called, others = LoopClock(), [], []
+        clock, called = LoopClock(), []
+        others: list[Any] = []
         clock.call_at(1.0, lambda: others.pop().cancel())
         others.append(clock.call_at(1.0, lambda: called.append(1)))
         await clock.sleep(2)

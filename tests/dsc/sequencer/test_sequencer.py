@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Any
 
 import pytest
 from dsc_charts import plot
@@ -14,6 +15,7 @@ from dsc.events import Event
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
+from dsc.trace import Record
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.store import KnowledgeBase
@@ -115,7 +117,7 @@ def test_an_outcome_whose_guards_do_not_hold_ends_the_run_with_a_problem():
     ran = Ran(
         "{plot: p, states: {a: {entry: {trigger: arm.grasp}, on: {grasped: {to: e, when: (p)}}}, e: {final: true}}}"
     )
-    assert "no transition handles 'grasped'" in ran.end.problem
+    assert "no transition handles 'grasped'" in (ran.end.problem or "")
 
 
 def test_nothing_to_wait_for_ends_the_run_with_a_problem():
@@ -128,7 +130,7 @@ def test_a_timeout_that_leads_nowhere_does_not_keep_the_run_alive():
     ran = Ran(
         "{plot: p, states: {a: {after: [{seconds: 0.1, to: e, when: (p)}, {seconds: 0.3, to: e, when: (p)}]}, e: {final: true}}}"
     )
-    assert "deadlock: no skill, timer or event is pending" in ran.end.problem
+    assert "deadlock: no skill, timer or event is pending" in (ran.end.problem or "")
     assert ran.at == pytest.approx(0.3)
 
 
@@ -136,7 +138,7 @@ def test_an_error_of_the_chart_ends_the_run_with_a_problem():
     ran = Ran(
         "{plot: p, states: {a: {entry: {trigger: arm.grasp}, on: {grasped: {to: e, tell: (nonsense)}}}, e: {final: true}}}"
     )
-    assert "nonsense" in ran.end.problem
+    assert "nonsense" in (ran.end.problem or "")
 
 
 @pytest.mark.parametrize(
@@ -150,7 +152,7 @@ def test_an_error_of_the_chart_ends_the_run_with_a_problem():
 def test_a_chart_that_goes_round_in_circles_ends_the_run_with_a_problem(states):
     ran = Ran("{plot: p, states: " + states + "}")
     assert not ran.end.finished
-    assert "goes round" in ran.end.problem or "nested deeper" in ran.end.problem
+    assert "goes round" in (ran.end.problem or "") or "nested deeper" in (ran.end.problem or "")
     assert ran.of_type("end") == [{"finished": False, "problem": ran.end.problem}]
 
 
@@ -160,7 +162,7 @@ def test_a_component_that_is_not_there_ends_the_run_with_a_problem(entry, at_onc
     first = "a: {always: b}" if at_once else "a: {after: {seconds: 1, to: b}}"
     ran = Ran("{plot: p, states: {" + first + ", b: {entry: " + entry + ", on: {grasped: e}}, e: {final: true}}}")
     assert not ran.end.finished
-    assert "there is no component 'am'; did you mean 'arm'?" in ran.end.problem
+    assert "there is no component 'am'; did you mean 'arm'?" in (ran.end.problem or "")
 
 
 def test_a_wrong_start_is_refused():
@@ -246,10 +248,10 @@ def test_every_record_names_what_caused_it():
           a: {entry: {trigger: arm.look}, on: {found: {to: e, tell: (told)}}}
           e: {final: true}
     """)
-    by_seq = {record.seq: record for record in ran.records}
+    by_seq: dict[int | None, Record] = {record.seq: record for record in ran.records}
     assert [record.seq for record in ran.records] == list(range(1, len(ran.records) + 1))
     chain = []
-    record = next(r for r in ran.records if r.type == "knowledge" and r.data["author"] == "chart")
+    record: Record | None = next(r for r in ran.records if r.type == "knowledge" and r.data["author"] == "chart")
     while record is not None:
         chain.append(record.type)
         record = by_seq.get(record.cause)
@@ -290,7 +292,7 @@ def test_a_component_counts_as_busy_until_its_answer_is_taken():
         async def switch(self, mode):
             seen.append(sorted(start.component for start in ran_holder[0].dispatcher.started()))
 
-    ran_holder = []
+    ran_holder: list[Sequencer] = []
     Ran(
         """
         plot: p
@@ -368,7 +370,7 @@ def test_a_run_that_ends_with_a_problem_puts_its_components_at_rest():
           b: {final: true}
         """
     )
-    assert "no transition handles 'grasped'" in ran.end.problem
+    assert "no transition handles 'grasped'" in (ran.end.problem or "")
     assert ran.arm.log[-2:] == ["speed=0", "mode neutral"]
     assert ran.of_type("end")[0]["problem"] == ran.end.problem
     assert ran.sequencer.machine.state.root is None
@@ -408,7 +410,8 @@ def test_whoever_listens_is_told_every_step_before_its_actions_leave():
         sequencer.post(Event("nonsense"), after=1)
         sequencer.change(Delta(added=(Fact("q"),)), "somebody", after=1.5)
 
-    heard, arm = [], Arm()
+    heard: list[tuple[Any, list[str]]] = []
+    arm = Arm()
     ran = Ran(GRASP, arm=arm, prepare=prepare)
     assert ran.end.finished
     assert [(step.event and step.event.name, step.moved) for step, _ in heard] == [
@@ -418,7 +421,7 @@ def test_whoever_listens_is_told_every_step_before_its_actions_leave():
 
 
 def test_a_run_that_ends_with_a_problem_tells_the_step_that_leaves_everything():
-    heard = []
+    heard: list[Any] = []
     ran = Ran(
         "{plot: p, states: {a: {on: {stop: e}}, e: {final: true}}}",
         prepare=lambda sequencer: sequencer.listen(heard.append),
@@ -447,7 +450,7 @@ def test_what_is_still_to_come_when_a_run_ends_is_dropped():
 
 
 def test_what_was_still_to_come_does_not_come_in_the_next_run():
-    heard = []
+    heard: list[Any] = []
 
     async def main():
         waits = Library([plot("{plot: p, states: {a: {after: {seconds: 3, to: e}}, e: {final: true}}}")])

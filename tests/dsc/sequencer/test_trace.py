@@ -26,7 +26,8 @@ def test_a_record_is_one_line_with_the_head_first():
 
 def test_records_are_numbered_timed_and_caused():
     times = iter([0.0, 1.5])
-    trace, heard = Trace(lambda: next(times)), []
+    trace = Trace(lambda: next(times))
+    heard: list[Record] = []
     trace.listen(heard.append)
     first = trace.record("event", name="a")
     trace.cause = first
@@ -35,7 +36,9 @@ def test_records_are_numbered_timed_and_caused():
 
 
 def test_all_listeners_hear_the_same_from_when_they_listen_on():
-    trace, early, late = Trace(lambda: 0.0), [], []
+    trace = Trace(lambda: 0.0)
+    early: list[Record] = []
+    late: list[Record] = []
     trace.listen(early.append)
     trace.record("event")
     trace.listen(late.append)
@@ -69,7 +72,8 @@ INNER = "{plot: q, when: (p), states: {s: {after: {seconds: 1, to: e}}, e: {fina
 def traced():
     kb = KnowledgeBase(Schema.parse("(define (domain d) (:predicates (p)))"))
     library = Library([plot(PLOTS), plot(INNER)])
-    trace, heard = Trace(lambda: 0.0), []
+    trace = Trace(lambda: 0.0)
+    heard: list[Record] = []
     trace.listen(heard.append)
     tracer, machine = StepTracer(trace), Machine(library)
     for step in (
@@ -119,7 +123,8 @@ def test_actions_are_told_and_timers_are_not():
 
 
 def test_a_skill_that_is_cancelled_is_told_once_and_one_that_ended_is_not():
-    trace, heard = Trace(lambda: 0.0), []
+    trace = Trace(lambda: 0.0)
+    heard: list[Record] = []
     trace.listen(heard.append)
     tracer = StepTracer(trace)
     starts = [Start(f"a{n}.0", n, "c", "s", {}) for n in (1, 2)]
@@ -176,7 +181,8 @@ def test_a_step_tells_new_and_changed_variables_by_the_state_that_holds_their_pl
     library = Library(
         [plot(outer), plot("{plot: q, parameters: {m: {type: number}}, states: {s: {}, e: {final: true}}}")]
     )
-    trace, heard = Trace(lambda: 0.0), []
+    trace = Trace(lambda: 0.0)
+    heard: list[Record] = []
     trace.listen(heard.append)
     tracer, machine = StepTracer(trace), Machine(library)
     situation = KnowledgeSituation(KnowledgeBase(Schema.parse("(define (domain d))")), library)

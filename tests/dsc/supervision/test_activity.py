@@ -23,6 +23,8 @@ from dsc.testing.faults import LossyTransport
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 
+Log = list[tuple[float, str]]
+
 
 class Device(Component):
     """Notes what it is told, and when."""
@@ -67,7 +69,7 @@ LOOK = """
 
 
 def test_a_component_is_on_while_a_state_uses_it_and_so_is_what_it_needs():
-    log = []
+    log: Log = []
     end, _ = ran(
         LOOK, Device("camera", log, needs=("power",)), Device("power", log, needs=("net",)), Device("net", log)
     )
@@ -84,13 +86,13 @@ def test_a_component_is_on_while_a_state_uses_it_and_so_is_what_it_needs():
 
 
 def test_a_component_that_nobody_needs_is_left_alone():
-    log = []
+    log: Log = []
     ran(LOOK, Device("camera", log), Device("power", log))
     assert not [what for _, what in log if what.startswith("power")]
 
 
 def test_what_two_need_is_off_when_neither_does():
-    log = []
+    log: Log = []
     text = """
         plot: p
         states:
@@ -121,7 +123,7 @@ MAP = """
 
 
 def test_a_mode_counts_as_long_as_it_is_on():
-    log = []
+    log: Log = []
     ran(MAP, Device("camera", log, mapping=("lamp",)), Device("lamp", log))
     assert [one for one in log if "starts" not in one[1]] == [
         (0, "lamp on"), (0, "camera on"), (7, "camera off"), (7, "lamp off"),
@@ -129,7 +131,7 @@ def test_a_mode_counts_as_long_as_it_is_on():
 
 
 def test_a_mode_from_before_a_restart_counts():
-    log = []
+    log: Log = []
 
     async def main():
         components = [Device("camera", log, mapping=("lamp",)), Device("lamp", log)]
@@ -145,20 +147,20 @@ def test_a_mode_from_before_a_restart_counts():
 
 
 def test_a_mode_that_is_refused_keeps_nobody_on():
-    log = []
+    log: Log = []
     ran(MAP.replace("mapping", "maping"), Device("camera", log))
     assert log == []
 
 
 def test_a_mode_that_was_left_on_ends_with_the_run():
-    log = []
+    log: Log = []
     ran(MAP.replace("exit: {switch: camera, to: neutral}, ", ""), Device("camera", log))
     assert log[-1] == (12, "camera off")
 
 
 @pytest.mark.parametrize("late", [False, True])
 def test_what_a_mode_needs_counts_also_if_it_is_entered_while_a_skill_is_at_work(late):
-    log = []
+    log: Log = []
     lamp = Device("lamp", log)
     text = """
         plot: p
@@ -191,7 +193,7 @@ class Slow(Device):
 
 
 def test_a_skill_after_a_change_of_mode_waits_for_what_the_mode_needs():
-    log = []
+    log: Log = []
     text = """
         plot: p
         states:
@@ -213,7 +215,7 @@ def test_a_skill_after_a_change_of_mode_waits_for_what_the_mode_needs():
 
 
 def test_what_was_started_anew_is_switched_on_anew():
-    log = []
+    log: Log = []
     power = Device("power", log)
 
     async def crash(_):
@@ -230,7 +232,7 @@ def test_what_was_started_anew_is_switched_on_anew():
 
 
 def test_what_cannot_be_switched_on_fails_its_skills_and_says_why():
-    log = []
+    log: Log = []
     camera = Device("camera", log)
     camera.refuses = 1
     end, at = ran(LOOK, camera)
@@ -239,7 +241,7 @@ def test_what_cannot_be_switched_on_fails_its_skills_and_says_why():
 
 
 def test_what_is_needed_and_cannot_be_switched_on_is_tried_again():
-    log = []
+    log: Log = []
     power = Device("power", log)
     power.refuses = 2
     end, _ = ran(LOOK, Device("camera", log, needs=("power",)), power)
@@ -264,21 +266,22 @@ def test_what_does_not_come_off_does_not_keep_the_run():
 def test_a_component_is_on_while_it_puts_things_in_order():
     class Careful(Device):
         @skill(outcomes={"looked": {}})
-        async def look(self, call):
+        async def look(self, call):  # type: ignore[override]
             try:
                 await call.clock.sleep(100)
             finally:
                 await call.clock.sleep(3)
                 self.note("is folded")
 
-    log = []
+    log: Log = []
     text = "{plot: p, states: {a: {entry: {trigger: arm.look}, after: {seconds: 5, to: b}, on: {looked: b}}, b: {after: {seconds: 20, to: e}}, e: {final: true}}}"
     ran(text, Careful("arm", log, needs=("power",)), Device("power", log))
     assert log[-3:] == [(8, "arm is folded"), (8, "arm off"), (8, "power off")]
 
 
 def test_who_takes_the_place_of_another_is_on_instead_of_it():
-    old, new = [], []
+    old: Log = []
+    new: Log = []
 
     async def replace(sequencer):
         await asyncio.sleep(2)
@@ -290,7 +293,7 @@ def test_who_takes_the_place_of_another_is_on_instead_of_it():
 
 
 def test_a_run_that_is_cancelled_switches_everything_off():
-    log = []
+    log: Log = []
 
     async def main():
         camera = Device("camera", log, needs=("power",))
@@ -310,7 +313,7 @@ def test_a_run_that_is_cancelled_switches_everything_off():
 
 @pytest.mark.parametrize("transport", [LocalTransport, lambda: LossyTransport(3, loss=0.2, double=0.3, delay=0.1)])
 def test_components_elsewhere_are_switched_on_and_off_by_the_run_itself(transport):
-    log = []
+    log: Log = []
 
     async def main():
         carrier, clock = transport(), LoopClock()
@@ -336,7 +339,7 @@ def test_components_elsewhere_are_switched_on_and_off_by_the_run_itself(transpor
 
 
 def test_one_component_in_two_runs_is_off_when_neither_needs_it():
-    log = []
+    log: Log = []
 
     async def main():
         camera, kb = Device("camera", log), KnowledgeBase(Schema())

@@ -229,7 +229,7 @@ def test_a_sequencer_tells_it_while_it_runs():
         asyncio.get_running_loop().call_later(1, lambda: seen.append(coverage.ratio))
         await sequencer.run("p")
 
-    seen = []
+    seen: list[float] = []
     run_simulated(main())
     assert seen == [1 / 3]
     assert coverage.ratio == 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from typing import Any
 
 import pytest
 from dsc_charts import plot
@@ -70,7 +71,7 @@ class Lives:
 
     def __init__(self, folder, seed, chance, most=3, robot=Robot):
         self.robot = robot
-        self.crashes = Crashes(folder, seed, chance, most)
+        self.crashes: Crashes[Any] = Crashes(folder, seed, chance, most)
         self.begun = 0
 
     def live(self, folder):
@@ -99,7 +100,7 @@ class Lives:
 
 
 def test_wherever_a_run_is_killed_it_comes_to_the_same_end(tmp_path):
-    fired = Counter()
+    fired: Counter[str] = Counter()
     for seed in range(25):
         (folder := tmp_path / str(seed)).mkdir()
         lives = Lives(folder, seed, 0.1)
@@ -155,7 +156,7 @@ def test_there_are_no_more_crashes_than_wanted(tmp_path):
 
 
 def test_an_error_of_the_store_that_is_none_of_ours_is_raised(tmp_path):
-    crashes = Crashes(tmp_path, 1, 1.0)
+    crashes: Crashes[Any] = Crashes(tmp_path, 1, 1.0)
 
     def live(folder):
         raise StoreError("a disk is broken")

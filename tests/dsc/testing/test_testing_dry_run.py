@@ -158,12 +158,12 @@ def test_by_hand_and_rehearsed_a_plot_does_the_same(grasps, blocked):
     drives = ["no_path"] * blocked + ["arrived"] * 5
     whole = rehearse(PLOTS, "fetch", {"item": "cup"}, knowledge=world(SCHEMA, "cup - item"),
                      skills={"base.drive": drives, "arm.grasp": answers})  # fmt: skip
-    run, drives, answers = fetch(), iter(drives), iter(answers)
+    run, to_drive, to_grasp = fetch(), iter(drives), iter(answers)
     while not run.finished:
         if "base.drive" in running(run):
-            run.answer("base.drive", next(drives))
+            run.answer("base.drive", next(to_drive))
         elif "arm.grasp" in running(run):
-            answer = next(answers)
+            answer = next(to_grasp)
             run.answer("arm.grasp", answer.event, answer.attributes)
         else:
             run.advance(10)

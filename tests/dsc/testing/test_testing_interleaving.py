@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import pytest
 from dsc_charts import plot
@@ -46,7 +47,7 @@ class Side(Component):
 
 def heard(interleaving):
     """Who was heard in which order, as far as anybody listened."""
-    order = []
+    order: list[Any] = []
 
     async def main():
         clock = LoopClock()

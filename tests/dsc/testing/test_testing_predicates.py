@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
 from dsc_charts import plot
 from fetching import PLOTS, SCHEMA
@@ -33,7 +35,10 @@ SLIPPED = Answer("slipped", {"item": "cup"})
 @pytest.fixture(scope="module")
 def run():
     known = world(SCHEMA, "cup - item", "(= (failures cup) 1)")
-    skills = {"base.drive": ["no_path", "arrived"], "arm.grasp": [SLIPPED, "grasped"]}
+    skills: dict[str, Sequence[str | Answer]] = {
+        "base.drive": ["no_path", "arrived"],
+        "arm.grasp": [SLIPPED, "grasped"],
+    }
     return rehearse(PLOTS, "fetch", {"item": "cup"}, skills=skills, knowledge=known, events=[(4, "hello")])
 
 
@@ -166,4 +171,4 @@ def test_choices():
 
 
 def test_every_public_name_is_there():
-    assert all(callable(getattr(testing, name)) for name in testing.__all__)
+    assert all(callable(getattr(testing, name)) for name in vars(testing)["__all__"])

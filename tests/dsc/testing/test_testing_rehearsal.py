@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from typing import Any
 
 import pytest
 from dsc_charts import plot
 from fetching import PLOTS, SCHEMA, Arm, Base
 
 from dsc import Event, Library
+from dsc.model.plot import ActionPlot
 from dsc.testing import Answer, Call, consumed, entered, exited, rehearsal, rehearse, started, took, trail, world
 from knowledge_base import Delta, InputError, ParseError, UnknownNameError, fact
 
@@ -38,8 +41,9 @@ def test_a_run_is_told_whole():
 def test_a_library_and_its_plots_are_the_same_to_a_rehearsal():
     skills = {"base.drive": "arrived", "arm.grasp": "grasped"}
     known = [world(SCHEMA, "cup - item") for _ in range(2)]
+    both: list[Iterable[ActionPlot]] = [PLOTS, Library(PLOTS)]
     runs = [rehearse(plots, "fetch", {"item": "cup"}, skills=skills, knowledge=kb)
-            for plots, kb in zip((PLOTS, Library(PLOTS)), known, strict=True)]  # fmt: skip
+            for plots, kb in zip(both, known, strict=True)]  # fmt: skip
     assert runs[0].records == runs[1].records
     assert runs[0].finished
 
@@ -49,7 +53,7 @@ def test_one_answer_is_for_every_call_and_a_function_makes_its_own():
         lucky.append(call)
         return "grasped" if len(lucky) == 3 else Answer("slipped", {"item": call.arguments["item"]})
 
-    lucky = []
+    lucky: list[Any] = []
     run = fetch({"base.drive": "arrived", "arm.grasp": third_time_lucky})
     assert [call.at for call in lucky] == [1, 2, 3]
     assert run.calls[1:] == tuple(lucky)
@@ -130,7 +134,7 @@ def test_components_of_ones_own_stand_beside_scripted_ones():
             await super().switch(mode)
             modes.append(mode)
 
-    modes = []
+    modes: list[str] = []
     run = fetch({"arm.grasp": "grasped"}, components=[Real()])
     assert run.finished
     assert modes == ["neutral"]
@@ -185,7 +189,7 @@ def test_what_was_still_to_come_when_the_run_ended_is_nobodys_business():
 
 def test_others_change_the_knowledge():
     waiting = plot("{plot: p, states: {a: {always: {to: e, when: (and (open) (not (near shelf)))}}, e: {final: true}}}")
-    changes = [(3, "(open)"), (8, Delta(removed=(fact("near", "shelf"),)))]
+    changes: list[tuple[float, Delta | str]] = [(3, "(open)"), (8, Delta(removed=(fact("near", "shelf"),)))]
     run = rehearse([waiting], "p", knowledge=world(SCHEMA, facts="(near shelf)"), changes=changes)
     assert run.finished
     assert run.seconds == pytest.approx(8)

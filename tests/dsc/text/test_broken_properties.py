@@ -116,8 +116,8 @@ def said(read, text):
     """What is said about a text, all findings included; each must have a place in it."""
     try:
         made = read(text, "f")
-    except InputError as error:
-        found = [error]
+    except InputError as refused:
+        found = [refused]
     else:
         library = Library([made, *(one for one in LIBRARY if one.name != made.name)])
         found = [finding.error for finding in validate_plot(made, library, SCHEMA)]

@@ -89,6 +89,7 @@ def expected(file):
     if file.name in BYTES:
         return BYTES[file.name]
     found = EXPECTED.fullmatch(file.read_text().splitlines()[0])
+    assert found is not None
     return int(found[1]), found[2]
 
 
@@ -138,7 +139,7 @@ def test_all_files_at_once_are_all_complained_about(dsc):
 def test_the_installed_command_says_the_same(complaints, name):
     file = BROKEN / name
     words = ["plot", "import" if file.suffix == ".scxml" else "check", str(file)]
-    command = [Path(sys.executable).with_name("dsc"), *words]
+    command: list[str | Path] = [Path(sys.executable).with_name("dsc"), *words]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     assert result.returncode == 2
     assert (result.stdout + result.stderr).removeprefix("dsc: ").splitlines() == complaints(file)

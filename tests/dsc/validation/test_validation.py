@@ -630,7 +630,7 @@ def _ring(size):
 
 def _handed_on(size):
     """Submachines one after the other, each with a choice before it that passes what the plot inside needs."""
-    states = {}
+    states: dict[str, dict[str, object]] = {}
     for n in range(size):
         states[f"c{n}"] = {
             "choice": [{"to": f"c{n + 1}", "when": "(> ?n 0)"}, {"to": f"s{n}", "pass": {"item": "?item"}}]
@@ -664,7 +664,12 @@ def test_a_large_plot_is_walked_no_oftener_than_a_small_one(form, monkeypatch):
         seen = []
         walk = ActionPlot.walk
         library = Library([*HELPERS, large])
-        monkeypatch.setattr(ActionPlot, "walk", lambda self: (seen.append(self), walk(self))[1])
+
+        def noted(self):
+            seen.append(self)
+            return walk(self)
+
+        monkeypatch.setattr(ActionPlot, "walk", noted)
         assert validate_plot(large, library, SCHEMA) == []
         monkeypatch.undo()
         return len(seen)

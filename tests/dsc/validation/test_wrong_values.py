@@ -83,7 +83,7 @@ def sequencer_of(**other):
     ("act", "said"),
     [
         (at_work(lambda run: run.post("stop")), "an event is an Event with its attributes, as Event(\"stop\", {}), not 'stop'"),
-        (at_work(lambda run: run.post(Event("stop", ["a"]))), "an event is an Event with its attributes"),
+        (at_work(lambda run: run.post(Event("stop", ["a"]))), "an event is an Event with its attributes"),  # type: ignore[arg-type]
         (at_work(lambda run: run.post(Event("stop"), after="soon")), "a finite number of seconds, not 'soon'"),
         (at_work(lambda run: run.post(Event("stop"), after=float("nan"))), "a finite number of seconds, not nan"),
         (at_work(lambda run: run.change([1], "me")), "a change is a Delta, not [1]"),
@@ -101,34 +101,34 @@ def sequencer_of(**other):
         (sequencer_of(clock=5), "the clock is a LoopClock, made inside the loop that runs the sequencer, not 5"),
         (sequencer_of(trace=[]), "a trace is a Trace, not []"),
         (sequencer_of(store="a.kb"), "a store is a RunStore, not 'a.kb'"),
-        (lambda: Library(5), "a library is made of a list of plots, not of 5"),
-        (lambda: validate_plot("p", Library()), "a plot is an ActionPlot, as load_plot and parse_plot give it, not 'p'"),
-        (lambda: validate_plot(PLOT, [PLOT]), "the plots are given as a Library, made by Library(plots), not ["),
-        (lambda: validate_plot(PLOT, Library(), "(define"), "a schema is a Schema; Schema.parse reads its text, not '(define'"),
-        (lambda: validate_plot(PLOT, Library(), None, 5), "the signatures of skills are given as a list, not as 5"),
-        (lambda: validate_plot(PLOT, Library(), None, ["go"]), "a skill is known by its SkillSignature, as the skills() of a component give it, not 'go'"),
-        (lambda: validate_library([PLOT], None, None), "the plots are given as a Library"),
-        (lambda: Library(["p"]), "a plot is an ActionPlot, as load_plot and parse_plot give it, not 'p'"),
-        (lambda: Library(PLOT), "a library is made of a list of plots"),
-        (lambda: parse_plot(None), "the YAML text is text, not None"),
-        (lambda: load_plot(5), "a file or folder is named by a text or a Path, not 5"),
-        (lambda: load_library(None), "a file or folder is named by a text or a Path, not None"),
+        (lambda: Library(5), "a library is made of a list of plots, not of 5"),  # type: ignore[arg-type]
+        (lambda: validate_plot("p", Library()), "a plot is an ActionPlot, as load_plot and parse_plot give it, not 'p'"),  # type: ignore[arg-type]
+        (lambda: validate_plot(PLOT, [PLOT]), "the plots are given as a Library, made by Library(plots), not ["),  # type: ignore[arg-type]
+        (lambda: validate_plot(PLOT, Library(), "(define"), "a schema is a Schema; Schema.parse reads its text, not '(define'"),  # type: ignore[arg-type]
+        (lambda: validate_plot(PLOT, Library(), None, 5), "the signatures of skills are given as a list, not as 5"),  # type: ignore[arg-type]
+        (lambda: validate_plot(PLOT, Library(), None, ["go"]), "a skill is known by its SkillSignature, as the skills() of a component give it, not 'go'"),  # type: ignore[list-item]
+        (lambda: validate_library([PLOT], None, None), "the plots are given as a Library"),  # type: ignore[arg-type]
+        (lambda: Library(["p"]), "a plot is an ActionPlot, as load_plot and parse_plot give it, not 'p'"),  # type: ignore[list-item]
+        (lambda: Library(PLOT), "a library is made of a list of plots"),  # type: ignore[arg-type]
+        (lambda: parse_plot(None), "the YAML text is text, not None"),  # type: ignore[arg-type]
+        (lambda: load_plot(5), "a file or folder is named by a text or a Path, not 5"),  # type: ignore[arg-type]
+        (lambda: load_library(None), "a file or folder is named by a text or a Path, not None"),  # type: ignore[arg-type]
         (lambda: load_library("/nowhere"), "there are no plots (*.yaml) in '/nowhere'"),
         (lambda: ActionPlot.model_validate("p"), "a mapping was expected; found 'p'"),
-        (lambda: skill(outcomes=["ok"]), "the outcomes of a skill are a mapping of names, as in @skill(outcomes={'grasped': {}})"),
-        (lambda: skill(outcomes={"ok": ["item"]}), "the attributes of 'ok' are a mapping of names"),
-        (lambda: skill(lambda call: None), "the outcomes of a skill are a mapping of names"),
-        (lambda: skill(outcomes={}, blocking="tread"), "blocks in a thread or a process, not 'tread'; did you mean 'thread'?"),
-        (lambda: query(["hours"]), "the values of an answer are a mapping of names"),
-        (lambda: event(5), "the attributes of an event are a mapping of names"),
-        (lambda: component_of("arm", "go"), "'go' is not a skill: decorate a function with `skill`"),
+        (lambda: skill(outcomes=["ok"]), "the outcomes of a skill are a mapping of names, as in @skill(outcomes={'grasped': {}})"),  # type: ignore[arg-type]
+        (lambda: skill(outcomes={"ok": ["item"]}), "the attributes of 'ok' are a mapping of names"),  # type: ignore[dict-item]
+        (lambda: skill(lambda call: None), "the outcomes of a skill are a mapping of names"),  # type: ignore[arg-type]
+        (lambda: skill(outcomes={}, blocking="tread"), "blocks in a thread or a process, not 'tread'; did you mean 'thread'?"),  # type: ignore[arg-type]
+        (lambda: query(["hours"]), "the values of an answer are a mapping of names"),  # type: ignore[arg-type]
+        (lambda: event(5), "the attributes of an event are a mapping of names"),  # type: ignore[arg-type]
+        (lambda: component_of("arm", "go"), "'go' is not a skill: decorate a function with `skill`"),  # type: ignore[arg-type]
         (lambda: primitive_plot(Arm().skills()["go"], done="okk"), "no outcome 'okk'; did you mean 'ok'?"),
         (executive([Arm]), "an instance is made by Arm()"),
         (executive(["arm"]), "a component is an instance of a subclass of Component, not 'arm'"),
         (executive([Arm(), Arm()]), "two components are named 'arm'"),
         (executive([], ["p"]), "a plot is an ActionPlot"),
-        (lambda: Executive(5, [PLOT], []), "a planning domain is a PlanningDomain, a PDDL file or its text, not 5"),
-        (lambda: Executive("(define (domain d))", 5, []), "a library is made of a list of plots, not of 5"),
+        (lambda: Executive(5, [PLOT], []), "a planning domain is a PlanningDomain, a PDDL file or its text, not 5"),  # type: ignore[arg-type]
+        (lambda: Executive("(define (domain d))", 5, []), "a library is made of a list of plots, not of 5"),  # type: ignore[arg-type]
         (executive(5), "components are given as a list, not as 5"),
         (executive([], knowledge=5), "the knowledge is a KnowledgeBase, not 5"),
         (executive([], planner="fast"), "a planner needs a method 'solve', which 'fast' lacks"),

@@ -168,7 +168,7 @@ def status(url: str, browser: OpenerDirector | None = None) -> int:
     """How a browser is answered, a new one if none is given."""
     try:
         with (browser or build_opener()).open(url, timeout=60) as answer:
-            return answer.status
+            return int(answer.status)
     except HTTPError as refused:
         return refused.code
 
@@ -177,7 +177,12 @@ def status(url: str, browser: OpenerDirector | None = None) -> int:
 def opened(monkeypatch) -> list[str]:
     """What browsers are given on their command line."""
     addresses: list[str] = []
-    monkeypatch.setattr(webbrowser, "open", lambda url: addresses.append(url) or True)
+
+    def given(url: str) -> bool:
+        addresses.append(url)
+        return True
+
+    monkeypatch.setattr(webbrowser, "open", given)
     return addresses
 
 

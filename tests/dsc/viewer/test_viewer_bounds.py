@@ -7,6 +7,7 @@ import socket
 import threading
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -121,8 +122,8 @@ def controlled(kb, act) -> Control:
 
     async def run() -> Control:
         control = Control(lambda: None)
-        listeners = []
-        control.attach(SimpleNamespace(
+        listeners: list[Any] = []
+        control.attach(SimpleNamespace(  # type: ignore[arg-type]
             knowledge=kb, listen=listeners.append, wait_before_events=lambda _: None,
             change=lambda delta, author: kb.apply(delta, author=author),
         ))  # fmt: skip

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import threading
+from typing import Any
 
 import pytest
+
+from dsc.sequencer.sequencer import RunEnd
 
 pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 
@@ -24,7 +27,7 @@ from knowledge_base import InputError, KnowledgeBase, Schema
 class Watched:
     """A run in a thread of its own that stands still at its first event."""
 
-    def __init__(self, breakpoint_: dict | None = None) -> None:
+    def __init__(self, breakpoint_: dict[str, Any] | None = None) -> None:
         self.log = RecordLog(live=True)
         self._changed = threading.Condition()
         self.control = Control(self._change)
@@ -90,7 +93,7 @@ def test_a_breakpoint_holds_the_run_where_it_says(on, record) -> None:
     watched.control.obey({"do": "break", "on": on})
     watched.control.obey({"do": "resume"})
     watched.until(lambda: watched.control.paused)
-    assert next(iter(on.values())) in watched.control.paused
+    assert next(iter(on.values())) in (watched.control.paused or "")
     met = [seq for seq in range(1, len(watched.log) + 1) if record(watched.log.record(seq))]
     assert met
     watched.control.obey({"do": "unbreak", "number": 1})
@@ -108,7 +111,7 @@ def test_a_step_of_a_plan_is_found_in_any_of_its_regions() -> None:
 
     control = Control(changed)
 
-    async def main(knowledge: KnowledgeBase) -> object:
+    async def main(knowledge: KnowledgeBase) -> RunEnd:
         clock = LoopClock()
         plan = parse_plot(PLAN).model_copy(update={"generated": True})
         sequencer = Sequencer(Library([plan]), knowledge, [], clock, Trace(clock.now))

@@ -150,7 +150,7 @@ def test_a_malformed_question_is_refused_in_a_line(page, text) -> None:
     assert answer.status_code == 400, answer.text[:200]
 
 
-ODD = [
+ODD: list[object] = [
     None,
     True,
     -1,

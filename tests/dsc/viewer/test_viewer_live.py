@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import threading
+from typing import Any
 
 import pytest
 
@@ -41,13 +42,14 @@ def socket(page: LivePage):
     )
 
 
-def said(connection) -> dict:
-    return json.loads(connection.recv(timeout=60))
+def said(connection) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(connection.recv(timeout=60))
+    return found
 
 
-def received(connection, last: int) -> list[dict]:
+def received(connection, last: int) -> list[dict[str, Any]]:
     connection.send(json.dumps({"want": 1}))
-    records: list[dict] = []
+    records: list[dict[str, Any]] = []
     while len(records) < last:
         records += said(connection).get("records", [])
     return records

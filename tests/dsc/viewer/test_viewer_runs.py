@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from typing import Any
 
 import pytest
 
@@ -12,7 +13,7 @@ from dsc.events import Event
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
-from dsc.trace import Trace
+from dsc.trace import Record, Trace
 from dsc.viewer.record_sources import records_of
 from knowledge_base import KnowledgeBase, Schema, StoreError
 
@@ -28,9 +29,9 @@ states:
 """
 
 
-def kept_run(path, halfway) -> list:
+def kept_run(path, halfway) -> list[Any]:
     """Run a plot in a store; `halfway` is called when the first of its two events has been taken."""
-    heard = []
+    heard: list[Record] = []
 
     async def main(kb):
         clock = LoopClock()
@@ -48,7 +49,7 @@ def kept_run(path, halfway) -> list:
     return heard
 
 
-def records(log) -> list:
+def records(log) -> list[Any]:
     return [log.record(seq) for seq in range(1, len(log) + 1)]
 
 
@@ -62,18 +63,18 @@ def test_a_run_that_has_ended_is_its_records(tmp_path):
 
 
 def test_what_a_run_adds_is_followed_until_its_end(tmp_path):
-    seen = []
+    seen: list[tuple[Any, Any, int]] = []
 
     def halfway() -> None:
         if seen:
             return
         opened = records_of(tmp_path / "run.kb")
         log = opened.__enter__()
-        seen.extend([opened, log, len(log)])
+        seen.append((opened, log, len(log)))
         assert log.live
 
     heard = kept_run(tmp_path / "run.kb", halfway)
-    opened, log, before = seen
+    ((opened, log, before),) = seen
     over = threading.Event()
     log.on_more(lambda: None if log.live else over.set())
     assert log.live is False or over.wait(timeout=20)

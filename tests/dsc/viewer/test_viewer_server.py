@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib import import_module
+from typing import Any
 
 import pytest
 
@@ -59,8 +60,8 @@ def socket(viewer, **how):
     return websockets.connect(f"ws://127.0.0.1:{viewer.port}/socket?token={viewer.token}", **how)
 
 
-def received(connection, last: int) -> list[dict]:
-    records: list[dict] = []
+def received(connection, last: int) -> list[dict[str, Any]]:
+    records: list[dict[str, Any]] = []
     while not records or records[-1]["seq"] < last:
         said = json.loads(connection.recv(timeout=10))
         if said["type"] == "records":
@@ -130,7 +131,7 @@ def test_new_records_follow_and_the_end_is_told() -> None:
             assert received(connection, 1)[0]["type"] == "log"
             log.append('{"seq": 2, "t": 1.0, "type": "end", "cause": 1}')
             log.end()
-            said: list[dict] = []
+            said: list[dict[str, Any]] = []
             while not {"records", "status"} <= {one["type"] for one in said}:
                 said.append(json.loads(connection.recv(timeout=10)))
             assert [r["type"] for one in said for r in one.get("records", ())] == ["end"]
