@@ -1,4 +1,4 @@
-"""`dsc kb`: a world model on the command line; commands import their modules on use, so that help stays light."""
+"""`dsc kb`: a world model on the command line; commands import their modules only when they run, to start quickly."""
 
 from __future__ import annotations
 

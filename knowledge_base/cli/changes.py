@@ -1,4 +1,4 @@
-"""Commands that make a store and change it, and that import, export and draw a world."""
+"""Commands that create and change a store, and that import, export and draw a world."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def draw(
 
 
 def _size(store: Path) -> int:
-    """Return the size in bytes, with SQLite's log."""
+    """Return the size of the store in bytes, including SQLite's log."""
     log = store.with_name(store.name + "-wal")
     return store.stat().st_size + (log.stat().st_size if log.exists() else 0)
 
@@ -208,7 +208,7 @@ def _change(
 
 
 def _output(to: Path, source: Path, domain: Path | None) -> Output:
-    """Return the output, which must not be the input."""
+    """Return the output; raise `InputError` if it is also the input."""
     from knowledge_base.output_files import Output
 
     return Output(to, "--to", source, domain or domain_of(source))

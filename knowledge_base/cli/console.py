@@ -34,19 +34,20 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
 MOST_ROWS = 5000
-"""Rows of one table. Columns are as wide as their widest cell, so that all rows must exist before the first is
-printed.
+"""Maximum number of rows in one table.
+
+A column is as wide as its widest cell, so that all rows of a table must be in memory before the first is printed.
 """
 _MARK = b"\xef\xbb\xbf"  # byte order mark, in UTF-8
 _MOST_DIGITS = 15
-"""Maximum number of digits of a version: more than any store needs, and few enough to parse immediately."""
+"""Maximum number of digits of a version: more than any store needs, and few enough to parse quickly."""
 
 readers: dict[str, Callable[[Path], KnowledgeBase]] = {}
-"""Readers of further sources by file ending, e.g. `.yaml`; upper rooms register theirs."""
+"""Readers of other sources by file ending, e.g. `.yaml`; packages that use this package register their readers here."""
 
 
 class Opened(NamedTuple):
-    """An opened world, and the problem whose initial state it is, if any."""
+    """An opened world, and the problem that it is the initial state of, if any."""
 
     kb: KnowledgeBase
     problem: ProblemText | None = None
@@ -54,10 +55,10 @@ class Opened(NamedTuple):
 
 @contextmanager
 def opened(source: Path, domain: Path | None = None) -> Iterator[Opened]:
-    """Open any source for reading; other processes may write a store meanwhile.
+    """Open any source for reading; other processes may write a store at the same time.
 
     Raises:
-        InputError: the file is missing, or of none of these kinds.
+        InputError: the file is missing, or is not a store, problem, world or scenario.
     """
     found = _opened(source, domain)
     with found.kb:
@@ -65,10 +66,10 @@ def opened(source: Path, domain: Path | None = None) -> Iterator[Opened]:
 
 
 def opened_store(store: Path) -> KnowledgeBase:
-    """Open a store for reading; other sources have no past.
+    """Open a store for reading; other kinds of sources are refused, as they have no history.
 
     Raises:
-        StoreError: the file is missing, or not a store.
+        StoreError: the file is missing, or is not a store.
     """
     from knowledge_base.store import KnowledgeBase
 
@@ -83,7 +84,7 @@ def writable(store: Path) -> KnowledgeBase:
     """
     from knowledge_base.store import KnowledgeBase
 
-    opened_store(store).close()  # another kind of file gets the reader's message, and no file is made
+    opened_store(store).close()  # report other kinds of files, and create no file
     return KnowledgeBase.open(None, store)
 
 
@@ -102,7 +103,7 @@ def _opened(source: Path, domain: Path | None) -> Opened:
         return Opened(KnowledgeBase.open(None, source, read_only=True))
     if source.suffix in readers:
         return Opened(readers[source.suffix](source))
-    data = read_bytes(source, MAX_WORLD_BYTES)  # once, since a pipe can be read only once
+    data = read_bytes(source, MAX_WORLD_BYTES)  # read only once, as a pipe allows
     if data.removeprefix(_MARK).lstrip()[:1] == b"{":
         return Opened(KnowledgeBase.from_json(decoded(data, source), source=str(source)))
     require_size(len(data), MAX_BYTES, str(source))
@@ -124,17 +125,17 @@ def _problem(text: str, source: Path, domain: Path | None) -> Opened:
 
 
 class Moment(TypedDict, total=False):
-    """The arguments of `KnowledgeBase.at`: either of the two."""
+    """The arguments of `KnowledgeBase.at`: either a version or a time in seconds."""
 
     version: int
     time: float
 
 
 def moment(text: str) -> Moment:
-    """Return a version (`12`) or a time (ISO 8601; local without a time zone).
+    """Return the arguments of `KnowledgeBase.at` for a version (`12`) or a time (ISO 8601; local without a time zone).
 
     Raises:
-        InputError: the text is neither.
+        InputError: the text is neither a version nor a time.
     """
     if text.isdecimal() and len(text) <= _MOST_DIGITS:
         return {"version": int(text)}
@@ -150,7 +151,7 @@ def print_json(said: Any) -> None:
 
 
 def print_json_list(items: Iterable[Any], said: Mapping[str, Any] | None = None, name: str = "") -> None:
-    """Print the list, or `{**said, name: [*items]}`, as `print_json` does, but each item as it arrives."""
+    """Print the list, or `{**said, name: [*items]}`, as `print_json` does, but write each item immediately."""
     whole: object = [] if said is None else {**said, name: []}
     head, _, tail = json.dumps(whole, indent=2).rpartition("[]")
     indent = "\n" + "  " * (1 if said is None else 2)
@@ -163,13 +164,13 @@ def print_json_list(items: Iterable[Any], said: Mapping[str, Any] | None = None,
 
 
 def print_line(said: Any) -> None:
-    """Print one JSON value on a line and flush, for programs that follow the output."""
+    """Print one JSON value on one line and flush the output, for programs that follow it."""
     typer.echo(json.dumps(said))
     sys.stdout.flush()
 
 
 def print_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Print a table up to the width of the terminal or output; after `MOST_ROWS` rows another one begins."""
+    """Print tables at most as wide as the terminal, each with at most `MOST_ROWS` rows."""
     rest = iter(rows)
     _print_table(head, islice(rest, MOST_ROWS))
     while some := list(islice(rest, MOST_ROWS)):
@@ -177,7 +178,7 @@ def print_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
 
 
 def _print_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Print a table. Rich wraps the cells of a table that is too wide; it is slow for tables of many rows."""
+    """Print one table; if the table is too wide, Rich wraps its cells, which is slow for many rows."""
     from rich.box import HEAVY_HEAD
     from rich.cells import cell_len
     from rich.console import Console
@@ -241,12 +242,12 @@ def clock_time(seconds: float) -> str:
     """Return seconds since 1970 as ISO 8601: `2026-11-21T16:40:03.250Z`."""
     try:
         return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
-    except (OverflowError, ValueError, OSError):  # another clock, e.g. simulated time far ahead
+    except (OverflowError, ValueError, OSError):  # the time of another clock, e.g. simulated time in the far future
         return f"{seconds:g} s"
 
 
 def explanation_lines(why: Explanation, depth: int = 0, *, deciding: bool = True) -> Iterator[str]:
-    """Yield the tree of a condition, a line for each part; arrows lead to the deciding one."""
+    """Yield the tree of a condition, with one line for each part; arrows mark the parts that decide the truth."""
     indent = "" if depth == 0 else "   " * (depth - 1) + ("-> " if deciding else "   ")
     detail = f"   [{why.detail}]" if why.detail else ""
     yield f"{indent}{'true ' if why.truth else 'false'}  {why.text}{detail}"

@@ -50,14 +50,14 @@ Seconds = Annotated[
     float | None, typer.Option("--seconds", min=0.0, help="Stop the query after this number of seconds.")
 ]
 NO = 1
-"""Exit status of the answer `no`; 2 is a mistake, as for every command."""
+"""Exit status of the answer `no`; status 2 is an error, as for every command."""
 Pattern = Annotated[
     str | None, typer.Argument(metavar="[PATTERN]", help="Only changes of this, e.g. '(on ?x table)' or '(weight ?x)'.")
 ]
 TOGETHER = 1000
-"""Number of changes that are read together."""
+"""Number of changes that one read returns."""
 POLL_S = 0.1
-"""Seconds between two looks at a store that other processes write."""
+"""Time in seconds between two reads of a store that other processes write."""
 
 
 def query(
@@ -199,7 +199,7 @@ def _answer(
     *,
     as_json: bool,
 ) -> None:
-    """Print the answers as they are found, without a list of all in memory."""
+    """Print each answer when it is found; the answers are never all in memory."""
     from knowledge_base.language.evaluation.world import Bounds
     from knowledge_base.language.syntax.expression import variables_in_order
 
@@ -207,7 +207,7 @@ def _answer(
     answers = world.stream(condition, params, bounds=Bounds(seconds=seconds))
     answers = islice(answers, limit)
     names = [name for name in dict.fromkeys(variables_in_order(condition)) if name not in params]
-    first = list(islice(answers, 1))  # an error in the query is reported before any output
+    first = list(islice(answers, 1))  # report an error in the query before any output
     answers = chain(first, answers)
     if as_json:
         print_json_list(answers, {"variables": names, "holds": bool(first)}, "answers")
@@ -249,7 +249,7 @@ def _parsed(expression: str) -> Expression:
 
 
 def _params(said: list[str] | None) -> dict[str, Value]:
-    """Return the bindings of `x=VALUE` options; values are written as in the language."""
+    """Return the bindings of the options `x=VALUE`; values have the notation of the language."""
     from knowledge_base.language.syntax.expression import Constant
     from knowledge_base.language.syntax.text import parse_term
 
@@ -264,7 +264,7 @@ def _params(said: list[str] | None) -> dict[str, Value]:
 
 
 def _changes(kb: KnowledgeBase, since: int, until: int | None) -> Iterator[Change]:
-    """Yield the changes of a store, in several reads."""
+    """Yield the changes of a store, read in several blocks."""
     last = kb.version if until is None else until
     kb.changes(last, last)  # report a wrong version before the first change
     yield from kb.changes(since, min(last, since + TOGETHER))

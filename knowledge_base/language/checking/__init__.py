@@ -1,1 +1,1 @@
-"""Conditions, terms and effects compared with the declarations of a schema, before evaluation."""
+"""Checks of conditions, terms and effects against the declarations of a schema, before their evaluation."""

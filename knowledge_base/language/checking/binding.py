@@ -1,7 +1,7 @@
-"""Free variables: which of them a condition finds values for, which must be bound, and the errors if not.
+"""Free variables: which a condition finds values for, which must be bound, and the errors for the others.
 
-An atom finds values, unless it is computed; `not`, `imply`, `forall` and comparisons only test. So a variable that
-occurs nowhere else has no answers to list (safe queries in the sense of Datalog).
+An atom finds values, unless its predicate is computed; `not`, `imply`, `forall` and comparisons only test values. A
+variable that occurs in no such atom has no answers to list (safe queries in the sense of Datalog).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _NONE: frozenset[str] = frozenset()
 
 
 def found_variables(e: Expression, schema: Vocabulary, bound: frozenset[str] = _NONE) -> frozenset[str]:
-    """The free variables of `e` that it finds values for, when those in `bound` already have some."""
+    """Return the free variables of `e` that `e` finds values for, if the variables in `bound` have values already."""
     match e:
         case Atom(name, _) if name in schema.computed:
             return _NONE
@@ -48,12 +48,12 @@ def found_variables(e: Expression, schema: Vocabulary, bound: frozenset[str] = _
 
 
 def only_tested(e: Expression, schema: Vocabulary, bound: frozenset[str] = _NONE) -> frozenset[str]:
-    """The free variables of `e` beyond `bound` that nothing in it finds values for."""
+    """Return the free variables of `e` that are not in `bound` and that no part of `e` finds values for."""
     return free_variables(e) - found_variables(e, schema, bound) - bound
 
 
 def check_answers(e: Expression, bound: frozenset[str], schema: Vocabulary) -> None:
-    """Raise `InputError` if a free variable of the query `e`, not in `bound`, can only be tested."""
+    """Raise `InputError` if the query `e` can only test one of its free variables that are not in `bound`."""
     for name in sorted(only_tested(e, schema, bound)):
         kind = next(_types(e, name, schema), "object")
         raise InputError(
@@ -64,7 +64,7 @@ def check_answers(e: Expression, bound: frozenset[str], schema: Vocabulary) -> N
 
 
 def _types(e: Expression | Term, name: str, schema: Vocabulary) -> Iterator[str]:
-    """The types of things that the variable must have where it is written."""
+    """Yield the types of objects that the variable must have, according to its places in `e`."""
     for part in parts_of(e):
         yield from _types(part, name, schema)
     if isinstance(e, Atom) and schema.is_type(e.predicate, len(e.args)):
@@ -72,17 +72,17 @@ def _types(e: Expression | Term, name: str, schema: Vocabulary) -> Iterator[str]
             yield e.predicate
     elif isinstance(e, Atom | Call):
         known = schema.function(e.function) if isinstance(e, Call) else schema.predicate(e.predicate)
-        for parameter, arg in zip(known.parameters, e.args, strict=False):  # their number is checked elsewhere
+        for parameter, arg in zip(known.parameters, e.args, strict=False):  # `check` compares the number of arguments
             if isinstance(arg, Variable) and arg.name == name:
                 yield from (t for t in parameter.types if t in schema.types)
 
 
 def check_bound(e: Expression | Term, bindings: Mapping[str, Value]) -> None:
-    """Raise an error unless all free variables of `e` have values that facts and comparisons can be about.
+    """Raise an error unless all free variables of `e` have values that may be arguments of facts.
 
     Raises:
-        UnknownNameError: one has no value.
-        SchemaError: one is a geometry.
+        UnknownNameError: a variable has no value.
+        SchemaError: the value of a variable is a geometry.
     """
     for name in sorted(free_variables(e)):
         if isinstance(bindings.get(name), tuple):
@@ -94,7 +94,7 @@ def check_bound(e: Expression | Term, bindings: Mapping[str, Value]) -> None:
 
 
 def unbound_error(name: str, place: Place | None, bound: Iterable[str]) -> UnknownNameError:
-    """The error for a free variable in a condition that must be true or false."""
+    """Return the error for a free variable in a condition that must be true or false."""
     return UnknownNameError(
         f"the variable '?{name}' is not bound; to ask whether there is one, use (exists (?{name}) ...)",
         place=place,

@@ -44,15 +44,15 @@ def check(
     Args:
         e: the condition.
         schema: the declarations.
-        variables: the variables that will be bound, with their types (`None`: anything).
-        free: whether other variables are an error, or what a query asks for.
-        objects: the known things with their types, against which names in `e` are checked. Without it other
-            names than the schema's constants pass.
+        variables: the variables that will be bound, with their types; `None` is an unknown type.
+        free: `error` if other free variables are an error, `answers` if they are the answers of a query.
+        objects: the known objects with their types; names in `e` must be among them. With `None`, every name is
+            accepted.
 
     Raises:
         UnknownNameError: an undeclared predicate, function, type, variable or object.
-        SchemaError: a wrong number of arguments, or a type that can never fit.
-        InputError: a query's variable that occurs only under `not` or in a comparison; nesting that is too deep.
+        SchemaError: a wrong number of arguments, or a type that no object can match.
+        InputError: a variable of a query occurs only under `not` or in a comparison; or the nesting is too deep.
     """
     check_depth(e)
     checker = _Checker(schema, objects, variables or {}, free)
@@ -69,25 +69,28 @@ def check_effect(
 ) -> None:
     """Raise an error with its place unless `effect` can be applied to worlds of `schema`.
 
-    Args and errors as for `check`; a type as effect is a `SchemaError`, since things keep their type.
+    Arguments and errors as for `check`. A type as an effect is a `SchemaError`, since objects keep their type.
     """
     check_depth(effect)
     _Checker(schema, objects, variables or {}, "error").effect(effect)
 
 
 def check_term(term: Term, schema: Vocabulary, variables: Mapping[str, str | None] | None = None) -> None:
-    """Raise an error with its place unless `term` has a value on worlds of `schema`; args and errors as `check`."""
+    """Raise an error with its place unless `term` has a value on worlds of `schema`.
+
+    Arguments and errors as for `check`.
+    """
     check_depth(term)
     _Checker(schema, None, variables or {}, "error").term(term)
 
 
 def check_parameters(parameters: tuple[TypedVariable, ...], schema: Vocabulary) -> dict[str, str | None]:
-    """Check the parameters' types; gives them in the form that `check` takes as `variables`.
+    """Return the parameters with their types, in the form of the argument `variables` of `check`.
 
-    A parameter of several types (`either`) is given as `None`.
+    The type of a parameter with several types (`either`) is `None`.
 
     Raises:
-        UnknownNameError: a type that is not declared.
+        UnknownNameError: a type is not declared.
     """
     for parameter in parameters:
         for type_name in parameter.types:
@@ -96,7 +99,7 @@ def check_parameters(parameters: tuple[TypedVariable, ...], schema: Vocabulary) 
 
 
 def check_reads(computed: Computing, schema: Vocabulary) -> None:
-    """Raise an error with its place unless the computed predicate can read what it declares; errors as `check`."""
+    """Raise an error with its place unless all reads of the computed predicate are valid; errors as for `check`."""
     checker = _Checker(schema, None, check_parameters(computed.parameters, schema), "error")
     for read in computed.reads:
         if isinstance(read, Atom):
@@ -106,7 +109,7 @@ def check_reads(computed: Computing, schema: Vocabulary) -> None:
 
 
 def check_arity(signature: Signature, count: int, place: Place | None = None) -> None:
-    """Raise `SchemaError` unless `signature` takes `count` arguments."""
+    """Raise `SchemaError` unless `signature` has `count` parameters."""
     if signature.arity != count:
         raise SchemaError(
             f"'{signature.name}' takes {signature.arity} arguments, as in {signature}; found {count}",
@@ -115,7 +118,7 @@ def check_arity(signature: Signature, count: int, place: Place | None = None) ->
 
 
 def value_fits(value: Value, wanted: tuple[str, ...]) -> bool:
-    """Whether a value that names no thing may be an argument of one of the `wanted` types."""
+    """Return whether a value that is not an object's name may be an argument of one of the `wanted` types."""
     if isinstance(value, bool):
         return "boolean" in wanted
     if isinstance(value, str):
@@ -124,7 +127,7 @@ def value_fits(value: Value, wanted: tuple[str, ...]) -> bool:
 
 
 def _written(term: Term) -> str:
-    """A term as messages call it."""
+    """Return a term in the form of messages."""
     match term:
         case Variable(name):
             return f"'?{name}'"
@@ -141,7 +144,7 @@ def _single(types: tuple[str, ...]) -> str | None:
 
 
 class _Checker:
-    """One walk through an expression; `scope` holds the visible variables with their possible types."""
+    """Check of one expression; `scope` contains the visible variables with their possible types."""
 
     def __init__(
         self,
@@ -194,7 +197,7 @@ class _Checker:
                 self.assignment(effect)
 
     def assignment(self, effect: NumericEffect) -> None:
-        """The value must have the type of the function's result; all operators but `assign` work on numbers."""
+        """Require that the value has the type of the function; operators other than `assign` require numbers."""
         result = self.schema.result(effect.call.function, effect.call.place)
         self.term(effect.call)
         if effect.operator != "assign" or result == "number":
@@ -237,7 +240,7 @@ class _Checker:
                     self.number(arg, operator)
 
     def number(self, term: Term, operator: str) -> None:
-        """A term used as a number; a variable must be able to be one."""
+        """Check a term that is used as a number; the type of a variable must allow numbers."""
         self.term(term)
         types = self.types_of(term)
         word = isinstance(term, Constant) and isinstance(term.value, str | bool)
@@ -264,11 +267,14 @@ class _Checker:
         )
 
     def compatible(self, arg: Term, given: str, wanted: str) -> bool:
-        """A thing's type must be the wanted one or below; a variable may also turn out to be."""
+        """Return whether the type of an object is `wanted` or one of its subtypes.
+
+        For a variable, a supertype of `wanted` is accepted too: its value may still have the right type.
+        """
         return self.schema.is_a(given, wanted) or (isinstance(arg, Variable) and self.schema.is_a(wanted, given))
 
     def types_of(self, term: Term) -> tuple[str, ...] | None:
-        """The types the term's value can have; `None` when nothing is known."""
+        """Return the possible types of the term's value; `None` when no type is known."""
         match term:
             case Variable(name):
                 return self.scope.get(name)
@@ -284,7 +290,7 @@ class _Checker:
             return ("boolean",)
         if not isinstance(value, str):
             return ("number",)
-        # No test for an empty mapping: a world would have to count its objects.
+        # Do not test for an empty mapping: a world would have to count its objects.
         known = self.schema.constants.get(value) or (None if self.objects is None else self.objects.get(value))
         if known is not None:
             return (known, "text") if quoted else (known,)
@@ -303,12 +309,12 @@ class _Checker:
             raise unknown_object(value, constant.place, self.names())
 
     def names(self) -> tuple[str, ...]:
-        """All things that can be named."""
+        """Return the names of all known objects."""
         return (*(self.objects or ()), *self.schema.constants)
 
     @contextmanager
     def inside(self, variables: tuple[TypedVariable, ...]) -> Iterator[None]:
-        """The scope of a quantifier."""
+        """Open the scope of a quantifier for a block."""
         for variable in variables:
             for type_name in variable.types:
                 self.schema.require_type(type_name, variable.place)
@@ -321,7 +327,7 @@ class _Checker:
 
 
 def unknown_object(name: str, place: Place | None, valid: tuple[str, ...]) -> UnknownNameError:
-    """The error for a name without a known thing."""
+    """Return the error for a name that is not a known object."""
     return UnknownNameError(
         f"there is no object '{name}' (text is written in quotes)", place=place, found=name, valid=valid
     )

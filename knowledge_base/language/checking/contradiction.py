@@ -1,8 +1,8 @@
-"""Whether the form of conditions excludes that they hold together, in every world.
+"""Test whether the form of conditions excludes that they are true together, in every world.
 
-The answer "no" is certain; without a contradiction it is "perhaps". The analysis covers an atom and its negation,
-comparisons of one term with constants, and `and`, `or`, `imply` and `not` of those. A quantified condition is one atom;
-`(not (forall ...))` equals its `(exists (... not ...))`.
+A contradiction that is found is certain; without one, the conditions may still exclude each other. The analysis covers
+an atom and its negation, comparisons of one term with constants, and `and`, `or`, `imply` and `not` of these. A
+quantified condition counts as one atom; `(not (forall ...))` equals `(exists (... not ...))`.
 """
 
 from __future__ import annotations
@@ -28,17 +28,20 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.text import to_text
 
 MOST_CASES = 512
-"""Number of ways in which a part of a condition can hold; with more, the answer is "perhaps"."""
+"""Maximum number of cases in which a part of a condition is true.
+
+With more cases, no contradiction is reported.
+"""
 
 MOST_TOGETHER = 64
-"""Number of literals in one such way; with more, the answer is "perhaps", too."""
+"""Maximum number of literals in one case; with more literals, no contradiction is reported."""
 
 _OPPOSITE = {"=": "!=", "!=": "=", "<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 _MIRRORED = {"=": "=", "!=": "!=", "<": ">", ">": "<", "<=": ">=", ">=": "<="}
 
 
 def contradictory(*conditions: Expression) -> bool:
-    """Whether these conditions certainly never hold together."""
+    """Return whether these conditions are certainly never true together."""
     try:
         return not _cases(_normal(And(conditions), holds=True))
     except _TooManyError:
@@ -46,28 +49,28 @@ def contradictory(*conditions: Expression) -> bool:
 
 
 def implied(condition: Expression, by: Expression) -> bool:
-    """Whether `condition` certainly holds whenever `by` does."""
+    """Return whether `condition` is certainly true in every world in which `by` is true."""
     return contradictory(by, Not(condition))
 
 
 def complete(conditions: Iterable[Expression]) -> bool:
-    """Whether one of the conditions certainly holds in every world."""
+    """Return whether in every world at least one of the conditions is certainly true."""
     return contradictory(*map(Not, conditions))
 
 
 def subjects(condition: Expression) -> frozenset[str]:
-    """The subjects of a condition, as text: its atoms, and the terms that it compares with constants."""
+    """Return the subjects of a condition as text: its atoms, and the terms that it compares with constants."""
     return frozenset(literal.about for literal in _literals(_normal(condition, holds=True)))
 
 
 @dataclass(frozen=True, slots=True)
 class _Literal:
-    """One thing that holds or not.
+    """A comparison that is true or false.
 
     Attributes:
-        about: an atom, or a compared term.
-        operator: the comparison; an atom is compared with a truth value.
-        value: the other side.
+        about: an atom, or a compared term, as text.
+        operator: the operator of the comparison; an atom is compared with a truth value.
+        value: the constant on the right side.
     """
 
     about: str
@@ -79,7 +82,10 @@ _Case = tuple[_Literal, ...]
 
 
 def _normal(e: Expression, *, holds: bool) -> Expression:
-    """The condition, or its opposite, with `not` only in front of atoms and quantifiers, and `exists` alone."""
+    """Return the condition, or its negation if not `holds`, in normal form.
+
+    In the normal form, `not` occurs only in front of atoms and quantifiers, and the only quantifier is `exists`.
+    """
     match e:
         case Not(body):
             found = _normal(body, holds=not holds)
@@ -99,17 +105,20 @@ def _normal(e: Expression, *, holds: bool) -> Expression:
 
 
 def _ordered(operator: str, left: Term, right: Term) -> Comparison:
-    """With the constant on the right, other terms in a fixed order."""
+    """Return the comparison with a constant on the right, or with other terms in a fixed order."""
     swapped = isinstance(left, Constant) or (not isinstance(right, Constant) and to_text(right) < to_text(left))
     return Comparison(_MIRRORED[operator], right, left) if swapped else Comparison(operator, left, right)
 
 
 class _TooManyError(Exception):
-    """There are more than `MOST_CASES`, or longer ones than `MOST_TOGETHER`."""
+    """The cases are more than `MOST_CASES`, or one is longer than `MOST_TOGETHER`."""
 
 
 def _cases(e: Expression) -> list[_Case]:
-    """The ways in which a condition can hold, each a conjunction, without those that contradict themselves."""
+    """Return the cases in which a condition is true, each a conjunction of literals.
+
+    Cases that contradict themselves are omitted.
+    """
     match e:
         case And(parts):
             cases: list[_Case] = [()]
@@ -159,7 +168,7 @@ def _possible(case: _Case) -> bool:
 
 
 def _some_value(literals: list[_Literal]) -> bool:
-    """Whether some value compares in all these ways."""
+    """Return whether some value satisfies all these comparisons."""
     equal = [one.value for one in literals if one.operator == "="]
     if equal:
         return all(_compares(equal[0], one) for one in literals)

@@ -1,4 +1,4 @@
-"""Checks of arguments from programs without type checks: each once, at the public method, with one line of error."""
+"""Checks of arguments from callers without type checks: once, in the public method, with a one-line error."""
 
 from __future__ import annotations
 
@@ -13,29 +13,32 @@ _NO_CHANGE = Delta()
 
 
 def shown(value: object) -> str:
-    """Any value as a message shows it."""
+    """Return any value as a message shows it; never raise an exception."""
     try:
         return str.__str__(repr(value))
-    except ValueError:  # Python writes no number of that many digits
+    except ValueError:  # Python refuses to write such a long number
         return "a number of thousands of digits" if isinstance(value, int) else f"an object of type {type_name(value)}"
     except BaseException:  # noqa: BLE001  # user code may raise anything, `SystemExit` too
         return f"an object of type {type_name(value)}"
 
 
 def require(value: object, kinds: type | tuple[type, ...], wanted: str) -> None:
-    """Raise `InputError` unless `value` has one of the kinds; `wanted` is the message, as `a schema is a Schema`."""
+    """Raise `InputError` unless `value` has one of the types.
+
+    `wanted` is the beginning of the message, e.g. `a schema is a Schema`.
+    """
     if not isinstance(value, kinds):
         raise InputError(f"{wanted}, not {shown(value)[:60]}")
 
 
 def require_several(value: object, what: str) -> None:
-    """Raise `InputError` unless `value` is iterable and not text; `what` names its items."""
+    """Raise `InputError` unless `value` is iterable and not text; `what` is the word for its items in the message."""
     if isinstance(value, str) or not isinstance(value, Iterable):
         raise InputError(f"{what} are given as a list, not as {shown(value)[:60]}")
 
 
 def require_condition(text: object) -> None:
-    """Raise `InputError` unless it is a text or an expression, which must still be read or checked."""
+    """Raise `InputError` unless `text` is a text or an expression; neither is parsed or checked here."""
     if isinstance(text, Fact):
         raise InputError(f"a condition is text such as '(clean cup1)', not a Fact; write it as text: {text}")
     if not isinstance(text, str | Expression):
@@ -43,10 +46,10 @@ def require_condition(text: object) -> None:
 
 
 def require_params(params: object) -> None:
-    """Raise an error unless the parameters are a mapping to values that facts can have as arguments.
+    """Raise an error unless `params` is a mapping to values that may be arguments of facts.
 
     Raises:
-        InputError: it is not a mapping, a name is not text, or a value has another type.
+        InputError: `params` is not a mapping, a name is not text, or a value has another type.
         SchemaError: a value is a geometry.
     """
     if type(params) is not dict and not isinstance(params, Mapping):
@@ -62,11 +65,11 @@ def require_params(params: object) -> None:
 
 
 def fitted_names(e: Expression, params: Iterable[str]) -> tuple[str, ...]:
-    """The parameters' names as `e` spells them; variables of a text are in lower case.
+    """Return the names of the parameters as `e` spells them; variables of a text are in lower case.
 
     Raises:
-        UnknownNameError: `e` has no such variable that could be given a value.
-        InputError: two of the names are the same.
+        UnknownNameError: `e` has no such free variable.
+        InputError: two of the names denote the same variable.
     """
     free = free_variables(e)
     found: dict[str, None] = {}
@@ -83,19 +86,19 @@ def fitted_names(e: Expression, params: Iterable[str]) -> tuple[str, ...]:
 
 
 def require_text(value: object, what: str) -> None:
-    """Raise `InputError` unless it is text."""
+    """Raise `InputError` unless `value` is text; `what` is the word for it in the message."""
     if not isinstance(value, str):
         raise InputError(f"{what} is text, not {shown(value)}")
 
 
 def require_version(version: object) -> None:
-    """Raise `InputError` unless it is a whole number, of a size that versions can have."""
+    """Raise `InputError` unless `version` is a whole number in the range of versions."""
     if isinstance(version, bool) or not isinstance(version, int) or version.bit_length() > 63:
         raise InputError(f"a version is a whole number, 0 or more, not {shown(version)}")
 
 
 def require_time(time: object) -> None:
-    """Raise `InputError` unless it is a finite number that a clock could tell."""
+    """Raise `InputError` unless `time` is a finite number."""
     try:
         if isinstance(time, int | float) and not isinstance(time, bool) and math.isfinite(time):
             return
@@ -105,7 +108,7 @@ def require_time(time: object) -> None:
 
 
 def require_delta(delta: object) -> None:
-    """Raise `InputError` unless it is a `Delta` whose parts have their declared types."""
+    """Raise `InputError` unless `delta` is a `Delta` whose parts have their declared types."""
     if not isinstance(delta, Delta):
         raise InputError(f"a change is a Delta, not {shown(delta)}")
     if delta == _NO_CHANGE:  # the usual case; an empty part of another type differs

@@ -12,7 +12,7 @@ from knowledge_base.language.syntax.expression import Atom, Term, TypedVariable
 
 ROOT_TYPE = "object"
 VALUE_TYPES = ("number", "text", "boolean")
-"""Types of arguments that are values, not things; they have no subtypes, and no quantifier ranges over them."""
+"""Types of arguments that are values, not objects; these types have no subtypes, and quantifiers exclude them."""
 
 Read = Term | Atom
 """An input of a computed predicate: the value of a term, or the truth of an atom."""
@@ -20,9 +20,9 @@ Read = Term | Atom
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """A predicate's or function's name and the parameters it takes, in order.
+    """The name of a predicate or function, with its parameters in order.
 
-    `result` is the type of a function's value, one of `UNSET`; a predicate has none.
+    `result` is the type of a function's value, one of `UNSET`; a predicate has the result `None`.
     """
 
     name: str
@@ -32,118 +32,127 @@ class Signature:
 
     @property
     def arity(self) -> int:
-        """The number of arguments it takes."""
+        """Number of parameters."""
         return len(self.parameters)
 
     def __str__(self) -> str:
-        """As declared: `(on ?a - item ?b - place)`, `(label ?a - item) - text`."""
+        """Return the declaration as text: `(on ?a - item ?b - place)`, `(label ?a - item) - text`."""
         typed = (f"?{p.name} - {' or '.join(p.types or (ROOT_TYPE,))}" for p in self.parameters)
         result = "" if self.result in (None, "number") else f" - {self.result}"
         return "(" + " ".join([self.name, *typed]) + ")" + result
 
     def means(self, other: Signature) -> bool:
-        """Whether both take the same types in the same order and have one result; parameters may have other names."""
+        """Return whether both have the same types of parameters in the same order, and the same result.
+
+        The names of the parameters may differ.
+        """
         mine, others = ([p.types for p in s.parameters] for s in (self, other))
         return mine == others and self.result == other.result
 
 
 class Computing(Protocol):
-    """A predicate that is computed from its inputs."""
+    """A predicate whose truth is computed from its inputs."""
 
     @property
     def name(self) -> str:
-        """The name."""
+        """Name of the predicate."""
 
     @property
     def parameters(self) -> tuple[TypedVariable, ...]:
-        """The parameters."""
+        """Parameters of the predicate."""
 
     @property
     def reads(self) -> tuple[Read, ...]:
-        """Its inputs, over the parameters."""
+        """Inputs of the predicate, as terms and atoms over the parameters."""
 
     def inputs(self, args: tuple[Term, ...]) -> tuple[Read, ...]:
-        """The inputs for the arguments `args`."""
+        """Return the inputs for the arguments `args`."""
 
     def refused(self, place: Place | None = None) -> SchemaError:
-        """The error for asserting, retracting or watching it."""
+        """Return the error for asserting, retracting or watching the predicate."""
 
     def judge(self, values: Sequence[object]) -> bool:
-        """The truth for these inputs.
+        """Return the truth of the predicate for these input values.
 
         Raises:
-            InputError: it cannot be computed.
+            InputError: the truth cannot be computed.
         """
 
 
 class Vocabulary(Protocol):
-    """The types, constants, predicates and functions that texts may name; equality is identity."""
+    """The types, constants, predicates and functions that texts may use; equality is identity."""
 
     @property
     def types(self) -> Mapping[str, str | None]:
-        """Each type's parent."""
+        """Name to parent of each type."""
 
     @property
     def constants(self) -> Mapping[str, str]:
-        """Things that every world has, with their types."""
+        """Objects that every world contains, with their types."""
 
     @property
     def predicates(self) -> Mapping[str, Signature]:
-        """The predicates whose facts are asserted."""
+        """Predicates with asserted facts, by name."""
 
     @property
     def functions(self) -> Mapping[str, Signature]:
-        """The functions, by name."""
+        """Functions by name."""
 
     @property
     def functional(self) -> frozenset[str]:
-        """The predicates whose last argument depends on the others."""
+        """Predicates whose last argument depends on the other arguments."""
 
     @property
     def computed(self) -> Mapping[str, Computing]:
-        """The predicates that are computed."""
+        """Computed predicates by name."""
 
     def is_a(self, type_name: str, ancestor: str) -> bool:
-        """Whether everything of type `type_name` is of type `ancestor`; a type is its own ancestor."""
+        """Return whether `ancestor` is `type_name` or one of its ancestors."""
 
     def fits(self, type_name: str, wanted: Iterable[str]) -> bool:
-        """Whether `type_name` is one of the `wanted` types; none wanted means any object."""
+        """Return whether `type_name` is one of the `wanted` types or their subtypes.
+
+        An empty `wanted` accepts any object.
+        """
 
     def fitting(self, wanted: tuple[str, ...]) -> frozenset[str]:
-        """All types that fit the `wanted` ones."""
+        """Return all types that match the `wanted` types."""
 
     def subtypes(self, type_name: str) -> tuple[str, ...]:
-        """`type_name` and all types below it, in the order declared."""
+        """Return `type_name` and all types below it, in the order of their declaration."""
 
     def require_type(self, name: str, place: Place | None = None) -> None:
-        """Raise `UnknownNameError` unless `name` is a type of things."""
+        """Raise `UnknownNameError` unless `name` is a type of objects."""
 
     def require_argument_type(self, name: str, place: Place | None = None) -> None:
-        """Raise `UnknownNameError` unless `name` is a type of things or of values."""
+        """Raise `UnknownNameError` unless `name` is a type of objects or of values."""
 
     def is_type(self, name: str, arity: int) -> bool:
-        """Whether an atom of that name and number of arguments tests a type."""
+        """Return whether an atom with that name and number of arguments tests a type."""
 
     def predicate(self, name: str, place: Place | None = None) -> Signature:
-        """The predicate of that name, which may be a computed one.
+        """Return the predicate of that name, which may be a computed predicate.
 
         Raises:
-            UnknownNameError: there is none.
-            SchemaError: it is a function.
+            UnknownNameError: the predicate is not declared.
+            SchemaError: a function or a type has that name.
         """
 
     def told(self, name: str, place: Place | None = None) -> Signature:
-        """The predicate of that name, if its facts can be asserted; errors as `predicate`, and for a computed one."""
+        """Return the predicate of that name if its facts can be asserted.
+
+        Errors as for `predicate`; a computed predicate is a `SchemaError`.
+        """
 
     def function(self, name: str, place: Place | None = None) -> Signature:
-        """The function of that name.
+        """Return the function of that name.
 
         Raises:
-            UnknownNameError: there is none.
+            UnknownNameError: the function is not declared.
         """
 
     def result(self, function: str, place: Place | None = None) -> str:
-        """The type of the function's value; raises `UnknownNameError` as `function`."""
+        """Return the type of the function's value; errors as for `function`."""
 
     def unset(self, function: str) -> Content:
-        """The value of the function where it is not set; raises `UnknownNameError` as `function`."""
+        """Return the value of the function before the first assignment; errors as for `function`."""

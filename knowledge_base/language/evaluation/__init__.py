@@ -1,1 +1,1 @@
-"""Conditions, terms and effects on a world: truth, answers, values, changes, explanations."""
+"""Evaluation of conditions, terms and effects on a world: truth, answers, values, changes, explanations."""

@@ -1,11 +1,11 @@
-"""Conditions compiled to closures, once per condition and schema: tests and searches.
+"""Conditions compiled to closures (tests and searches), once for each condition and schema.
 
-A *test* answers whether a condition holds when all its free variables are bound. A *search* gives the
-bindings that make it hold. Quantifiers are searches too: `exists` looks for a witness and `forall` for a
-counterexample, through the index and not by trying all objects.
+A *test* returns whether a condition is true when all its free variables are bound. A *search* yields the bindings that
+make the condition true. Quantifiers are searches too: `exists` searches for a witness, and `forall` for a
+counterexample. They use the index and do not enumerate all objects.
 
-A search decides at every step which condition to look up next: the one with the fewest matches for the variables
-bound so far. `SearchPlan` keeps the preparation of a step, which depends only on the conditions that are left.
+At every step, a search chooses the next condition: the one with the fewest matches for the variables bound so far.
+`SearchPlan` caches the preparation of a step, which depends only on the remaining conditions.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ Answers = Callable[[World, Bindings], list[Answer]]
 
 
 def compile_test(e: Expression, schema: Vocabulary) -> Test:
-    """A function that says whether `e` holds; all free variables of `e` must then be bound.
+    """Return a function that tests whether `e` is true; a caller must bind all free variables of `e`.
 
     Raises:
         UnknownNameError: an undeclared predicate, type or function.
@@ -95,7 +95,7 @@ def compile_test(e: Expression, schema: Vocabulary) -> Test:
 
 
 def compile_query(e: Expression, schema: Vocabulary, bound: frozenset[str]) -> Search:
-    """A search for values of the free variables of `e` that are not in `bound`.
+    """Return a search for values of the free variables of `e` that are not in `bound`.
 
     Raises:
         InputError: such a variable is only tested; other errors as for `compile_test`.
@@ -104,9 +104,10 @@ def compile_query(e: Expression, schema: Vocabulary, bound: frozenset[str]) -> S
 
 
 def compile_answers(e: Expression, schema: Vocabulary, bound: frozenset[str], names: tuple[str, ...]) -> Answers:
-    """The results of `compile_query` as dictionaries of the variables `names`, which are those it finds.
+    """Return a function that returns the results of `compile_query` as dictionaries of the variables `names`.
 
-    All answers differ: facts and things are found once, and `distinct` removes other repetitions.
+    `names` are the variables that the query finds. All answers differ: facts and objects are found only once, and
+    `distinct` removes other repetitions.
     """
     plan = SearchPlan(conjuncts(e), schema, bound, names)
     first_test, only = plan.first.test, plan.first.answering
@@ -129,12 +130,12 @@ def compile_answers(e: Expression, schema: Vocabulary, bound: frozenset[str], na
 
 
 def witnesses(e: Exists, schema: Vocabulary) -> Search:
-    """A search for the choices of objects that make the body true."""
+    """Return a search for the choices of objects that make the body true."""
     return _search(_witnessing(e, schema), schema, free_variables(e))
 
 
 def counterexamples(e: Forall, schema: Vocabulary) -> Search:
-    """A search for the choices of objects that make the body false."""
+    """Return a search for the choices of objects that make the body false."""
     return _search(_refuting(e, schema), schema, free_variables(e))
 
 
@@ -161,7 +162,7 @@ def _atom(atom: Atom, schema: Vocabulary) -> Test:
         return _computed(atom, schema)
     predicate = atom.predicate
     names = [arg.name for arg in atom.args if isinstance(arg, Variable)]
-    if len(names) == len(atom.args) > 1:  # as most questions about one fact
+    if len(names) == len(atom.args) > 1:  # the usual form of a query for one fact
         pick = itemgetter(*names)
         return lambda world, bindings: world.holds(predicate, pick(bindings))
     arguments = compile_arguments(atom.args, schema)
@@ -206,7 +207,7 @@ def _all(tests: list[Test]) -> Test:
 
     def test(world: World, bindings: Bindings) -> bool:
         try:
-            for part in tests:  # a generator costs twice as much here
+            for part in tests:  # a generator costs twice the time here
                 if not part(world, bindings):
                     return False
         except InputError as error:
@@ -219,7 +220,7 @@ def _all(tests: list[Test]) -> Test:
 def _any(tests: list[Test]) -> Test:
     def test(world: World, bindings: Bindings) -> bool:
         try:
-            for part in tests:  # as above
+            for part in tests:  # a generator costs twice the time here
                 if part(world, bindings):
                     return True
         except InputError as error:
@@ -230,7 +231,10 @@ def _any(tests: list[Test]) -> Test:
 
 
 def _decided(tests: list[Test], world: World, bindings: Bindings, *, by: bool, otherwise: InputError) -> bool:
-    """That a part decides, although another one cannot be computed; if none does, that one's error counts."""
+    """Return whether some part decides the result; raise the error `otherwise` if no part does.
+
+    Parts that cannot be computed are ignored.
+    """
     for part in tests:
         try:
             if part(world, bindings) is by:
@@ -241,12 +245,15 @@ def _decided(tests: list[Test], world: World, bindings: Bindings, *, by: bool, o
 
 
 def _found(conditions: Iterable[Conjunct], schema: Vocabulary, bound: frozenset[str]) -> Test:
-    """Whether a search finds anything, with fewer frames than the search, which matters for nested quantifiers."""
+    """Return a test whether a search finds anything.
+
+    The test needs fewer stack frames than the search, which matters for nested quantifiers.
+    """
     plan = SearchPlan(conditions, schema, bound)
     first_test = plan.first.test
 
     def test(world: World, bindings: Bindings) -> bool:
-        if first_test is not None and not first_test(world, bindings):  # most searches of conditions end here
+        if first_test is not None and not first_test(world, bindings):  # most searches end here
             return False
         try:
             for stage, found in _ends(plan, world, bindings):
@@ -258,7 +265,7 @@ def _found(conditions: Iterable[Conjunct], schema: Vocabulary, bound: frozenset[
                 for candidate in found:
                     if next(last(world, candidate), None) is not None:
                         return True
-        except InputError:  # a later candidate may decide, although this one cannot be computed
+        except InputError:  # a later candidate may decide, although this candidate cannot be computed
             return next(_candidates(plan, world, bindings), None) is not None
         return False
 
@@ -278,7 +285,7 @@ def _search(conditions: Iterable[Conjunct], schema: Vocabulary, bound: frozenset
 
 
 def _candidates(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[Bindings]:
-    """The candidates found; an error about candidates that cannot be computed comes after all others."""
+    """Yield the candidates; an error about candidates without a computable value is raised after all others."""
     failed: list[InputError] = []
     for stage, found in _ends(plan, world, bindings, failed):
         for candidate in _computable(found, failed):
@@ -291,7 +298,10 @@ def _candidates(plan: SearchPlan, world: World, bindings: Bindings) -> Iterator[
 
 
 def _computable(found: Iterator[Bindings], failed: list[InputError]) -> Iterator[Bindings]:
-    """The computable candidates of `found`: a filter continues after an error in its test, a generator ends."""
+    """Yield the computable candidates of `found`.
+
+    After an error, a filter continues with its next candidate, but a generator ends.
+    """
     while True:
         try:
             yield from found
@@ -302,7 +312,7 @@ def _computable(found: Iterator[Bindings], failed: list[InputError]) -> Iterator
 
 
 def _keep_first(failed: list[InputError], error: InputError) -> None:
-    """Keep only the first of the errors; every candidate may have one."""
+    """Store only the first error; every candidate may raise one."""
     if not failed:
         failed.append(error)
 
@@ -310,11 +320,11 @@ def _keep_first(failed: list[InputError], error: InputError) -> None:
 def _ends(
     plan: SearchPlan, world: World, bindings: Bindings, failed: list[InputError] | None = None
 ) -> Iterator[tuple[Stage, Iterator[Bindings]]]:
-    """The stages with at most one look-up left, each with the candidates that passed all tests.
+    """Yield the stages with at most one look-up left, each with the candidates that passed all tests.
 
-    The caller evaluates the plan's first test, and exhausts the candidates before it continues. Backtracking keeps an
-    explicit stack, so that long conjunctions do not recurse. With `failed`, it collects errors and omits their
-    candidates.
+    The caller must evaluate the first test of the plan, and must exhaust the candidates before it continues.
+    Backtracking uses an explicit stack, so that long conjunctions do not recurse. If `failed` is a list, errors are
+    appended to it, and their candidates are omitted.
     """
     stack: list[tuple[Stage, Iterator[Bindings]]] = [(plan.tested, iter((bindings,)))]
     while stack:
@@ -343,13 +353,13 @@ class Stage:
     """One step of a search: the tests, then one of the look-ups.
 
     Attributes:
-        test: whether the conditions hold that need no more values; `None` if there are none.
-        choices: the look-ups that may come next, by the number of their condition.
-        left: the conditions that remain after the tests.
+        test: tests the conditions without unbound variables; `None` if no such condition exists.
+        choices: the possible next look-ups, with the numbers of their conditions.
+        left: the numbers of the conditions that remain after the tests.
         bound: the variables that have a value.
-        last: the look-up, if it is the last: nothing is left to be tested of what it finds.
-        answering: gives the answers of `last`, if the search has names for them.
-        after: the following stages that are prepared.
+        last: the single remaining look-up, whose results need no further test; else `None`.
+        answering: returns the answers of `last`, if the search has names for them.
+        after: the following stages that are prepared already, by the number of the chosen condition.
     """
 
     test: Test | None
@@ -362,18 +372,18 @@ class Stage:
 
 
 class SearchPlan:
-    """The stages of one search, each prepared when it is first reached.
+    """The stages of one search; each is prepared when it is reached for the first time.
 
     Args:
         conditions: the conditions of the search.
         schema: the declarations.
-        bound: the variables that have a value already.
-        names: the variables of the answers, if the search gives answers.
+        bound: the variables that have a value before the search.
+        names: the variables of the answers, if the search returns answers.
 
     Attributes:
-        steps: the conditions; stages have their numbers.
+        steps: the conditions in order; stages refer to them by number.
         first: the first stage.
-        tested: the same without its test, for a caller that has evaluated it.
+        tested: the first stage without its test, for a caller that has evaluated the test.
     """
 
     def __init__(
@@ -388,12 +398,12 @@ class SearchPlan:
         self._names = names
         self._stages: dict[tuple[int, ...], Stage] = {}
         self.first = stage = self._stage(tuple(range(len(self.steps))), bound)
-        while stage.choices:  # one way through, so that every mistake in the text shows now
+        while stage.choices:  # follow one path through all stages, so that every error in the text is raised now
             stage = self.after(stage, stage.choices[0][0])
         self.tested = replace(self.first, test=None)
 
     def after(self, stage: Stage, chosen: int) -> Stage:
-        """The stage that follows when the condition `chosen` was looked up."""
+        """Return the stage after the look-up of the condition with the number `chosen`."""
         found = stage.after.get(chosen)
         if found is None:
             left = tuple([i for i in stage.left if i != chosen])
@@ -409,7 +419,7 @@ class SearchPlan:
     def _stage(self, left: tuple[int, ...], bound: frozenset[str]) -> Stage:
         steps = {i: self.steps[i] for i in left}
         open_steps = {i: s for i, s in steps.items() if not s.free <= bound}
-        # `map` instead of comprehensions, whose frames add up under deep nesting.
+        # `map` instead of comprehensions, whose stack frames add up in deep nesting.
         tests = list(map(self._test, (s.conjunct for i, s in steps.items() if i not in open_steps)))
         chosen = candidates(open_steps, bound)
         lookups = map(partial(_lookup, schema=self._schema, bound=bound), (step for _, step in chosen))
@@ -428,7 +438,7 @@ class SearchPlan:
 
 
 def _lookup(step: JoinStep, schema: Vocabulary, bound: frozenset[str]) -> Lookup | Search:
-    """Finds values for the variables of a condition that are not in `bound`."""
+    """Return a look-up that finds values for the variables of a condition that are not in `bound`."""
     finds = step.free - bound
     match step.conjunct:
         case TypeRange(variable):

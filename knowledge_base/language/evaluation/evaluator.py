@@ -1,7 +1,7 @@
-"""Conditions, terms and effects on a world: truth, answers, values and changes.
+"""Evaluation of conditions, terms and effects on a world: truth, answers, values and changes.
 
-Conditions are compiled at their first use and remembered by identity. So a further evaluation of the same expression
-costs only its look-ups. No text is executed.
+Conditions are compiled at their first use and cached by identity. Each later evaluation of the same expression costs
+only its look-ups. No text is executed.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ NO_BINDINGS: Bindings = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """A compiled condition."""
+    """A compiled condition with its free variables."""
 
     e: Expression
     free: frozenset[str]
     test: Test
 
     def holds(self, world: World, bindings: Mapping[str, Value]) -> bool:
-        """Whether it is true of `world`; errors as for `holds`."""
+        """Return whether the condition is true in `world`; errors as for the function `holds`."""
         for name in self.free:
             if type(bindings.get(name)) not in VALUE_TYPES:
                 check_bound(self.e, bindings)
@@ -55,11 +55,11 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Queried:
-    """A compiled query, for certain variables that are bound.
+    """A query, compiled for a set of bound variables.
 
     Attributes:
-        e: the query; it is kept alive with what was made from it.
-        answers: gives the values of the others, as `query` does.
+        e: the query; the reference keeps it alive as long as its compiled form.
+        answers: returns the values of the other variables, as `query` does.
     """
 
     e: Expression
@@ -67,25 +67,25 @@ class Queried:
 
 
 _terms: IdentityCache[Term, tuple[frozenset[str], Getter]] = IdentityCache()
-"""The free variables of a term, and its value."""
+"""The free variables of a term, and the function that returns its value."""
 _conditions: IdentityCache[Expression, Asked] = IdentityCache()
 _queries: IdentityCache[Expression, tuple[frozenset[str], dict[frozenset[str], Queried]]] = IdentityCache()
-"""The free variables of a query, and its searches by the variables that are bound."""
+"""The free variables of a query, and its compiled searches by their bound variables."""
 
 
 def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> bool:
-    """Whether `e` is true of `world`; variables in `bindings` that `e` does not have are ignored.
+    """Return whether `e` is true in `world`; variables in `bindings` that `e` does not contain are ignored.
 
     Raises:
         UnknownNameError: a free variable is not bound, or a predicate, function or type is not declared.
         SchemaError: a wrong number of arguments, or `<` or a similar operator met a value that is not a number.
-        InputError: it is nested too deeply, or something in it cannot be computed.
+        InputError: the nesting is too deep, or a part cannot be computed.
     """
     return asked(e, world.schema).holds(world, bindings)
 
 
 def asked(e: Expression, schema: Vocabulary) -> Asked:
-    """The condition compiled for worlds with this schema; errors of the text as for `holds`."""
+    """Return the condition compiled for worlds with this schema; errors of the text as for `holds`."""
     found = _conditions.find(e, schema)
     if found is None:
         check_depth(e)
@@ -94,10 +94,10 @@ def asked(e: Expression, schema: Vocabulary) -> Asked:
 
 
 def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> list[dict[str, Value]]:
-    """The values of the free variables of `e`, each choice once, that make it true of `world`.
+    """Return the bindings of the free variables of `e` that make it true in `world`, each binding once.
 
-    Without unbound variables the answer is `[{}]` when `e` is true and `[]` when it is not. The order of
-    answers and of their variables depends on nothing but the text and the world with its order of insertion.
+    Without unbound variables, the result is `[{}]` when `e` is true and `[]` when it is false. The order of answers and
+    of their variables depends only on the text and on the world with its order of insertion.
 
     Raises:
         InputError: an unbound variable occurs only under `not` or in a comparison.
@@ -107,9 +107,9 @@ def query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
 
 
 def rows(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Iterator[dict[str, Value]]:
-    """The answers of `query` in the same order, each when it is found; `world` must not change until the last.
+    """Yield the answers of `query` in the same order; `world` must not change before the last answer.
 
-    An error about candidates that cannot be computed comes after all answers; other errors as for `query`.
+    An error about candidates without a computable value is raised after all answers; other errors as for `query`.
     """
     check_depth(e)
     bound = free_variables(e).intersection(bindings)
@@ -120,7 +120,7 @@ def rows(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDING
 
 
 def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried:
-    """The query compiled for bound `params`; errors of the text as for `query`."""
+    """Return the query compiled for the bound variables `params`; errors of the text as for `query`."""
     queries = _queries.find(e, schema)
     if queries is None:
         check_depth(e)
@@ -135,12 +135,12 @@ def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried
 
 
 def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Content:
-    """The value of `term` on `world`.
+    """Return the value of `term` in `world`.
 
     Raises:
         UnknownNameError: a free variable is not bound, or a function is not declared.
-        SchemaError: arithmetic met a value that is not a number.
-        InputError: a division by zero.
+        SchemaError: an operand of arithmetic is not a number.
+        InputError: a division by zero, or a result that is too large.
     """
     if isinstance(term, Constant):
         return term.value
@@ -159,7 +159,10 @@ def evaluate_term(term: Term, world: World, bindings: Mapping[str, Value] = NO_B
 
 
 def evaluate_argument(term: Term, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Value:
-    """The value of `term` as an argument of a fact; errors as for `evaluate_term`, and for a geometry."""
+    """Return the value of `term` as an argument of a fact.
+
+    Errors as for `evaluate_term`; a geometry is a `SchemaError`.
+    """
     found = evaluate_term(term, world, bindings)
     if isinstance(found, tuple):
         raise SchemaError("a geometry can be compared, but is not an argument of a fact", place=term.place)
@@ -167,7 +170,7 @@ def evaluate_argument(term: Term, world: World, bindings: Mapping[str, Value] = 
 
 
 def asked_for(e: Expression, bound: frozenset[str]) -> tuple[str, ...]:
-    """The free variables of `e` that are not in `bound`, each once, in the order of the text."""
+    """Return the free variables of `e` that are not in `bound`, without repetitions, in the order of the text."""
     return tuple(dict.fromkeys(name for name in variables_in_order(e) if name not in bound))
 
 
@@ -175,15 +178,16 @@ _ARITHMETIC = {"increase": "+", "decrease": "-", "scale-up": "*", "scale-down": 
 
 
 def apply_effect(effect: Effect, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Delta:
-    """The changes of `effect` on `world`, which stays unchanged.
+    """Return the changes of `effect` in `world`, which stays unchanged.
 
-    All conditions and values refer to the world before (PDDL 2.1). A fact both deleted and added is
-    added. Several changes of one number in an effect add up; two different assignments contradict.
+    All conditions and values refer to the world before the effect (PDDL 2.1). A fact that is both deleted and added
+    becomes true. Several increases and decreases of one number in an effect add up; two different assignments
+    contradict each other.
 
     Raises:
         UnknownNameError: a variable is not bound, or a name is not declared.
-        SchemaError: contradicting assignments, a wrong number of arguments, arithmetic on no number.
-        InputError: it is nested too deeply.
+        SchemaError: contradicting assignments, a wrong number of arguments, or an operand that is not a number.
+        InputError: the nesting is too deep.
     """
     check_depth(effect)
     application = _Application(world)
@@ -194,7 +198,7 @@ def apply_effect(effect: Effect, world: World, bindings: Mapping[str, Value] = N
 
 
 def choices(variables: tuple[TypedVariable, ...], world: World) -> Iterator[dict[str, Value]]:
-    """Every choice of things for `variables`, in order of insertion."""
+    """Yield every choice of objects for `variables`, in order of insertion."""
     things = [
         tuple(dict.fromkeys(thing for t in v.types or ("object",) for thing in world.objects(t))) for v in variables
     ]
@@ -203,7 +207,7 @@ def choices(variables: tuple[TypedVariable, ...], world: World) -> Iterator[dict
 
 
 class _Application:
-    """Collects changes; dicts stand for ordered sets."""
+    """Collector of the changes of an effect; dictionaries represent ordered sets."""
 
     def __init__(self, world: World) -> None:
         self.world = world

@@ -1,4 +1,4 @@
-"""Why a condition is true or false of a world: its tree with truth values and the leaf that decides."""
+"""Explanation why a condition is true or false: its tree with truth values, and the leaf that decides."""
 
 from __future__ import annotations
 
@@ -35,24 +35,24 @@ from knowledge_base.language.syntax.text import to_text
 from knowledge_base.spelling import value_text
 
 _Judged = tuple["Explanation", InputError | None]
-"""A part, and the error if it cannot be computed."""
+"""A part, and the error if the part cannot be computed, else `None`."""
 
 MOST_TRIED = 200
-"""Number of choices of a false `exists` that are compared to find the nearest miss."""
+"""Maximum number of choices for a false `exists` that are compared to find the nearest miss."""
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """A condition with its variables filled in, its truth, and the same for its parts.
+    """A condition with the values of its variables, its truth, and the explanations of its parts.
 
     Attributes:
         text: the condition in the language.
-        truth: whether it holds; a part that cannot be computed counts as false where another part decides.
-        children: all its parts; for `exists` and `forall` the one choice that shows it, if any: a witness, the
-            nearest miss or a counterexample.
-        detail: the values of a comparison's computed sides, the inputs of a computed predicate, the chosen
-            objects, or the reason for a missing value.
-        decider: which of the children decides; `None` for a leaf.
+        truth: whether the condition is true; a part that cannot be computed is false if another part decides.
+        children: explanations of all parts. For `exists` and `forall`, the explanation of one choice: a witness, the
+            nearest miss or a counterexample, if any.
+        detail: the values of a comparison's computed sides, the inputs of a computed predicate, the chosen objects, or
+            the reason for a missing value.
+        decider: index of the child that decides the truth; `None` for a leaf.
     """
 
     text: str
@@ -63,19 +63,19 @@ class Explanation:
 
     @property
     def deciding(self) -> Explanation:
-        """The leaf that makes the whole what it is: the first false part of an `and`, and so on."""
+        """The leaf that decides the truth of the whole, e.g. the first false part of an `and`."""
         here = self
         while here.decider is not None:
             here = here.children[here.decider]
         return here
 
     def __str__(self) -> str:
-        """One line, e.g. `(< (failures cup1) 2) is false: 3 < 2`."""
+        """Return one line, e.g. `(< (failures cup1) 2) is false: 3 < 2`."""
         said = f"{self.text} is {'true' if self.truth else 'false'}"
         return f"{said}: {self.detail}" if self.detail else said
 
     def to_json(self) -> dict[str, Any]:
-        """The tree as plain data, without what is empty; `decider` is the number of the child that decides, from 0."""
+        """Return the tree as plain data without empty fields; `decider` is the index of the deciding child, from 0."""
         found: dict[str, Any] = {"text": self.text, "truth": self.truth}
         if self.detail:
             found["detail"] = self.detail
@@ -87,7 +87,7 @@ class Explanation:
 
 
 def explain(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> Explanation:
-    """Why `e` is true or false of `world`.
+    """Return the explanation why `e` is true or false in `world`.
 
     Raises:
         UnknownNameError: a free variable is not bound, or a name is not declared.
@@ -120,17 +120,20 @@ def _explain(e: Expression, world: World, bindings: Bindings) -> Explanation:
 
 
 def _judged(e: Expression, world: World, bindings: Bindings) -> _Judged:
-    """A part with its error, which has no effect when another part decides."""
+    """Return a part with its error, which is ignored if another part decides."""
     try:
         return _explain(e, world, bindings), None
     except InputError as error:
-        asked(e, world.schema)  # a mistake in the text is an error even if the part does not decide
+        asked(e, world.schema)  # an error in the text is raised even if the part does not decide
         text = to_text(substitute(e, bindings))
         return Explanation(text, truth=False, detail=f"cannot be computed: {error}"), error
 
 
 def _junction(text: str, parts: Sequence[_Judged], *, neutral: bool) -> Explanation:
-    """`and` (neutral: true) or `or` (neutral: false); the first part that is not neutral decides."""
+    """Return the explanation of `and` (neutral: true) or `or` (neutral: false).
+
+    The first part whose truth is not neutral decides.
+    """
     children = tuple(child for child, _ in parts)
     deciding = [i for i, (child, error) in enumerate(parts) if error is None and child.truth is not neutral]
     error = next((error for _, error in parts if error is not None), None)
@@ -180,7 +183,10 @@ def _shown(
 
 
 def _nearness(body: Expression, world: World, choice: Bindings) -> int:
-    """Number of parts that hold, without explanations, which would multiply with every nested `exists`."""
+    """Return the number of true parts.
+
+    Explanations are not computed here, since their cost would multiply with every nested `exists`.
+    """
     return sum(_is_so(part, world, choice) for part in body.parts) if isinstance(body, And) else 0
 
 
@@ -192,7 +198,7 @@ def _is_so(e: Expression, world: World, bindings: Bindings) -> bool:
 
 
 def _detail(e: Atom | Comparison, world: World, bindings: Bindings) -> str | None:
-    """The values or inputs behind a leaf that is not just a fact."""
+    """Return the compared values or the inputs of a leaf; `None` for a plain fact."""
     if isinstance(e, Comparison):
         return _compared(e, world, bindings)
     of = world.schema.computed.get(e.predicate)

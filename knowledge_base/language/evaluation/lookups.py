@@ -1,7 +1,8 @@
-"""The steps of a search: look-ups of facts and things, in an order that tries few candidates.
+"""The steps of a search: look-ups of facts and objects, in an order that leads to few candidates.
 
-The order is greedy by the variables that are bound: tests first, then atoms with bound arguments, then other atoms,
-then types, then `or` and `exists`. Among atoms the one with the fewest matches is taken, if the world counts them.
+The order is greedy in the bound variables: first tests, then atoms with bound arguments, then other atoms, then types,
+then `or` and `exists`. Among atoms, the search chooses the one with the fewest matches, if the world can estimate their
+number.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from knowledge_base.language.syntax.expression import (
 
 @dataclass(frozen=True, slots=True)
 class TypeRange:
-    """The condition that a variable ranges over the things of its types."""
+    """The condition that the value of a variable is an object of one of its types."""
 
     variable: TypedVariable
 
@@ -55,14 +56,16 @@ class JoinStep:
     schema: Vocabulary
 
     def is_ready(self, bound: AbstractSet[str]) -> bool:
-        """Whether it can be done when the variables `bound` have values."""
+        """Return whether the look-up is possible when the variables `bound` have values."""
         unbound = self.free - bound
         return not unbound or unbound <= _finds(self.conjunct, self.free & bound, self.schema)
 
     def cost(self, bound: AbstractSet[str]) -> tuple[int, int, int]:
-        """Kind of look-up (tests are 0 to 2), then open arguments, then bound ones; smaller is earlier.
+        """Return the kind of look-up (0 to 2 for tests), the number of open arguments, and minus that of all arguments.
 
-        It never grows with more variables in `bound`.
+        Steps with smaller costs come earlier.
+
+        The cost never grows with more variables in `bound`.
         """
         unbound = len(self.free - bound)
         match self.conjunct:
@@ -81,7 +84,7 @@ class JoinStep:
 
 
 def conjuncts(e: Expression) -> Iterator[Expression]:
-    """The conditions that `e` is the conjunction of."""
+    """Yield the parts of the conjunction `e`, or `e` itself."""
     if isinstance(e, And):
         for part in e.parts:
             yield from conjuncts(part)
@@ -90,7 +93,7 @@ def conjuncts(e: Expression) -> Iterator[Expression]:
 
 
 def as_range(conjunct: Conjunct, schema: Vocabulary) -> Conjunct:
-    """A type's atom about a variable ranges over the things of that type."""
+    """Return an atom of a type with a variable as a range over the objects of that type, else `conjunct` itself."""
     match conjunct:
         case Atom(name, (Variable(variable),)) if schema.is_type(name, 1):
             return TypeRange(TypedVariable(variable, (name,), place=conjunct.place))
@@ -99,7 +102,7 @@ def as_range(conjunct: Conjunct, schema: Vocabulary) -> Conjunct:
 
 
 def opposite(e: Expression) -> Expression:
-    """The negation of `e`, with `not` pushed inside so that its parts can be looked up."""
+    """Return the negation of `e`, with `not` moved to the parts, so that these can be looked up."""
     match e:
         case Not(body):
             return body
@@ -112,10 +115,10 @@ def opposite(e: Expression) -> Expression:
 
 
 def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabulary) -> list[JoinStep]:
-    """The look-ups in a good order for bound variables `bound`, without numbers of facts.
+    """Return the look-ups in a good order for the bound variables `bound`, without numbers of facts.
 
     Raises:
-        InputError: a variable is only tested and nothing finds values for it.
+        InputError: a variable is only tested, and no condition finds values for it.
     """
     steps = [JoinStep(c, _free(c), schema) for c in conditions]
     known = set(bound)
@@ -128,7 +131,7 @@ def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabul
     heapify(agenda)
     while agenda:
         _, i = heappop(agenda)
-        if i in taken:  # an entry with an earlier, greater cost
+        if i in taken:  # an outdated entry with a greater cost
             continue
         taken[i] = steps[i]
         found = steps[i].free - known
@@ -142,9 +145,9 @@ def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabul
 
 
 def candidates(steps: Mapping[int, JoinStep], bound: frozenset[str]) -> list[tuple[int, JoinStep]]:
-    """The look-ups that may come next, of `steps` in the order of `order`: atoms, or else a single other.
+    """Return the possible next look-ups of `steps`, in the order of `order`: some atoms, or else one other look-up.
 
-    Only a few, because they are compared by number of matches each time.
+    Their number is small, because the search compares their numbers of matches at every step.
     """
     atoms = ((i, s) for i, s in steps.items() if isinstance(s.conjunct, Atom) and s.is_ready(bound))
     others = ((i, s) for i, s in steps.items() if s.is_ready(bound))
@@ -174,7 +177,7 @@ Answering = Callable[[World, Iterable[Bindings]], list[Answer]]
 
 
 class Lookup:
-    """A search through the facts that match an atom whose variables `finds` are open."""
+    """A search through the facts that match an atom with the open variables `finds`."""
 
     def __init__(self, atom: Atom, schema: Vocabulary, finds: frozenset[str]) -> None:
         first: dict[str, int] = {}
@@ -189,7 +192,7 @@ class Lookup:
                     self._repeated.append((first[arg.name], position))
             elif free_variables(arg).isdisjoint(finds):
                 getters.append(compile_argument(arg, schema))
-            else:  # computed from what the other arguments find
+            else:  # computed from the values that the other arguments find
                 getters.append(None)
                 self._computed.append((position, compile_argument(arg, schema)))
         self._found = tuple(first.items())
@@ -198,7 +201,7 @@ class Lookup:
         self._pattern = _pattern(getters, [_name(arg, finds) for arg in atom.args])
 
     def __call__(self, world: World, bindings: Bindings) -> Iterator[Bindings]:
-        """`bindings` with the values of the open variables, for every fact that matches; looked up one by one."""
+        """Return an iterator over `bindings` extended by the values of the open variables, for each matching fact."""
         matches = self._matches(world, bindings)
         if self._single is not None:
             name, i = self._single
@@ -206,7 +209,10 @@ class Lookup:
         return (self._extended(bindings, args) for args in matches)
 
     def answering(self, names: tuple[str, ...]) -> Answering:
-        """A function that gives the values of the variables `names` for every candidate and fact that matches it."""
+        """Return a function that returns the answers for candidates.
+
+        An answer contains the values of the variables `names` for one candidate and one matching fact.
+        """
         if self._single is None or not self._exact:
             return lambda world, candidates: [
                 {name: found[name] for name in names} for each in candidates for found in self(world, each)
@@ -216,7 +222,7 @@ class Lookup:
             return lambda world, candidates: [
                 {own: args[i]} for each in candidates for args in world.match(predicate, pattern(world, each))
             ]
-        template: Answer = dict.fromkeys(names, "")  # for the order
+        template: Answer = dict.fromkeys(names, "")  # fixes the order of the variables
         others = [name for name in names if name != own]
 
         def answers(world: World, candidates: Iterable[Bindings]) -> list[Answer]:
@@ -231,7 +237,7 @@ class Lookup:
         return answers
 
     def size(self, world: World, bindings: Bindings) -> int:
-        """An upper bound of the matching facts; 0 if the world has no cheap one."""
+        """Return an upper bound of the number of matching facts; 0 if the world has no method `estimate`."""
         estimate = getattr(world, "estimate", None)
         return estimate(self._predicate, self._pattern(world, bindings)) if estimate else 0
 
@@ -261,7 +267,10 @@ def _name(arg: Term, finds: frozenset[str]) -> str | None:
 def _pattern(
     getters: Sequence[Argument | None], names: Sequence[str | None]
 ) -> Callable[[World, Bindings], tuple[Value | None, ...]]:
-    """The pattern of a look-up; most go from one end of an arc, a variable with that name, to the other."""
+    """Return a function that returns the pattern of a look-up.
+
+    Most patterns bind one end of an arc to a variable and leave the other end open.
+    """
     match getters:
         case [None, None]:
             return lambda _world, _bindings: (None, None)
@@ -282,7 +291,7 @@ def _pattern(
 def smallest(
     choices: Sequence[tuple[int, Lookup | Search]], world: World, bindings: Bindings
 ) -> tuple[int, Lookup | Search]:
-    """The choice with the fewest matches; the first of them, or the only one without counting."""
+    """Return the first choice with the fewest matches; the matches of a single choice are not counted."""
     if len(choices) == 1:
         return choices[0]
     found, least = choices[0], -1
@@ -295,7 +304,7 @@ def smallest(
 
 
 def things(variable: TypedVariable) -> Search:
-    """A search through the things that the variable ranges over."""
+    """Return a search through the objects that the variable ranges over."""
     name, types = variable.name, variable.types or ("object",)
 
     def search(world: World, bindings: Bindings) -> Iterator[Bindings]:
@@ -306,7 +315,10 @@ def things(variable: TypedVariable) -> Search:
 
 
 def alternatives(branches: Sequence[Search]) -> Search:
-    """The results of all branches, branch by branch; an error of one comes after all others."""
+    """Return a search that yields the results of all branches in order.
+
+    An error of one branch is raised after all results.
+    """
 
     def search(world: World, bindings: Bindings) -> Iterator[Bindings]:
         failed: InputError | None = None
@@ -322,7 +334,7 @@ def alternatives(branches: Sequence[Search]) -> Search:
 
 
 def distinct(inner: Search, finds: frozenset[str]) -> Search:
-    """Only what `inner` finds for the variables `finds`, each choice once."""
+    """Return a search that yields each choice of values for the variables `finds` only once."""
     names = sorted(finds)
 
     def search(world: World, bindings: Bindings) -> Iterator[Bindings]:

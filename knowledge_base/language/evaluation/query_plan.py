@@ -1,4 +1,4 @@
-"""The plan of a query on a world: the order of its conditions, each looked up or tested."""
+"""Plan of a query on a world: the order of its conditions, each looked up or tested."""
 
 from __future__ import annotations
 
@@ -35,23 +35,26 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.text import to_text
 
 Kind = Literal["test", "computed", "look up", "scan", "things", "alternatives", "witnesses"]
-"""`test`: a condition whose variables all have values. `computed`: a condition that Python evaluates. `look up`: facts
-with given arguments. `scan`: all facts of a predicate. `things` of a type. `alternatives`: each part of an `or` in
-turn. `witnesses` of an `exists`."""
+"""Form of a step's evaluation.
+
+`test`: a condition whose variables all have values. `computed`: a condition that Python evaluates. `look up`: facts
+with given arguments. `scan`: all facts of a predicate. `things`: the objects of a type. `alternatives`: each part of an
+`or` in turn. `witnesses`: the witnesses of an `exists`.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class QueryStep:
-    """One condition of a query, at its turn.
+    """One condition of a query, at its place in the order.
 
     Attributes:
-        kind: its evaluation.
-        text: the condition, with the parameters' values in it.
-        by: for a look-up the arguments that have a value by then.
-        finds: the variables that get their values here.
-        matches: an upper bound of the number of facts or things; `None` if it is unknown.
-        varies: whether values found before decide the order from here.
-        reached: whether the first candidate got that far.
+        kind: the form of the evaluation.
+        text: the condition with the values of the parameters.
+        by: for a look-up, the arguments that have a value before this step.
+        finds: the variables that this step finds values for.
+        matches: an upper bound of the number of matching facts or objects; `None` if it is unknown.
+        varies: whether the order from this step on depends on the values found before.
+        reached: whether the first candidate reached this step.
     """
 
     kind: Kind
@@ -63,7 +66,7 @@ class QueryStep:
     reached: bool = True
 
     def __str__(self) -> str:
-        """One line, e.g. `look up (on ?x table) by table: finds ?x, at most 3 matches`."""
+        """Return one line, e.g. `look up (on ?x table) by table: finds ?x, at most 3 matches`."""
         what = f"{self.kind} {self.text}" + (f" by {' '.join(self.by)}" if self.by else "")
         said = [
             *([f"finds {' '.join(f'?{name}' for name in self.finds)}"] if self.finds else ()),
@@ -76,12 +79,12 @@ class QueryStep:
 
 @dataclass(frozen=True, slots=True)
 class QueryPlan:
-    """The steps of a query in the order in which its first candidate meets them.
+    """The steps of a query in the order in which its first candidate reaches them.
 
     Attributes:
-        text: the query, with the parameters' values in it.
-        answers: the variables it finds values for.
-        steps: the evaluation, in order.
+        text: the query with the values of the parameters.
+        answers: the variables that the query finds values for.
+        steps: the steps of the evaluation, in order.
     """
 
     text: str
@@ -89,16 +92,16 @@ class QueryPlan:
     steps: tuple[QueryStep, ...]
 
     def __str__(self) -> str:
-        """The query and below it one line for each step."""
+        """Return the query, and below it one line for each step."""
         return "\n".join([self.text, *(f"{number:3}. {step}" for number, step in enumerate(self.steps, start=1))])
 
     def to_json(self) -> dict[str, Any]:
-        """The same as plain data."""
+        """Return the plan as plain data."""
         return asdict(self)
 
 
 def plan_query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> QueryPlan:
-    """The plan of the query `e` on `world`, from following its first candidate.
+    """Return the plan of the query `e` on `world`; the plan follows the first candidate of the query.
 
     Raises:
         InputError: as for `query`.
@@ -111,7 +114,7 @@ def plan_query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_B
 
 
 class _Follower:
-    """Goes through the stages of a search as the search itself does, with one candidate and no way back."""
+    """Walk through the stages of a search with one candidate and without backtracking."""
 
     def __init__(self, plan: SearchPlan, world: World, params: Bindings) -> None:
         self._plan = plan
@@ -134,7 +137,7 @@ class _Follower:
             yield from self._tests(left, stage, found)
 
     def _tests(self, numbers: Iterable[int], stage: Stage, found: Iterator[Bindings]) -> Iterator[QueryStep]:
-        """The tests of a stage; then the candidate is the first of those `found` that passes them."""
+        """Yield the tests of a stage; the first candidate of `found` that passes them becomes the present candidate."""
         self._candidate = next(found, None)
         left = set(stage.left)
         for conjunct in (self._plan.steps[i].conjunct for i in numbers if i not in left):
@@ -171,7 +174,7 @@ class _Follower:
         by: tuple[str, ...] = (),
         matches: int | None = None,
     ) -> QueryStep:
-        """A step; a look-up is given what was `bound` before it."""
+        """Return a step; for a look-up, `bound` contains the variables with values before the step."""
         e = _expression(conjunct)
         finds = () if bound is None else asked_for(e, bound)
         reached = self._candidate is not None

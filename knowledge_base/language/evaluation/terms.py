@@ -1,4 +1,4 @@
-"""Terms compiled to closures: the value of an argument or of a side of a comparison on a world."""
+"""Terms compiled to closures: the value of an argument or of a side of a comparison in a world."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _FOLD: Mapping[str, Callable[[Number, Number], Number]] = {
 
 
 def compile_term(term: Term, schema: Vocabulary) -> Getter:
-    """A function that gives the term's value; all its variables must then be bound.
+    """Return a function that returns the value of the term; a caller must bind all its variables.
 
     Raises:
         UnknownNameError: an undeclared function.
@@ -54,7 +54,7 @@ def compile_term(term: Term, schema: Vocabulary) -> Getter:
 
 
 def compile_arguments(terms: tuple[Term, ...], schema: Vocabulary) -> Callable[[World, Bindings], tuple[Value, ...]]:
-    """A function that gives the values of all terms."""
+    """Return a function that returns the values of all terms."""
     constants = tuple(t.value for t in terms if isinstance(t, Constant))
     if len(constants) == len(terms):
         return lambda _world, _bindings: constants
@@ -70,10 +70,10 @@ def compile_arguments(terms: tuple[Term, ...], schema: Vocabulary) -> Callable[[
 
 
 def compile_argument(term: Term, schema: Vocabulary) -> Argument:
-    """As `compile_term`, for arguments of facts.
+    """Return a function that returns the value of an argument of a fact; errors as for `compile_term`.
 
     Raises:
-        SchemaError: it would be a geometry.
+        SchemaError: the value would be a geometry.
     """
     geometry = isinstance(term, Arithmetic) and term.operator == GEOMETRY
     if geometry or (isinstance(term, Call) and schema.result(term.function, term.place) == GEOMETRY):
@@ -82,9 +82,9 @@ def compile_argument(term: Term, schema: Vocabulary) -> Argument:
 
 
 def compile_comparison(e: Comparison, schema: Vocabulary) -> Test:
-    """A function that compares; `=` and `!=` anything, the others numbers.
+    """Return a function that compares the two sides: `=` and `!=` compare any values, the others only numbers.
 
-    The function raises `SchemaError` when it meets a side that is not a number.
+    The returned function raises `SchemaError` if one of the other operators compares a value that is not a number.
     """
     left, right = compile_term(e.left, schema), compile_term(e.right, schema)
     if e.operator == "=":
@@ -105,15 +105,15 @@ def compile_comparison(e: Comparison, schema: Vocabulary) -> Test:
 
 
 def same(left: Content, right: Content) -> bool:
-    """Equality of values; a truth value is not a number, though in Python `True == 1`."""
+    """Return whether the values are equal; a truth value never equals a number, although `True == 1` in Python."""
     return left == right and isinstance(left, bool) == isinstance(right, bool)
 
 
 def as_number(value: Content, used_by: str, place: Place | None) -> Number:
-    """`value` as a number.
+    """Return `value`, which must be a number.
 
     Raises:
-        SchemaError: it is anything else.
+        SchemaError: `value` is not a number.
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise SchemaError(f"'{used_by}' works on numbers, not on '{value}'", place=place)

@@ -1,7 +1,7 @@
 """The world that conditions are evaluated on, and the same world with bounds.
 
-The evaluator finds all candidates through its world. So a world that counts its answers bounds every question on it,
-and a world without bounds pays nothing.
+The evaluator finds all candidates through its world. A world that counts its results therefore bounds every query, and
+a world without bounds has no overhead.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from knowledge_base.language.syntax.text import to_text
 
 
 class World(Protocol):
-    """A state of the world: the store, pending changes on top of it, a planner's state.
+    """A state of the world: the store, pending changes on top of it, or a state of a planner.
 
-    Predicates are those with asserted facts; the language derives types as predicates, computed predicates,
-    quantifiers and comparisons from these answers. Three methods are optional. `estimate(predicate, pattern) -> int`
-    gives an upper bound of the matching facts, so that conjunctions begin with the rarest. `reference(function, args)
-    -> str | None` names the data source of a function's value, which no effect may set. `spend()` is called for every
-    effect on the world, and may end it (`Bounds`).
+    `holds` and `match` cover only predicates with asserted facts; the language derives type tests, computed predicates,
+    quantifiers and comparisons. Three methods are optional. `estimate(predicate, pattern) -> int` returns an upper
+    bound of the number of matching facts, so that conjunctions begin with the rarest fact.
+    `reference(function, args) -> str | None` returns the reference of the data source of a function's value, which no
+    effect may set. `spend()` is called for every effect on the world, and may raise an error at a bound (`Bounds`).
     """
 
     @property
@@ -34,35 +34,38 @@ class World(Protocol):
         """The declarations."""
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
-        """Whether the fact is true."""
+        """Return whether the fact is true."""
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[tuple[Value, ...]]:
-        """The arguments of all facts that agree with `pattern`; `None` is open; in order of insertion."""
+        """Return the arguments of all facts that match `pattern`, in order of insertion.
+
+        `None` in `pattern` matches every argument.
+        """
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """The value of the function; until it is set, the value in `facts.UNSET`."""
+        """Return the value of the function; before the first assignment, the value in `facts.UNSET`."""
 
     def objects(self, type_name: str) -> Iterable[str]:
-        """The things of that type or a subtype, in order of insertion."""
+        """Return the objects of that type and its subtypes, in order of insertion."""
 
     def type_of(self, name: str) -> str | None:
-        """The thing's type; `None` if there is no such thing."""
+        """Return the type of the object; `None` if the object is unknown."""
 
 
 LOOK_EVERY = 500
-"""Work between two looks at the clock and at `cancelled`: about a millisecond."""
+"""Amount of work between two checks of the clock and of `cancelled`; it takes about a millisecond."""
 _LONGEST_SHOWN = 120
 _T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """The bounds of a question; `None` means unbounded.
+    """The bounds of a query; `None` means unbounded.
 
     Attributes:
-        work: number of facts and things that it may visit; about a million in a second.
-        seconds: of real time.
-        cancelled: called about every millisecond, in the thread that answers; `True` ends the question.
+        work: maximum number of facts and objects that the query visits; about a million per second.
+        seconds: maximum real time in seconds.
+        cancelled: called about every millisecond, in the thread that evaluates the query; `True` ends the query.
         now: a clock in seconds.
     """
 
@@ -72,18 +75,18 @@ class Bounds:
     now: Callable[[], float] = time.monotonic
 
 
-class _Given(Exception):  # noqa: N818  no error of the question: the evaluator must not take it for one
-    """The question ends without an answer, for this reason."""
+class _Given(Exception):  # noqa: N818  not an error of the query: the evaluator must not handle it
+    """The query ends without an answer, for this reason."""
 
 
 class Meter:
-    """Counts the work of one question, and ends the question at its bounds.
+    """Counter of the work of one query, which ends the query at its bounds.
 
     Args:
-        bounds: those of the question.
+        bounds: the bounds of the query.
 
     Attributes:
-        work: number of facts and things visited.
+        work: number of facts and objects visited so far.
     """
 
     def __init__(self, bounds: Bounds | None) -> None:
@@ -99,7 +102,7 @@ class Meter:
             self._look()
 
     def each(self, found: Iterable[_T]) -> Iterator[_T]:
-        """The items of `found`, counted one by one."""
+        """Yield the items of `found`, and count each of them as work."""
         for one in found:
             self.work += 1
             if self.work >= self._look_at:
@@ -108,7 +111,10 @@ class Meter:
 
     @contextmanager
     def over(self, question: str | Expression) -> Iterator[None]:
-        """The block answers the question; raises `OutOfBoundsError` if a bound ends that."""
+        """Return a context manager for the evaluation of a query.
+
+        Its exit raises `OutOfBoundsError` if a bound has ended the block.
+        """
         try:
             yield
         except _Given as given:
@@ -130,7 +136,7 @@ class Meter:
 
 
 class BoundedWorld:
-    """A `World` that counts the answers of another one."""
+    """A `World` that counts the results of another world as work."""
 
     def __init__(self, world: World, meter: Meter) -> None:
         self._world, self._meter = world, meter
@@ -144,29 +150,29 @@ class BoundedWorld:
         return self._world.schema
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
-        """Whether the fact is true."""
+        """Return whether the fact is true."""
         self._meter.spend()
         return self._world.holds(predicate, args)
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterator[tuple[Value, ...]]:
-        """The arguments of all facts that agree with `pattern`."""
-        if self.estimate is not None and len(pattern) - pattern.count(None) > 1:  # a list that is searched
+        """Return the arguments of all facts that match `pattern`."""
+        if self.estimate is not None and len(pattern) - pattern.count(None) > 1:  # a list of facts is searched
             self._meter.spend(self.estimate(predicate, pattern))
         self._meter.spend()
         return self._meter.each(self._world.match(predicate, pattern))
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """The value of the function."""
+        """Return the value of the function."""
         self._meter.spend()
         return self._world.value(function, args)
 
     def objects(self, type_name: str) -> Iterable[str]:
-        """The things of that type or a subtype."""
+        """Return the objects of that type and its subtypes."""
         found = tuple(self._world.objects(type_name))
         self._meter.spend(len(found) + 1)
         return found
 
     def type_of(self, name: str) -> str | None:
-        """The thing's type; `None` if there is no such thing."""
+        """Return the type of the object; `None` if the object is unknown."""
         self._meter.spend()
         return self._world.type_of(name)

@@ -1,1 +1,1 @@
-"""Conditions, terms and effects as frozen values, and their text."""
+"""Conditions, terms and effects as immutable values, and their text."""

@@ -1,7 +1,7 @@
 """Durative actions as values (PDDL 2.1, Fox & Long 2003).
 
-Without concurrency a durative action is an ordinary action. Its precondition is what the action alone needs; its
-effect is the change until its end.
+Without concurrency, a durative action is an ordinary action. Its precondition is the condition that lets the action run
+alone; its effect is the change from its start to its end.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from knowledge_base.language.syntax.expression import (
 )
 
 FALSE = Or(())
-"""`(or)`, the condition that never holds."""
+"""`(or)`, the condition that is never true."""
 
 
 @dataclass(frozen=True, slots=True)
 class Duration:
-    """The duration of an action in seconds, between two terms, which are equal when it is fixed.
+    """The duration of an action in seconds, between two terms; a fixed duration has equal terms.
 
-    An action without an upper bound has the constant infinity as `most`.
+    For an action without an upper bound, `most` is the constant infinity.
     """
 
     least: Term
@@ -43,7 +43,7 @@ class Duration:
 
     @property
     def fixed(self) -> bool:
-        """Whether there is nothing to choose."""
+        """Whether the duration is fixed."""
         return self.least == self.most
 
 
@@ -52,9 +52,9 @@ class DurativeParts:
     """The conditions and effects of a durative action, by time.
 
     Attributes:
-        start, end: the conditions when it begins and just before it ends.
-        over_all: the condition during the time between the two.
-        start_effect, end_effect: the changes at its two ends.
+        start, end: the condition at the start, and the condition just before the end.
+        over_all: the condition for the time between the start and the end.
+        start_effect, end_effect: the change at the start, and the change at the end.
     """
 
     start: Expression = TRUE
@@ -65,17 +65,17 @@ class DurativeParts:
 
     @property
     def precondition(self) -> Expression:
-        """The condition before the action that lets it begin and end, alone.
+        """The condition before the action under which the action can start and end without other actions.
 
-        It has the condition at the start, and from the other conditions the parts that the start effect does not
-        decide. The effect decides a part with the same predicate of the same variables.
+        The result contains the condition at the start. From the other conditions, it contains the parts whose truth the
+        start effect does not decide. The effect decides a part with the same predicate and the same variables.
         """
         later = [_after(e, self.start_effect, frozenset()) for e in (self.over_all, self.end)]
         return _conjunction([part for e in (self.start, *later) for part in _conjuncts(e)])
 
     @property
     def effect(self) -> Effect:
-        """The changes from the beginning to the end of the action, alone."""
+        """The changes from the start to the end of the action, without other actions."""
         undone = tuple(leaf.atom for leaf in _unconditional(self.end_effect) if isinstance(leaf, Delete))
         settled = set(_settled(self.end_effect))
         kept = (_unless(part, undone) for part in _parts(self.start_effect) if _changed(part) not in settled)
@@ -93,7 +93,7 @@ def _conjunction(parts: list[Expression]) -> Expression:
 
 
 def _after(e: Expression, effect: Effect, bound: frozenset[str]) -> Expression:
-    """The condition before `effect` under which `e` holds after it (regression, by comparing texts)."""
+    """Return the condition before `effect` that makes `e` true after it (regression, by comparison of texts)."""
     match e:
         case Atom():
             said = {isinstance(leaf, Add) for leaf in _unconditional(effect) if _atom(leaf) == e}
@@ -129,7 +129,7 @@ def _unconditional(effect: Effect) -> Iterator[Effect]:
 
 
 def _settled(effect: Effect) -> Iterator[Atom | Call | None]:
-    """The atoms and functions whose values after the effect do not depend on those before."""
+    """Yield the atoms and functions whose values after the effect do not depend on their values before."""
     for part in _unconditional(effect):
         if not isinstance(part, NumericEffect) or part.operator == "assign":
             yield _changed(part)
@@ -144,7 +144,10 @@ def _atom(leaf: Effect) -> Atom | None:
 
 
 def _unless(part: Effect, undone: tuple[Atom, ...]) -> Effect:
-    """`part`, but a fact that the end deletes is not added where variables turn out to mean the same."""
+    """Return `part`, restricted so that it does not add a fact that the end effect deletes.
+
+    Two atoms with different variables can denote the same fact.
+    """
     if not isinstance(part, Add):
         return part
     same = [_same(part.atom, other) for other in undone]
@@ -153,7 +156,7 @@ def _unless(part: Effect, undone: tuple[Atom, ...]) -> Effect:
 
 
 def _same(atom: Atom, other: Atom) -> tuple[Expression, ...] | None:
-    """The equations under which both are one fact; `None` if they never are."""
+    """Return the equations under which both atoms are one fact; `None` if they never are."""
     if atom.predicate != other.predicate or len(atom.args) != len(other.args):
         return None
     pairs = [(a, b) for a, b in zip(atom.args, other.args, strict=True) if a != b]

@@ -1,7 +1,7 @@
-"""Effects as frozen values: how an action changes the world (PDDL 2.1 effects with `forall` and `when`).
+"""Effects as immutable values: the changes of an action (PDDL 2.1 effects with `forall` and `when`).
 
-Values that are built in Python have no limit of depth. `check_depth` validates them without recursion, because all
-functions that walk them recurse.
+Values that Python code constructs have no limit of depth. `check_depth` validates them without recursion, because all
+functions that walk through them are recursive.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from knowledge_base.language.syntax.sexpr import MAX_DEPTH
 
 @dataclass(frozen=True, slots=True)
 class Add(Located):
-    """The atom holds afterwards."""
+    """The atom becomes true."""
 
     atom: Atom
 
 
 @dataclass(frozen=True, slots=True)
 class Delete(Located):
-    """The atom does not hold afterwards: `(not (on ?i ?s))`."""
+    """The atom becomes false: `(not (on ?i ?s))`."""
 
     atom: Atom
 
@@ -61,7 +61,7 @@ class ForEach(Located):
 
 @dataclass(frozen=True, slots=True)
 class When(Located):
-    """The effect if the condition held before."""
+    """The effect if the condition was true before."""
 
     condition: Expression
     effect: Effect
@@ -83,13 +83,13 @@ NO_EFFECT = AllOf(())
 
 ASSIGNMENTS = ("assign", "increase", "decrease", "scale-up", "scale-down")
 EFFECT_KEYWORDS = ("and", "not", "forall", "when", *ASSIGNMENTS)
-"""The words that open an effect and are not predicates."""
+"""The words at the start of an effect that are not predicates."""
 
 Form = Expression | Term | Effect
 
 
 def parts_of_form(form: Form) -> tuple[Form, ...]:
-    """The effects, conditions and terms that `form` directly consists of."""
+    """Return the effects, conditions and terms that `form` directly consists of."""
     match form:
         case Add(atom) | Delete(atom):
             return (atom,)
@@ -106,7 +106,10 @@ def parts_of_form(form: Form) -> tuple[Form, ...]:
 
 
 def substitute_effect(effect: Effect, bindings: Mapping[str, Value | Term]) -> Effect:
-    """The effect with values or terms in place of the variables that `bindings` names; inner variables shadow them."""
+    """Return the effect with its free variables replaced by the values or terms in `bindings`.
+
+    A variable of an inner `forall` hides an outer variable of the same name.
+    """
     match effect:
         case Add(atom) | Delete(atom):
             return replace(effect, atom=substitute(atom, bindings))
@@ -123,13 +126,13 @@ def substitute_effect(effect: Effect, bindings: Mapping[str, Value | Term]) -> E
 
 
 def quantified_in(form: Form) -> frozenset[str]:
-    """The names of the variables that quantifiers in a condition or effect bind."""
+    """Return the names of the variables that quantifiers in a condition or effect bind."""
     inner = frozenset[str]().union(*map(quantified_in, parts_of_form(form)))
     return inner | {v.name for v in form.variables} if isinstance(form, Exists | Forall | ForEach) else inner
 
 
 def mentioned(form: Form) -> frozenset[str]:
-    """The variables that a condition, term or effect mentions and does not itself bind."""
+    """Return the variables that a condition, term or effect contains and does not itself bind."""
     if not isinstance(form, Effect):
         return free_variables(form)
     inner = frozenset[str]().union(*map(mentioned, parts_of_form(form)))
@@ -137,7 +140,7 @@ def mentioned(form: Form) -> frozenset[str]:
 
 
 def effect_parts(effect: Effect) -> Iterator[Effect]:
-    """The effect and all effects inside it."""
+    """Yield the effect and all effects inside it."""
     yield effect
     for part in parts_of_form(effect):
         if isinstance(part, Effect):
@@ -145,12 +148,12 @@ def effect_parts(effect: Effect) -> Iterator[Effect]:
 
 
 def effect_leaves(effect: Effect) -> Iterator[Add | Delete | NumericEffect]:
-    """The changes an effect consists of."""
+    """Return an iterator over the single changes that an effect consists of."""
     return (part for part in effect_parts(effect) if isinstance(part, Add | Delete | NumericEffect))
 
 
 def effect_conditions(effect: Effect) -> Iterator[Expression]:
-    """The conditions of all conditional effects."""
+    """Return an iterator over the conditions of all conditional effects."""
     return (part.condition for part in effect_parts(effect) if isinstance(part, When))
 
 
@@ -158,7 +161,7 @@ _shallow: IdentityCache[Form, bool] = IdentityCache()
 
 
 def check_depth(form: Form) -> None:
-    """Raise `InputError` if `form` is nested deeper than text can be, `MAX_DEPTH`; remembered by identity."""
+    """Raise `InputError` if `form` is nested deeper than `MAX_DEPTH`; the result is cached by identity."""
     if _shallow.find(form, None):
         return
     level = [form]

@@ -1,7 +1,7 @@
-"""Conditions and terms as frozen values, without a world.
+"""Conditions and terms as immutable values, without a world.
 
-The language has the conditions of PDDL 2.1 (Fox & Long 2003), `!=`, quoted text and truth values; a type is also
-a unary predicate. Comparison ignores places, so the same text at two places gives equal expressions.
+The language has the conditions of PDDL 2.1 (Fox & Long 2003), `!=`, quoted text and truth values; a type is also a
+unary predicate. Equality ignores places, so that the same text at two places results in equal expressions.
 """
 
 from __future__ import annotations
@@ -18,14 +18,17 @@ from knowledge_base.spelling import is_plain_name
 
 @dataclass(frozen=True, slots=True)
 class Located:
-    """Base of all values read from text; `place` is for messages only."""
+    """Base of all values read from text; `place` is only for messages."""
 
     place: Place | None = field(default=None, compare=False, repr=False, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
 class TypedVariable(Located):
-    """A parameter or quantified variable; no types or `object` means any type, several mean `either`."""
+    """A parameter or quantified variable.
+
+    No types, or only `object`, means any type; several types mean `either`.
+    """
 
     name: str
     types: tuple[str, ...] = ()
@@ -37,7 +40,7 @@ class TypedVariable(Located):
 
 @dataclass(frozen=True, slots=True)
 class Variable(Located):
-    """`?x`, by its name without the question mark; `?event.item` has the name `event.item`."""
+    """`?x`, stored by its name without the question mark; `?event.item` has the name `event.item`."""
 
     name: str
 
@@ -46,8 +49,8 @@ class Variable(Located):
 class Constant(Located):
     """An object's name, a number, a truth value, or text in quotes.
 
-    Text that needs quotes (blanks, upper case) is quoted even without `quoted`, so that printing and reading give
-    the same value again. Quoted text names the object of exactly that spelling.
+    Text that needs quotes (blanks, upper case) is always `quoted`, so that the text of a value is read as an equal
+    value. Quoted text denotes the object with exactly that spelling.
     """
 
     value: Value
@@ -68,7 +71,10 @@ class Call(Located):
 
 @dataclass(frozen=True, slots=True)
 class Arithmetic(Located):
-    """Computed from numbers: `+ - * /`, where `-` with one argument negates; `geometry` puts them in a row."""
+    """A value computed from numbers by `+ - * /`; `-` with one argument negates.
+
+    The operator `geometry` returns a tuple of the numbers.
+    """
 
     operator: str
     args: tuple[Term, ...]
@@ -79,7 +85,7 @@ Term = Variable | Constant | Call | Arithmetic
 
 @dataclass(frozen=True, slots=True)
 class Atom(Located):
-    """A predicate of its arguments, or a type of one: `(on ?o table)`, `(cup ?o)`."""
+    """A predicate with its arguments, or a type with one argument: `(on ?o table)`, `(cup ?o)`."""
 
     predicate: str
     args: tuple[Term, ...] = ()
@@ -87,28 +93,28 @@ class Atom(Located):
 
 @dataclass(frozen=True, slots=True)
 class Not(Located):
-    """True when `body` is not."""
+    """A condition that is true when `body` is false."""
 
     body: Expression
 
 
 @dataclass(frozen=True, slots=True)
 class And(Located):
-    """True when all parts are; `(and)` is true."""
+    """A condition that is true when all parts are true; `(and)` is true."""
 
     parts: tuple[Expression, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Or(Located):
-    """True when some part is; `(or)` is false."""
+    """A condition that is true when some part is true; `(or)` is false."""
 
     parts: tuple[Expression, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Imply(Located):
-    """False only when `premise` is true and `conclusion` is not."""
+    """A condition that is false only when `premise` is true and `conclusion` is false."""
 
     premise: Expression
     conclusion: Expression
@@ -116,7 +122,7 @@ class Imply(Located):
 
 @dataclass(frozen=True, slots=True)
 class Exists(Located):
-    """True when `body` is for some choice of known objects."""
+    """A condition that is true when `body` is true for some choice of known objects."""
 
     variables: tuple[TypedVariable, ...]
     body: Expression
@@ -124,7 +130,7 @@ class Exists(Located):
 
 @dataclass(frozen=True, slots=True)
 class Forall(Located):
-    """True when `body` is for all choices of known objects."""
+    """A condition that is true when `body` is true for all choices of known objects."""
 
     variables: tuple[TypedVariable, ...]
     body: Expression
@@ -132,7 +138,7 @@ class Forall(Located):
 
 @dataclass(frozen=True, slots=True)
 class Comparison(Located):
-    """`= != < <= > >=`; the first two compare anything, the others numbers."""
+    """A comparison with `= != < <= > >=`; the first two compare any values, the others only numbers."""
 
     operator: str
     left: Term
@@ -142,18 +148,18 @@ class Comparison(Located):
 Expression = Atom | Not | And | Or | Imply | Exists | Forall | Comparison
 
 TRUE = And(())
-"""`(and)`, the condition that always holds."""
+"""`(and)`, the condition that is always true."""
 
 COMPARISONS = ("=", "!=", "<", "<=", ">", ">=")
 ARITHMETIC = ("+", "-", "*", "/")
 COMPUTING = (*ARITHMETIC, GEOMETRY)
-"""The words that open a term and are not functions."""
+"""The words at the start of a term that are not functions."""
 KEYWORDS = ("and", "or", "not", "imply", "exists", "forall", *COMPARISONS)
-"""The words that open a condition and are not predicates."""
+"""The words at the start of a condition that are not predicates."""
 
 
 def variables_in_order(e: Expression | Term) -> Iterator[str]:
-    """Names of the free variables from left to right, with repetitions."""
+    """Yield the names of the free variables from left to right, with repetitions."""
     match e:
         case Variable(name):
             yield name
@@ -168,7 +174,7 @@ def variables_in_order(e: Expression | Term) -> Iterator[str]:
 
 
 def parts_of(e: Expression | Term) -> tuple[Expression | Term, ...]:
-    """The expressions and terms that `e` directly consists of."""
+    """Return the expressions and terms that `e` directly consists of."""
     match e:
         case Atom(_, args) | Call(_, args) | Arithmetic(_, args):
             return args
@@ -183,12 +189,12 @@ def parts_of(e: Expression | Term) -> tuple[Expression | Term, ...]:
 
 
 def free_variables(e: Expression | Term) -> frozenset[str]:
-    """The names of the variables in `e` that no quantifier binds."""
+    """Return the names of the variables in `e` that no quantifier binds."""
     return frozenset(variables_in_order(e))
 
 
 def variable_place(e: Expression | Term, name: str) -> Place | None:
-    """The place of the first `?name` in `e`."""
+    """Return the place of the first `?name` in `e`, or `None`."""
     if isinstance(e, Variable):
         return e.place if e.name == name else None
     found = (variable_place(part, name) for part in parts_of(e))
@@ -204,10 +210,10 @@ def substitute(e: Expression, bindings: Mapping[str, Value | Term]) -> Expressio
 @overload
 def substitute(e: Term, bindings: Mapping[str, Value | Term]) -> Term: ...
 def substitute(e: Expression | Term, bindings: Mapping[str, Value | Term]) -> Expression | Term:
-    """`e` with the free variables in `bindings` replaced by values or terms; quantified variables shadow.
+    """Return `e` with its free variables replaced by the values or terms in `bindings`.
 
-    Names in `bindings` that are not free in `e` are ignored. Places are kept. A quantified variable that a new term
-    mentions gets a fresh name.
+    A quantified variable hides an outer variable of the same name. Names in `bindings` that are not free in `e` are
+    ignored. Places are kept. If a new term contains the name of a quantified variable, that variable is renamed.
     """
     made: Expression | Term = e
     match e:
@@ -233,7 +239,10 @@ def substitute(e: Expression | Term, bindings: Mapping[str, Value | Term]) -> Ex
 def _entered(
     variables: tuple[TypedVariable, ...], body: Expression, bindings: Mapping[str, Value | Term]
 ) -> tuple[tuple[TypedVariable, ...], dict[str, Value | Term]]:
-    """A quantifier's variables and the bindings inside; a variable that a new term mentions gets a fresh name."""
+    """Return the variables of a quantifier and the bindings for its body.
+
+    If a new term contains the name of a quantified variable, that variable is renamed.
+    """
     own, free = {v.name for v in variables}, free_variables(body)
     inner = {name: value for name, value in bindings.items() if name in free and name not in own}
     met = {name for value in inner.values() if isinstance(value, Term) for name in variables_in_order(value)}
@@ -245,5 +254,5 @@ def _entered(
 
 
 def fresh(name: str, taken: Container[str]) -> str:
-    """The name with the first number that makes it differ from those `taken`."""
+    """Return the name with the first number that makes it differ from the names in `taken`."""
     return next(other for n in itertools.count(2) if (other := f"{name}_{n}") not in taken)

@@ -1,7 +1,7 @@
-"""Results for frozen values, by their identity.
+"""Cache of results for immutable values, by their identity.
 
-Hashing a condition by its content walks all of it, which costs more than evaluating it. Conditions live as long as
-their chart or text, so their identity suffices.
+The hash of a condition's content requires a walk through the whole condition, which costs more than its evaluation. A
+condition exists as long as its chart or text, so that its identity suffices as a key.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ _V = TypeVar("_V")
 
 
 class IdentityCache(Generic[_K, _V]):
-    """At most `size` results by the identity of the two values they were made from.
+    """At most `size` results, by the identity of a key and a context.
 
-    The values are kept alive with the result, so an identity is never taken for a later value's.
+    The cache keeps the key and the context alive, so that no later value can have the same identity.
     """
 
     def __init__(self, size: int = 4096) -> None:
@@ -23,12 +23,12 @@ class IdentityCache(Generic[_K, _V]):
         self._kept: dict[tuple[int, int], tuple[_K, object, _V]] = {}
 
     def find(self, key: _K, context: object) -> _V | None:
-        """The result for `key` in `context`, if it is kept."""
+        """Return the result for `key` in `context`, or `None`."""
         found = self._kept.get((id(key), id(context)))
         return None if found is None else found[2]
 
     def keep(self, key: _K, context: object, made: _V) -> _V:
-        """Keep a result, and hand it back."""
+        """Store a result and return it."""
         if len(self._kept) >= self._size:
             self._kept.clear()
         self._kept[id(key), id(context)] = (key, context, made)

@@ -1,11 +1,11 @@
-r"""Text to nested groups of words and typed lists: the outer form of all PDDL text.
+r"""Reader of text as nested groups of words and of typed lists: the outer form of all PDDL text.
 
-A word is a run of characters other than blanks, parentheses, quotes and semicolons. A `?` begins a new word, since
-files have `(on?x ?y)`. `;` starts a comment; `"..."` is text with the escapes `\"`, `\\`, `\n`, `\r`.
+A word is a sequence of characters other than blanks, parentheses, quotes and semicolons. A `?` begins a new word, since
+some files contain `(on?x ?y)`. `;` starts a comment; `"..."` is text with the escapes `\"`, `\\`, `\n`, `\r`.
 
-Reading is iterative, but all functions on the result recurse, so `MAX_DEPTH` limits the nesting. Compilation of
-nested quantifiers needs most, seven Python frames for each. With a caller that uses 150 of Python's 1,000 frames, the
-end is near 120.
+The reader is iterative, but all functions on its result recurse, so that `MAX_DEPTH` limits the nesting. The
+compilation of nested quantifiers needs the most: seven Python frames for each. If the caller uses 150 of Python's 1,000
+frames, the maximum is a nesting of about 120.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _TOKEN = re.compile(
 _HALF = re.compile("[\udc80-\udcff]")  # bytes of a file that are not UTF-8
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
-_ENDS = {"n": "\n", "r": "\r"}  # a reader of files may replace one end of a line by the other
+_ENDS = {"n": "\n", "r": "\r"}  # a reader of files may replace one line ending by another
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,19 +40,22 @@ class Word:
     quoted: bool = False
 
     def folded(self) -> str:
-        """The word in lower case, as PDDL compares names; quoted text as it is."""
+        """Return the word in lower case, as PDDL compares names; quoted text stays unchanged."""
         return self.text if self.quoted else self.text.lower()
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """The content of two parentheses; `place` is the opening one."""
+    """The content between two parentheses; `place` is the place of the opening parenthesis."""
 
     items: tuple[Node, ...]
     place: Place
 
     def head(self) -> str | None:
-        """The first word in lower case, the kind of the group; `None` if there is none."""
+        """Return the first word in lower case, which is the kind of the group.
+
+        Return `None` if the group does not begin with a word.
+        """
         first = self.items[0] if self.items else None
         return first.folded() if isinstance(first, Word) and not first.quoted else None
 
@@ -61,15 +64,15 @@ Node = Word | Group
 
 
 def read(text: str, source: str | None = None) -> list[Node]:
-    """The groups and words at the top of `text`, in order.
+    """Return the groups and words at the top level of `text`, in order.
 
     Args:
         text: the whole text.
-        source: the name of the file it comes from, for messages.
+        source: name of the file that contains the text, for messages.
 
     Raises:
-        ParseError: a parenthesis or quote without its partner, nesting beyond `MAX_DEPTH`, half a character, or a
-            control character in a word.
+        ParseError: a parenthesis or quote has no partner, the nesting exceeds `MAX_DEPTH`, a byte is not UTF-8, or a
+            word contains a control character.
     """
     top: list[Node] = []
     stack = [(Place(source, 1, 1), top)]
@@ -108,7 +111,7 @@ def _tokens(text: str, source: str | None) -> Iterator[tuple[str, str, Place]]:
 def _word(kind: str, token: str, place: Place) -> Word:
     if _HALF.search(token):
         raise ParseError("this is not UTF-8 text", place=place)
-    if kind == "word" and _CONTROL.search(token):  # it would be invisible in every message
+    if kind == "word" and _CONTROL.search(token):  # it would be invisible in messages
         raise ParseError(f"'{token}' has a control character", place=place)
     if kind == "word":
         return Word(token, place)
@@ -117,7 +120,7 @@ def _word(kind: str, token: str, place: Place) -> Word:
 
 
 class TypedName(NamedTuple):
-    """A name of a typed list, in lower case and with its `?` if it has one; no types means `object`."""
+    """A name of a typed list in lower case, with its `?` if it has one; no types means `object`."""
 
     name: str
     types: tuple[str, ...]
@@ -125,11 +128,11 @@ class TypedName(NamedTuple):
 
 
 def parse_typed_list(nodes: Sequence[Node], *, perhaps_none: bool = False) -> list[TypedName]:
-    """The names of a typed list with their types, in order.
+    """Return the names of a typed list with their types, in order.
 
     Raises:
-        ParseError: a `-` without a type after it, or without names before it unless there are `perhaps_none`; a
-            group where a name is expected.
+        ParseError: a `-` has no type after it, or no names before it unless `perhaps_none`; or a group is found
+            where a name is expected.
     """
     nodes = _unglued(nodes)
     found: list[TypedName] = []
@@ -155,12 +158,12 @@ def parse_typed_list(nodes: Sequence[Node], *, perhaps_none: bool = False) -> li
 
 
 def parse_names(nodes: Sequence[Node]) -> list[TypedName]:
-    """A typed list of things or types, whose names differ from variables, numbers and keywords.
+    """Return the names of a typed list of objects or types.
 
-    There may be none of a type: files that were generated have that.
+    A type without names is accepted, since generated files contain such types.
 
     Raises:
-        ParseError: as `parse_typed_list`, or such a name.
+        ParseError: as for `parse_typed_list`; or a name has the form of a variable, number or keyword.
     """
     names = parse_typed_list(nodes, perhaps_none=True)
     for name, _types, place in names:
@@ -170,10 +173,10 @@ def parse_names(nodes: Sequence[Node]) -> list[TypedName]:
 
 
 def parse_variables(node: Node) -> tuple[TypedVariable, ...]:
-    """The variables of `(?a ?b - cup)`, as used by quantifiers, parameters and declarations.
+    """Return the variables of `(?a ?b - cup)`, the form in quantifiers, parameters and declarations.
 
     Raises:
-        ParseError: no list, a name without `?`, or the same name twice.
+        ParseError: `node` is not a list, a name has no `?`, or a name occurs twice.
     """
     if isinstance(node, Word):
         raise ParseError(f"variables are written in parentheses: ({node.text})", place=node.place)
@@ -181,10 +184,10 @@ def parse_variables(node: Node) -> tuple[TypedVariable, ...]:
 
 
 def typed_variables(nodes: Sequence[Node], *, distinct: bool = True) -> tuple[TypedVariable, ...]:
-    """The variables of a typed list without parentheses, as in `(on ?a ?b - item)`.
+    """Return the variables of a typed list without parentheses, as in `(on ?a ?b - item)`.
 
     Raises:
-        ParseError: a name without `?`, or the same name twice where they have to be `distinct`.
+        ParseError: a name has no `?`; or a name occurs twice, if the names must be `distinct`.
     """
     seen: set[str] = set()
     found: list[TypedVariable] = []
@@ -199,7 +202,7 @@ def typed_variables(nodes: Sequence[Node], *, distinct: bool = True) -> tuple[Ty
 
 
 def _unglued(nodes: Sequence[Node]) -> list[Node]:
-    """The list with `-cup`, as some files have it, in two words."""
+    """Return the list with a word such as `-cup`, which some files contain, split into `-` and `cup`."""
     return [part for node in nodes for part in _parted(node)]
 
 

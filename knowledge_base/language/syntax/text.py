@@ -1,9 +1,9 @@
-"""Text or read groups to conditions, effects and terms, and these back to text.
+"""Parser of text or groups to conditions, effects and terms, and the conversion of these to text.
 
-Reading the text of a value gives an equal value again.
+The text of a value is read as an equal value.
 
-Names are folded to lower case, as PDDL compares them; quoted text is not. The parser checks only the form; `check`
-compares names with a schema.
+Names are converted to lower case, as PDDL ignores case; quoted text is not converted. The parser checks only the form;
+`check` compares names with a schema.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ from knowledge_base.spelling import TRUTH_VALUES, is_number, value_text
 __all__ = ["parse_condition", "parse_effect", "parse_term", "parse_typed_list", "parse_variables"]
 
 LONGEST_NUMBER = 40
-"""Characters of a number; longer numbers are probably mistakes, and slow to read."""
+"""Maximum length of a number in characters; a longer number is probably a mistake, and slow to read."""
 
 
 def parse_condition(text: str | Node, source: str | None = None) -> Expression:
-    """A condition from its text or from a group already read; `()` is true, as in PDDL.
+    """Return a condition, from its text or from a group; `()` is true, as in PDDL.
 
     Raises:
-        ParseError: the form is wrong; it says where and what was expected.
+        ParseError: the form is wrong; the message contains the place and the expected form.
     """
     group = _group(_only(text, source, "a condition"), "a condition")
     if not group.items:
@@ -71,10 +71,10 @@ def parse_condition(text: str | Node, source: str | None = None) -> Expression:
 
 
 def parse_effect(text: str | Node, source: str | None = None) -> Effect:
-    """An effect from its text or from a group already read; `()` changes nothing.
+    """Return an effect, from its text or from a group; `()` changes nothing.
 
     Raises:
-        ParseError: the form is wrong, or a word of conditions (`or`, `exists`) is used as an effect.
+        ParseError: the form is wrong, or a keyword of conditions (`or`, `exists`) begins an effect.
     """
     group = _group(_only(text, source, "an effect"), "an effect")
     if not group.items:
@@ -88,7 +88,7 @@ def parse_effect(text: str | Node, source: str | None = None) -> Effect:
 
 
 def parse_term(text: str | Node, source: str | None = None) -> Term:
-    """A variable, name, number, quoted text, function, arithmetic or geometry.
+    """Return a variable, name, number, quoted text, function, arithmetic or geometry.
 
     Raises:
         ParseError: the form is wrong.
@@ -166,7 +166,10 @@ def _keyword_effect(head: str, args: Sequence[Node], group: Group) -> Effect:
 
 
 def _fluent(node: Node) -> Call:
-    """A function that changes; files in the wild write `(increase total-cost 1)`, which can mean nothing else."""
+    """Return the function that an effect changes.
+
+    Some files write `(increase total-cost 1)`, without parentheses around the function.
+    """
     if isinstance(node, Word) and not node.quoted and not node.text.startswith("?"):
         return Call(node.folded(), (), place=node.place)
     return _call(_group(node, "a function"))
@@ -185,7 +188,7 @@ def _atom(group: Group, head: str, keywords: Iterable[str]) -> Atom:
         return Atom(head, tuple(parse_term(a) for a in group.items[1:]), place=group.place)
     except ParseError:
         nested = any(isinstance(a, Group) for a in group.items[1:])
-        if nested and nearest(head, keywords) is not None:  # a misspelt keyword is the better explanation
+        if nested and nearest(head, keywords) is not None:  # a misspelt keyword is the more likely mistake
             raise ParseError(
                 f"'{head}' is read as a predicate, whose arguments are names, variables or numbers",
                 place=group.place,
@@ -250,7 +253,7 @@ _HEADS = {And: "and", AllOf: "and", Or: "or", Not: "not", Delete: "not", Imply: 
 
 
 def to_text(form: Form) -> str:
-    """`form` on one line of PDDL, losslessly: `parse(to_text(x)) == x`."""
+    """Return `form` on one line of PDDL without loss: `parse(to_text(x)) == x`."""
     match form:
         case Variable(name):
             return f"?{name}"
@@ -269,11 +272,14 @@ def to_text(form: Form) -> str:
 
 
 def variables_text(variables: Sequence[TypedVariable]) -> str:
-    """A typed list in parentheses: `(?a - cup ?b - object)`, each variable with its type, or none with any."""
-    typed = any(v.types for v in variables)  # a variable without a type would take that of the next one
+    """Return a typed list in parentheses: `(?a - cup ?b - object)`.
+
+    Types are omitted if no variable has one.
+    """
+    typed = any(v.types for v in variables)  # else an untyped variable would have the type of the next
     return "(" + " ".join(f"?{v.name} - {types_text(v.types)}" if typed else f"?{v.name}" for v in variables) + ")"
 
 
 def types_text(types: Sequence[str]) -> str:
-    """The types of a name in a typed list."""
+    """Return the types of a name in the notation of a typed list."""
     return types[0] if len(types) == 1 else f"(either {' '.join(types)})" if types else "object"
