@@ -118,7 +118,7 @@ def licence(package: str) -> str:
     if package in LICENCES:
         return LICENCES[package]
     classified = [one.split(" :: ")[-1] for one in said.get_all("Classifier") or [] if one.startswith("License")]
-    text = said.get("License-Expression") or said.get("License") or ""
+    text = (said.get_all("License-Expression") or said.get_all("License") or [""])[0]
     text = text if text and len(text) < 60 else (classified or [text[:60]])[0]
     return SPELT.get(text, re.sub(r"^(MIT|BSD) License$", r"\1", text))
 

@@ -14,7 +14,7 @@ GROWTH = 1.1
 
 @pytest.fixture(scope="module")
 def counted():
-    command = [sys.executable, BENCH, "--json", "--rounds", "0"]
+    command: list[str | Path] = [sys.executable, BENCH, "--json", "--rounds", "0"]
     return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 

@@ -14,7 +14,7 @@ FOR_ALL = {"ping-pong", "5 levels", "4 regions", "ring of 1,000 states", "1,000 
 
 @pytest.fixture(scope="module")
 def rows():
-    command = [sys.executable, ENGINE, "--quick", "--json"]
+    command: list[str | Path] = [sys.executable, ENGINE, "--quick", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return {row["case"]: row for row in json.loads(done.stdout)["rows"]}
 

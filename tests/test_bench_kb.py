@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-COMMAND = [sys.executable, Path(__file__).parent.parent / "benchmarks" / "kb.py", "--quick", "--json"]
+COMMAND: list[str | Path] = [sys.executable, Path(__file__).parent.parent / "benchmarks" / "kb.py", "--quick", "--json"]
 OF_ITS_OWN = ("memory", "install", "half of", "99 of 100", "recovery")
 
 

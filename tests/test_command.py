@@ -158,7 +158,7 @@ def test_with_json_the_exit_status_is_the_commands_own(dsc):
 
 def installed(words, out):
     """The installed command with its output going there: its exit status and what it complains about."""
-    command = [Path(sys.executable).with_name("dsc"), *map(str, words)]
+    command: list[str | Path] = [Path(sys.executable).with_name("dsc"), *map(str, words)]
     done = subprocess.run(command, stdout=out, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
     return done.returncode, done.stderr
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -28,7 +29,7 @@ def blocks(page, language):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_python_on_a_page_runs_from_top_to_bottom(page):
-    names = {}
+    names: dict[str, Any] = {}
     for block in blocks(page, "python"):
         exec(compile(block, str(page), "exec"), names)  # noqa: S102  the page's own code is what is tested
 
@@ -115,7 +116,7 @@ def test_the_architecture_names_every_room():
 
 def classes():
     """The names in the body of each class of the project, by the name of the class."""
-    found = {}
+    found: dict[str, set[str]] = {}
     for package in PACKAGES:
         for path in (ROOT / package).rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text())):
@@ -176,7 +177,7 @@ def test_the_sessions_with_a_store_are_what_the_command_prints(tmp_path):
     for block in blocks(ROOT / "docs" / "knowledge.md", "console"):
         for shown in block.split("$ dsc ")[1:]:
             command, _, expected = shown.partition("\n")
-            words = [dsc, *shlex.split(command)]
+            words: list[str | Path] = [dsc, *shlex.split(command)]
             done = subprocess.run(words, check=False, capture_output=True, text=True, cwd=tmp_path)
             assert done.stdout + done.stderr == expected
 

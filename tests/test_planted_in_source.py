@@ -11,6 +11,7 @@ import inspect
 import textwrap
 from collections import Counter
 from contextlib import suppress
+from typing import Any
 
 import pytest
 
@@ -38,7 +39,7 @@ def exchanged(function, old, new):
     """The function with one part of its source exchanged, which has to stand there once."""
     source = textwrap.dedent(inspect.getsource(function))
     assert source.count(old) == 1, f"{function.__qualname__} has changed"
-    made = {}
+    made: dict[str, Any] = {}
     code = compile("from __future__ import annotations\n" + source.replace(old, new), "<planted>", "exec")
     exec(code, function.__globals__, made)  # noqa: S102  our own source but for a few characters
     return made[function.__name__]
@@ -191,7 +192,8 @@ def an_end_is_forgotten_only_when_it_is_kept(folder):
     """A commit that fails, one after the other: the robot still remembers what was not kept."""
 
     def remembered(path, fails_at):
-        arm, commits = Remembering(), Counter()
+        arm = Remembering()
+        commits: Counter[str] = Counter()
 
         def fail(boundary):
             commits[boundary] += 1

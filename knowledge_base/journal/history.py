@@ -18,7 +18,7 @@ MOST_KEPT = 10_000
 """Maximum number of objects, facts and numbers in the kept changes."""
 MOST_KEYS = 10_000
 """Maximum number of idempotency keys."""
-Writer = Callable[[sqlite3.Connection], None]
+Writer = Callable[[sqlite3.Connection], object]
 """Writes more rows in the transaction of a commit; it neither commits nor rolls back."""
 
 

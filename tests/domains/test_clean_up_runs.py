@@ -2,6 +2,7 @@
 
 import io
 import json
+from typing import Any
 
 import pytest
 
@@ -120,7 +121,7 @@ class Script:
 def test_through_everything_at_once(planner, monkeypatch):
     """Somebody adds an item while the planner works, a grasp fails while a rule recovers, stop and restart."""
     seen = []
-    holder = {}
+    holder: dict[str, Any] = {}
 
     def listener(record):
         seen.append(record)

@@ -7,6 +7,7 @@ from domains.clean_up_table import Scenario, deploy
 from domains.clean_up_table.deployment import HOME
 from domains.clean_up_table.observations import initial_knowledge, learned
 from domains.clean_up_table.physics import Physics, believed
+from dsc.trace import Record
 from knowledge_base import Delta, KnowledgeBase, fact
 from planning import Plan, PlanningDomain, PlanStep
 
@@ -73,7 +74,7 @@ def test_what_physics_does_not_allow_is_foreseen_with_a_reason(plan, at, said):
 
 def test_a_plan_that_physics_refuses_is_not_carried_out(planner):
     """Somebody told the robot that cans fit into cups: it would learn at the table, it foresees it instead."""
-    records = []
+    records: list[Record] = []
     table = deploy(Scenario.parse("table: {cups: 2, cans: 1}"), 0, 0.0, planner, records.append)
     wrong = tuple(fact("fits", "can1", cup) for cup in ("cup1", "cup2"))
     table.executive.knowledge.apply(

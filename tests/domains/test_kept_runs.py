@@ -10,6 +10,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from kept_lives import SCENARIO, told
@@ -42,7 +43,8 @@ def whole(planner, tmp_path_factory):
     """A run that was never broken off, with its report, its world, and copies of the files from its boundaries."""
     folder = tmp_path_factory.mktemp("kept")
     (alive := folder / "alive").mkdir()
-    boundaries, copies = [], []
+    boundaries: list[int] = []
+    copies: list[Path] = []
 
     def boundary(_):
         boundaries.append(1)
@@ -115,11 +117,16 @@ def _database(path: Path, *statements: str) -> None:
     connection.close()
 
 
+def _link(path: Path) -> None:
+    _database(path.with_name("mine"))
+    path.symlink_to("mine")
+
+
 STRANGERS = {
     "text": (lambda path: path.write_text("my notes\n"), "file is not a database"),
     "empty": (lambda path: path.touch(), "is empty"),
     "database": (_database, "this is a database, but no simulated world"),
-    "link": (lambda path: (_database(path.with_name("mine")), path.symlink_to("mine")), "is a link"),
+    "link": (_link, "is a link"),
     "pipe": (os.mkfifo, "is a pipe"),
     "log": (lambda path: path.with_name(path.name + "-wal").write_text("mine"), "run.kb-world-wal"),
     "later": (lambda path: _database(path, f"PRAGMA application_id = {KIND.application_id}", "PRAGMA user_version = 9"),
@@ -212,7 +219,8 @@ def test_a_mistake_is_one_line(words, message):
 
 def test_another_robot_is_the_same_one_after_the_crash(planner, tmp_path):
     (alive := tmp_path / "alive").mkdir()
-    copies, profile = [], find_profile("on_tracks", PROFILES)
+    copies: list[Any] = []
+    profile = find_profile("on_tracks", PROFILES)
 
     def boundary(_):
         if len(copies) < 30:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -85,5 +86,5 @@ def test_an_action_id_is_executed_once(world, script):
     assert world.state() == before
 
 
-def run(world: TableWorld, script: list[tuple[str, ...]], prefix: str) -> list:
+def run(world: TableWorld, script: list[tuple[str, ...]], prefix: str) -> list[Any]:
     return [getattr(world, verb)(f"{prefix}{n}", *args) for n, (verb, *args) in enumerate(script)]

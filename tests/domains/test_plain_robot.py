@@ -49,7 +49,7 @@ def handle(robot: Robot, item: str, surface: str) -> bool:
         return False
     if not grasp(robot, "pick_up", item=item, surface=surface):
         return True
-    for carrier in sorted(f.args[1] for f in robot.facts if f.predicate == "fits" and f.args[0] == item):
+    for carrier in sorted(str(f.args[1]) for f in robot.facts if f.predicate == "fits" and f.args[0] == item):
         usable = carrier in robot.lying(surface) and fact("free-room", carrier, "none") not in robot.facts
         if usable and fact("graspable", carrier) in robot.facts:
             robot.do("stack", item=item, carrier=carrier, surface=surface)
@@ -74,7 +74,7 @@ def grasp(robot: Robot, skill: str, **where: str) -> bool:
 def put_away(robot: Robot) -> bool:
     """Bring what is in the hand where it goes, or put it down where the robot is."""
     for item in robot.all("holding"):
-        (destination,) = [f.args[1] for f in robot.facts if f.predicate == "goes-to" and f.args[0] == item]
+        (destination,) = [str(f.args[1]) for f in robot.facts if f.predicate == "goes-to" and f.args[0] == item]
         if go(robot, destination):
             assert robot.do("throw_away", item=item, destination=destination).event == "thrown_away"
         elif robot.all("holding"):

@@ -54,7 +54,7 @@ LINES = [
 
 
 def test_plain_lines_say_what_is_worth_knowing():
-    lines = []
+    lines: list[str] = []
     progress = PlainProgress(lines.append)
     for one in RECORDS:
         progress(one)
@@ -79,7 +79,7 @@ def test_on_a_terminal_a_status_line_stands_below_the_same_lines(skill):
 def test_steps_that_stand_side_by_side_are_told_as_well():
     lane = {"states": {"before_2": {}, "step_2": {"about": "(throw can)", "dynamic": ["throw"]}}}
     plan = {"plot": "plan_2", "generated": True, "states": {"work": {"regions": {"anna": lane}}}}
-    lines = []
+    lines: list[str] = []
     progress = PlainProgress(lines.append)
     progress(record(1, "plot", plot=plan))
     progress(record(2, "step", **step(["clear/execute/work", "clear/execute/before_2", "clear/execute/step_2"])))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import given, settings
@@ -60,6 +60,7 @@ def applicable(robot: Robot, action: ActionText) -> Iterator[dict[str, str]]:
     assert isinstance(action.precondition, And)
     open_bindings: list[dict[str, str]] = [{}]
     for atom in action.precondition.parts:
+        assert isinstance(atom, Atom)
         rows = sorted((f.args for f in robot.facts if f.predicate == atom.predicate), key=str)
         open_bindings = [m for b in open_bindings for row in rows if (m := match(atom, row, b)) is not None]
     wanted = {p.name: p.types for p in action.parameters}
@@ -70,7 +71,7 @@ def applicable(robot: Robot, action: ActionText) -> Iterator[dict[str, str]]:
                 yield full
 
 
-def match(atom: Atom, row: tuple, binding: dict[str, str]) -> dict[str, str] | None:
+def match(atom: Atom, row: tuple[Any, ...], binding: dict[str, str]) -> dict[str, str] | None:
     found = dict(binding)
     for arg, value in zip(atom.args, row, strict=True):
         wanted = found.setdefault(arg.name, value) if isinstance(arg, Variable) else arg.value

@@ -40,7 +40,7 @@ def test_every_promise_holds_in_every_run(first, planners):
     outcomes = [lived(seed, planners, replayed=seed % REPLAYED_EVERY == 0) for seed in seeds]
     assert {one.seed: one.wrong for one in outcomes if one.wrong} == {}
     assert {one.how for one in outcomes} <= {"goal reached", "something left", "stopped", "ended early"}
-    crashes = sum((one.crashes for one in outcomes), Counter())
+    crashes: Counter[str] = sum((one.crashes for one in outcomes), Counter())
     assert {"killed before commit", "killed after commit", "killed after an action"} <= crashes.keys()
     assert sum(one.lives for one in outcomes) > CHUNK
 

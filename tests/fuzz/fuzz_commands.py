@@ -83,6 +83,7 @@ class Commands(Target):
 
     def vary(self, random: Random) -> bytes:
         """A call from the corpus with other arguments, or one that was never made."""
+        files: dict[str, str]
         if random.random() < 0.5:
             call = json.loads(random.choice(self.seeds()))
             words = tuple(call["argv"][: 2 if tuple(call["argv"][:2]) in commands() else 1])
@@ -90,7 +91,7 @@ class Commands(Target):
             _change(rest, random, words, files)
         else:
             words = random.choice(list(commands()))
-            files: dict[str, str] = {}
+            files = {}
             rest = _drawn(random, words, files)
         for name in list(files):
             files[name] = _content(files[name], random)
@@ -130,7 +131,7 @@ def _called(argv: Sequence[str], home: Path) -> tuple[int, str]:
     finally:
         os.chdir(before)
     out.flush()
-    said = out.buffer.getvalue().decode("utf-8", "replace")  # type: ignore[attr-defined]
+    said = out.buffer.getvalue().decode("utf-8", "replace")
     return (0 if status is None else status if isinstance(status, int) else 1), said
 
 

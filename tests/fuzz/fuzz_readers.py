@@ -233,7 +233,7 @@ def read_effect(data: bytes, folder: Path) -> None:
     text = _text(data)
     kb = _kitchen()
     for meaning in (told, retracted):
-        _unless(InputError, lambda meaning=meaning: meaning([text], kb, "FACT"))
+        _unless(InputError, partial(meaning, [text], kb, "FACT"))
     effect = parse_effect(text, "EFFECT")
     check_effect(effect, kb.schema)
     to_text(effect)
@@ -265,8 +265,8 @@ def read_trace_file(data: bytes, folder: Path) -> None:
     log.batch(1)
     answers = PageQueries(log)
     for seq in {0, 1, 2, len(log) // 2, len(log), len(log) + 1}:
-        _unless(InputError, lambda seq=seq: answers.facts({"seq": seq}))
-        _unless(InputError, lambda seq=seq: answers.query({"seq": seq, "expression": "(on ?x ?y)"}))
+        _unless(InputError, partial(answers.facts, {"seq": seq}))
+        _unless(InputError, partial(answers.query, {"seq": seq, "expression": "(on ?x ?y)"}))
 
 
 def read_store(data: bytes, folder: Path, name: str) -> None:

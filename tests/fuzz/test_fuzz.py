@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from operator import attrgetter
 from pathlib import Path
 from random import Random
 
@@ -174,7 +175,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize(
-    "mutation", sorted({*fuzz_mutation.TEXT, *fuzz_mutation.JSON, *fuzz_mutation.LINES}, key=lambda one: one.__name__)
+    "mutation", sorted({*fuzz_mutation.TEXT, *fuzz_mutation.JSON, *fuzz_mutation.LINES}, key=attrgetter("__name__"))
 )
 def test_a_mutation_takes_any_input(mutation):
     inputs = (b"", b"a", b"(a (b c) 1.5)", b"\xff\x00", b'{"a": [1, {"b": null}]}', b"<a><b/></a>", b"\n\n")

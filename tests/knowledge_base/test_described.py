@@ -41,7 +41,7 @@ class Text(str):
     def __len__(self):
         raise RuntimeError("hands off")
 
-    __getitem__ = __str__ = __iter__ = __format__ = __len__
+    __getitem__ = __str__ = __iter__ = __format__ = __len__  # type: ignore[assignment]
 
 
 class OddTextError(Exception):
@@ -51,7 +51,7 @@ class OddTextError(Exception):
 
 class Meta(type):
     @property
-    def __name__(cls):
+    def __name__(cls):  # type: ignore[override]
         raise RuntimeError("no name")
 
     def __repr__(cls):
@@ -61,7 +61,7 @@ class Meta(type):
 
 
 class NamelessError(Exception, metaclass=Meta):
-    @property
+    @property  # type: ignore[misc]
     def __class__(self):
         raise RuntimeError("no class")
 
@@ -78,7 +78,7 @@ class Group(ExceptionGroup):
 
 
 def nested(depth):
-    error = ValueError("deep")
+    error: Exception = ValueError("deep")
     for _ in range(depth):
         error = ExceptionGroup("g", [error, FailsError()])
     return error

@@ -11,6 +11,7 @@ from kb_strategies import SCHEMA, THINGS, deltas, removals
 from kb_worlds import PROPERTY, everything
 
 from knowledge_base import Delta, Fact, InputError, KnowledgeBase, Schema, exchange, fact
+from knowledge_base.facts import Value
 
 
 @PROPERTY
@@ -35,7 +36,7 @@ def test_a_change_survives_json(change):
 def test_kinds_of_values_are_told_apart():
     schema = Schema.parse("(define (domain d) (:predicates (said ?v - (either number boolean text))))")
     kb = KnowledgeBase(schema)
-    values = [1, 2.0, False, "1", "true", "ü", 1e-300, 2**53 + 1]
+    values: list[Value] = [1, 2.0, False, "1", "true", "ü", 1e-300, 2**53 + 1]
     kb.apply(Delta(added=tuple(fact("said", v) for v in values)), author="test")
     again = KnowledgeBase.from_json(kb.to_json())
     assert repr(again.facts()) == repr(kb.facts())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 from itertools import product
+from typing import Any
 
 import pytest
 from hypothesis import assume, given, settings
@@ -53,7 +54,7 @@ def _outcome(ask):
         return type(error)
 
 
-def _choices(names, world) -> list[dict]:
+def _choices(names, world) -> list[dict[str, Any]]:
     """All values that the variables could have."""
     numbers = list(dict.fromkeys(number for _, number in world.match("level", (None, None))))
     values = {"x": THINGS, "y": THINGS, "p": PLACES, "q": PLACES, "n": numbers}

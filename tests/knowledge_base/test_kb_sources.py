@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from kb_worlds import PROPERTY
 
 from knowledge_base import (
+    Change,
     ConflictError,
     Delta,
     InputError,
@@ -40,7 +42,7 @@ def source(kb):
     return kb.bind_source("pose", "cup1", "map", reference="tf:map/cup1")
 
 
-def heard(condition) -> list:
+def heard(condition) -> list[Any]:
     told = []
     condition.subscribe(lambda firing: told.append((firing.version, firing.truth)), falls=True)
     return told
@@ -59,7 +61,8 @@ def test_the_latest_value_is_what_everyone_reads(kb, source):
 
 
 def test_no_version_has_it(kb, source):
-    before, told = kb.to_json(), []
+    before = kb.to_json()
+    told: list[Change] = []
     kb.subscribe(told.append)
     source.update((1.0,))
     assert (kb.version, kb.changes(since=1), told, kb.to_json()) == (1, [], [], before)
@@ -120,7 +123,8 @@ class Clock:
     """Time that a test makes pass; timers that were cancelled may still be called, as by another thread."""
 
     def __init__(self) -> None:
-        self.time, self.timers = 0.0, []
+        self.time = 0.0
+        self.timers: list[Any] = []
 
     def now(self) -> float:
         return self.time
@@ -321,8 +325,9 @@ def test_conditions_agree_with_asking_anew_and_the_graph_with_the_world(steps):
     ]
     conditions = {text: kb.install(text) for text in texts}
     expected = {text: kb.ask(text) for text in texts}
-    told, due = {text: heard(c) for text, c in conditions.items()}, {text: [] for text in texts}
-    bound = {}
+    told = {text: heard(c) for text, c in conditions.items()}
+    due: dict[str, list[Any]] = {text: [] for text in texts}
+    bound: dict[str, Any] = {}
     for verb, name, number in steps:
         source = bound.get(name)
         is_fed = source is not None and not source.closed

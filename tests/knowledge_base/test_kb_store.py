@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import networkx as nx
 import pytest
@@ -13,7 +15,7 @@ from kb_interrupts import interrupted
 from kb_strategies import SCHEMA, THINGS, deltas, removals
 from kb_worlds import graph_content
 
-from knowledge_base import ConflictError, Delta, Fact, InputError, KnowledgeBase, Overlay, fact
+from knowledge_base import Change, ConflictError, Delta, Fact, InputError, KnowledgeBase, Overlay, fact
 
 
 @pytest.fixture
@@ -28,7 +30,7 @@ def kb() -> KnowledgeBase:
     return kb
 
 
-def described(world) -> tuple:
+def described(world) -> tuple[Any, ...]:
     """All a world says, asked through its five questions; the order counts."""
     facts = {p: list(world.match(p, (None,) * signature.arity)) for p, signature in world.schema.predicates.items()}
     things = {t: list(world.objects(t)) for t in world.schema.types}
@@ -83,7 +85,11 @@ def test_an_overlay_says_what_the_store_would(changes) -> None:
 @given(st.lists(deltas() | removals(), max_size=4))
 def test_the_announced_changes_rebuild_the_world(changes) -> None:
     kb, mirror = KnowledgeBase(SCHEMA), KnowledgeBase(SCHEMA)
-    kb.subscribe(lambda change: mirror.apply(change.delta, change.author))
+
+    def repeat(change: Change) -> None:
+        mirror.apply(change.delta, change.author)
+
+    kb.subscribe(repeat)
     for change in changes:
         kb.apply(change, author="test")
     assert described(mirror) == described(kb)
@@ -160,7 +166,7 @@ def test_a_parameter_that_is_missing_or_a_geometry_is_the_same_error_when_the_te
 
 
 def test_the_effective_change_is_announced_with_version_and_author(kb) -> None:
-    heard = []
+    heard: list[Change] = []
     kb.subscribe(heard.append)
     version = kb.version
     told = (fact("on", "cup1", "shelf"), Fact("quiet"))
@@ -171,7 +177,8 @@ def test_the_effective_change_is_announced_with_version_and_author(kb) -> None:
 
 
 def test_what_changes_nothing_is_not_announced(kb) -> None:
-    heard, version = [], kb.version
+    heard: list[Change] = []
+    version = kb.version
     kb.subscribe(heard.append)
     same = Delta(
         nodes={"cup1": "cup"},
@@ -196,7 +203,9 @@ def test_a_transaction_sees_itself_and_nobody_else_does(kb) -> None:
 
 
 def test_a_transaction_that_raises_leaves_nothing_behind(kb) -> None:
-    before, version, heard = described(kb), kb.version, []
+    before = described(kb)
+    version = kb.version
+    heard: list[Change] = []
     kb.subscribe(heard.append)
     with pytest.raises(InputError), kb.transaction(author="test") as tx:  # noqa: PT012
         tx.add_node("cup3", "cup")
@@ -256,7 +265,7 @@ def test_listeners_hear_in_commit_order_outside_the_lock(kb) -> None:
 
 
 def test_a_failing_listener_silences_nobody(kb) -> None:
-    heard = []
+    heard: list[Change] = []
 
     def fail(change) -> None:
         raise ValueError("deaf")
@@ -312,9 +321,11 @@ def test_overlays_stack(kb) -> None:
 def test_an_interrupt_at_any_moment_of_a_change_silences_nobody() -> None:
     was_interrupted, moment = True, 0
     while was_interrupted:
-        kb, heard = KnowledgeBase(SCHEMA), []
+        kb = KnowledgeBase(SCHEMA)
+        heard: list[Change] = []
         kb.subscribe(heard.append)
-        was_interrupted = interrupted(moment, partial(kb.apply, Delta(nodes={"cup1": "cup"}), "test"))
+        commit: Callable[[], Any] = partial(kb.apply, Delta(nodes={"cup1": "cup"}), "test")
+        was_interrupted = interrupted(moment, commit)
         kb.apply(Delta(nodes={"cup2": "cup"}), "test")
         assert heard[-1].version == kb.version, f"interrupted at moment {moment}"
         moment += 1

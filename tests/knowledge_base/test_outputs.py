@@ -21,7 +21,7 @@ SCHEMA = Schema.parse("(define (domain d) (:types cup) (:predicates (clean ?c - 
 
 
 @pytest.fixture(name="store")
-def _store(tmp_path) -> Path:
+def _store(tmp_path: Path) -> Path:
     path = tmp_path / "s.db"
     with KnowledgeBase.open(SCHEMA, path) as kb, kb.transaction(author="test") as tx:
         tx.add_node("red", "cup")

@@ -1,6 +1,7 @@
 """The data of the mutation test is true: rooms have files, reasons belong to code that is there."""
 
 import tomllib
+from typing import Any
 
 from judgement import ACCEPTED, EXCLUDED, Excluded, exclusion, read_accepted, read_excluded
 from rooms import ROOT, read_rooms
@@ -77,7 +78,7 @@ def opened():
     rewritten = undecorated(text)
     assert "@contextmanager" not in rewritten
     assert "@cached_property" not in rewritten
-    names = {}
+    names: dict[str, Any] = {}
     exec(rewritten, names)  # noqa: S102  the code stands above
     counter = names["Counter"]()
     counter.value = 3

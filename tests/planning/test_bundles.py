@@ -91,7 +91,7 @@ def test_a_bundle_that_is_not_there_is_named_with_who_needs_it(wanted, said):
 
 def test_what_is_no_bundle_is_refused():
     with pytest.raises(InputError, match="a bundle is a Bundle or the name of an installed one, not 5"):
-        gathered([5], {})
+        gathered([5], {})  # type: ignore[list-item]
 
 
 def test_bundles_that_contradict_each_other_are_named():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 import unified_planning.test
@@ -19,7 +20,7 @@ OURS = [*sorted(ROOT.glob("domains/**/*domain*.pddl")), *sorted(ROOT.glob("examp
 THEIRS = sorted(Path(unified_planning.test.__path__[0]).glob("pddl/*/domain.pddl"))
 
 
-def content(domain: PlanningDomain) -> tuple:
+def content(domain: PlanningDomain) -> tuple[Any, ...]:
     schema = domain.schema
     return (
         domain.name, schema.types, schema.constants, schema.predicates, schema.functions, domain.actions, domain.axioms

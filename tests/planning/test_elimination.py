@@ -63,6 +63,7 @@ def test_a_planner_gives_no_needless_steps_and_the_cost_of_what_is_left():
         return found
 
     found = asyncio.run(run())
+    assert WORK.step is not None
     assert (found.plan, found.cost) == (Plan((WORK.step,)), 1)
 
 
@@ -79,7 +80,8 @@ def test_what_is_left_is_a_plan_of_which_nothing_can_be_spared(actions, init, tr
         GroundAction(PlanStep(f"a{i}"), needs, adds, tuple(one for one in gone if one not in adds))
         for i, (needs, adds, gone) in enumerate(actions)
     ]
-    chosen, state = [], frozenset(init)
+    chosen: list[int] = []
+    state = frozenset(init)
     for index in tried:
         if index < len(made) and made[index].applicable(state):
             chosen, state = [*chosen, index], made[index].apply(state)

@@ -180,7 +180,7 @@ def test_how_a_domain_is_cut_and_in_which_order_it_comes_does_not_matter(owners,
 
 def merged_sections(parts):
     """A file has each section of declarations once."""
-    sections = {}
+    sections: dict[str, list[str]] = {}
     for part in parts:
         keyword, rest = part[1:-1].split(" ", 1)
         once = keyword in (":types", ":predicates")

@@ -97,7 +97,7 @@ def _applicable(domain, world):
     found = []
     for action in domain.actions.values():
         for bindings in grounder.choices(action.parameters, {}):
-            step = PlanStep(action.name, tuple(bindings[p.name] for p in action.parameters))
+            step = PlanStep(action.name, tuple(str(bindings[p.name]) for p in action.parameters))
             if domain.applicable(step, world):
                 found.append(step)
     return found

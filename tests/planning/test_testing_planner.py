@@ -8,6 +8,7 @@ import pytest
 from test_testing_with_plans import DOMAIN, LIGHT_UP, PLOTS, Lamps, OnePlan
 
 from dsc.testing import Answer, Fault, Faults, ScriptedSkills, world
+from dsc.trace import Record
 from planning import Executive
 from planning.execution.planner_call import PATIENCE
 from planning.testing import FaultyPlanner
@@ -16,7 +17,8 @@ PLANNER = [Fault.PLANNER_FAILS, Fault.PLANNER_HANGS, Fault.PLANNER_DIES, Fault.P
 
 
 def run(faults, *reached):
-    knowledge, records = world(DOMAIN.schema, "a b - lamp"), []
+    knowledge = world(DOMAIN.schema, "a b - lamp")
+    records: list[Record] = []
     skills = ScriptedSkills(knowledge, {"lamps.light": Answer("lit", observed="(on ?lamp)")}, like=[Lamps()])
     robot = Executive(DOMAIN, PLOTS, skills.components, knowledge, FaultyPlanner(OnePlan(), faults, *reached))
     robot.listen(records.append)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from dsc import Component, Library, Outcome, SkillCall, parse_plot, primitive_plot, skill
@@ -54,7 +56,8 @@ def light_up(replies, plots=PLOTS):
     knowledge = world(DOMAIN.schema, "a b - lamp")
     skills = ScriptedSkills(knowledge, {"lamps.light": replies}, like=[Lamps()])
     robot = Executive(DOMAIN, plots, skills.components, knowledge, planner=OnePlan())
-    steps, coverage = [], Coverage(plots)
+    steps: list[Any] = []
+    coverage = Coverage(plots)
 
     def prepare(sequencer):
         sequencer.listen(steps.append)

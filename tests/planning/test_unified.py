@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 import unified_planning.shortcuts as up
 from unified_planning.io import PDDLWriter
@@ -27,7 +29,7 @@ def known(domain: PlanningDomain, start) -> KnowledgeBase:
     return kb
 
 
-def numbers(start) -> dict:
+def numbers(start) -> dict[Any, Any]:
     """What functions are worth; what is not said is 0, and they do not say it."""
     return {fluent: number for fluent, number in start.values.items() if number}
 

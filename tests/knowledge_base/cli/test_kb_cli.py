@@ -97,9 +97,9 @@ def test_public_names_are_there_when_asked_for() -> None:
     import knowledge_base
 
     assert "KnowledgeBase" in dir(knowledge_base)
-    assert {getattr(knowledge_base, name) is not None for name in knowledge_base.__all__} == {True}
+    assert {getattr(knowledge_base, name) is not None for name in knowledge_base.__all__} == {True}  # type: ignore[attr-defined]
     with pytest.raises(AttributeError, match="no attribute 'Knowledge'"):
-        _ = knowledge_base.Knowledge
+        _ = knowledge_base.Knowledge  # type: ignore[attr-defined]
 
 
 ENDLESS = "(and (cup ?a) (cup ?b) (cup ?c) (cup ?d) (cup ?e) (cup ?f) (cup ?g) (cup ?h) (cup ?i) (cup ?j) (cup ?k))"

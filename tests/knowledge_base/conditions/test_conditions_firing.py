@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from typing import Any
 
 import pytest
 from kb_strategies import SCHEMA, THINGS
 
-from knowledge_base import ConditionCancelledError, Delta, KnowledgeBase, fact
+from knowledge_base import ConditionCancelledError, Delta, Firing, KnowledgeBase, fact
 from knowledge_base.errors import InputError, UnknownNameError
 
 
@@ -67,7 +68,7 @@ def weigh(kb, thing, number) -> None:
     kb.apply(Delta(values={fact("weight", thing): number}), author="test")
 
 
-def heard(condition, *, falls=False) -> list:
+def heard(condition, *, falls=False) -> list[Any]:
     """What a listener is told from now on: whether it is true, and the witness."""
     told = []
     condition.subscribe(lambda f: told.append((f.truth, f.witness)), falls=falls)
@@ -149,7 +150,8 @@ def test_what_another_listener_cancels_is_not_told(kb) -> None:
 
 
 def test_an_unsubscribed_listener_is_not_told(kb) -> None:
-    told, condition = [], kb.install("(quiet)")
+    told: list[Firing] = []
+    condition = kb.install("(quiet)")
     condition.subscribe(told.append)()
     tell(kb, ("quiet",))
     assert told == []
@@ -335,8 +337,8 @@ def test_threads_that_install_cancel_and_commit_at_once_lose_nothing(kb) -> None
     rounds, threads = 30, 4
     kb.apply(Delta(nodes={f"c{n}": "cup" for n in range(threads)}), author="test")
     barrier = threading.Barrier(threads)
-    told: list[list] = [[] for _ in range(threads)]
-    everyone = []
+    told: list[list[Any]] = [[] for _ in range(threads)]
+    everyone: list[Firing] = []
     kb.install("(on ?x shelf)", fire="each").subscribe(everyone.append)
     errors = []
 

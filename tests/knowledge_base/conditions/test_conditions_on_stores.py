@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from threading import RLock
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -12,7 +13,7 @@ from kb_random_schemas import brute_witnesses, changes, conditions, languages, p
 from kb_strategies import SCHEMA, THINGS
 from kb_worlds import PROPERTY, Ticks
 
-from knowledge_base import Delta, InputError, KnowledgeBase, Schema, StoreError, fact
+from knowledge_base import Change, Delta, InputError, KnowledgeBase, Schema, StoreError, fact
 from knowledge_base.conditions.notification import Notifier
 from knowledge_base.journal.history import MemoryHistory, Version
 
@@ -39,7 +40,7 @@ def opened(path, **how) -> KnowledgeBase:
     return KnowledgeBase.open(SCHEMA, path, clock=Ticks(), **how)
 
 
-def heard(condition) -> list:
+def heard(condition) -> list[Any]:
     """What a listener is told from now on, falls too: the version, and whether it is true."""
     told = []
     condition.subscribe(lambda firing: told.append((firing.version, firing.truth)), falls=True)
@@ -103,7 +104,8 @@ def test_a_world_that_was_read_from_json_goes_on_at_its_version(path):
 def test_a_write_that_fails_flips_nothing_and_is_told_to_nobody(path, delta):
     with opened(path) as kb:
         condition = kb.install("(and (on ?x shelf) (> (weight ?x) 1))")
-        told, seen = heard(condition), []
+        told = heard(condition)
+        seen: list[Change] = []
         kb.subscribe(seen.append)
         with pytest.raises(FullDiskError):
             kb.apply(delta, author="test", along=fail)
@@ -180,7 +182,8 @@ def commit(kb, delta) -> None:
 
 
 def test_nobody_is_called_while_a_transaction_is_open():
-    lock, heard = RLock(), []
+    lock: Any = RLock()
+    heard = []
     announcer = Notifier(lock)
     with lock:
         announcer.queue(lambda: heard.append("of another commit"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from typing import Literal
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -57,7 +58,9 @@ def test_truth_and_firings_are_those_of_evaluating_anew_in_order(data) -> None:
         e = data.draw(conditions(language))
         params = data.draw(parameters(e, language.schema))
         # What an outermost `exists` chooses is part of the witness, so the set of witnesses is another one.
-        fire = "edge" if isinstance(e, ex.Exists) else data.draw(st.sampled_from(["edge", "each"]))
+        fire: Literal["edge", "each"] = (
+            "edge" if isinstance(e, ex.Exists) else data.draw(st.sampled_from(["edge", "each"]))
+        )
         try:
             condition = kb.install(e, params, fire=fire)
         except InputError:  # about a thing that was removed

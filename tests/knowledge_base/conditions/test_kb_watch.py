@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from typing import Any
 
 import pytest
 from kb_strategies import SCHEMA, THINGS
@@ -19,20 +20,20 @@ def kb() -> KnowledgeBase:
     return kb
 
 
-def tell(kb, *facts) -> Change:
+def tell(kb: KnowledgeBase, *facts) -> Change:
     return kb.apply(Delta(added=tuple(fact(*f) for f in facts)), author="test")
 
 
-def read(watch) -> list:
+def read(watch) -> list[Any]:
     """All that waits to be read, to the end of the watch."""
 
-    async def run() -> list:
+    async def run() -> list[Any]:
         return [item async for item in watch]
 
     return asyncio.run(run())
 
 
-async def _taken(watch, count) -> list:
+async def _taken(watch, count) -> list[Any]:
     return [await asyncio.wait_for(anext(watch), 5) for _ in range(count)]
 
 
@@ -66,7 +67,7 @@ def test_a_watch_tells_the_changes_that_touch_its_pattern(kb, pattern, params, e
     watch = kb.watch(pattern, params)
     versions = {kb.apply(delta, author="test").version: name for name, delta in CHANGES.items()}
 
-    async def run() -> list:
+    async def run() -> list[Any]:
         found = await _taken(watch, len(expected))
         with pytest.raises(asyncio.TimeoutError):
             await asyncio.wait_for(anext(watch), 0)
@@ -104,7 +105,7 @@ def test_a_closed_watch_ends(kb) -> None:
 def test_closing_ends_whoever_waits(kb) -> None:
     watch = kb.watch()
 
-    async def run() -> list:
+    async def run() -> list[Any]:
         waiting = asyncio.create_task(_all(watch))
         await asyncio.sleep(0)
         threading.Thread(target=watch.close).start()
@@ -113,7 +114,7 @@ def test_closing_ends_whoever_waits(kb) -> None:
     assert asyncio.run(run()) == []
 
 
-async def _all(watch) -> list:
+async def _all(watch) -> list[Any]:
     return [item async for item in watch]
 
 
@@ -129,7 +130,7 @@ def test_changes_of_several_threads_come_in_order_and_none_is_lost(kb) -> None:
             with kb.transaction(author="test") as tx:
                 tx.set("time", kb.value("time", ()) + 1)
 
-    async def run() -> list:
+    async def run() -> list[Any]:
         workers = [threading.Thread(target=work) for _ in range(threads)]
         for worker in workers:
             worker.start()

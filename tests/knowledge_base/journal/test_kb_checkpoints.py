@@ -46,7 +46,12 @@ def test_files_are_tidied_up_while_their_writers_go_on(path, monkeypatch):
     monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 20)
     by = set()
     tidy_up = write_transaction._tidy_up
-    monkeypatch.setattr(write_transaction, "_tidy_up", lambda path: by.add(threading.current_thread()) or tidy_up(path))
+
+    def tidied_up(path):
+        by.add(threading.current_thread())
+        return tidy_up(path)
+
+    monkeypatch.setattr(write_transaction, "_tidy_up", tidied_up)
     with opened(path) as one, opened(path.with_name("other.kb")) as other:
         for _ in range(3):
             commit(one, 10)
@@ -99,7 +104,12 @@ def test_a_log_that_grows_faster_than_it_is_tidied_up_is_kept_short_by_its_write
 def test_what_has_left_nothing_in_the_log_asks_for_nothing(path, monkeypatch):
     monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 1)
     asked = []
-    monkeypatch.setattr(write_transaction, "_tidy_up", lambda path: asked.append(path) or 0)
+
+    def asking(path):
+        asked.append(path)
+        return 0
+
+    monkeypatch.setattr(write_transaction, "_tidy_up", asking)
     with opened(path) as kb:
         CHECKPOINTS.settle()
         before = len(asked)
@@ -157,7 +167,7 @@ def test_a_change_is_not_called_failed_because_its_writer_cannot_tidy_up(path, m
         connection.set_authorizer(no_checkpoints)
         return connection
 
-    really_writing = journal.writing
+    really_writing = write_transaction.writing
     monkeypatch.setattr(journal, "writing", writing)
     monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 2)
     monkeypatch.setattr(CHECKPOINTS, "is_behind", lambda _: True)

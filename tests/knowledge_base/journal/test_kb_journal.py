@@ -6,6 +6,7 @@ import contextlib
 import shutil
 import sqlite3
 from random import Random
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -14,6 +15,7 @@ from kb_strategies import SCHEMA, THINGS, deltas, removals
 from kb_worlds import PROPERTY, Ticks, everything, graph_content, unordered
 
 from knowledge_base import (
+    Change,
     ConflictError,
     Delta,
     Fact,
@@ -67,7 +69,8 @@ def test_index_graph_and_journal_agree_at_every_version_and_reopening_is_equal(t
     path = tmp_path_factory.mktemp("kb") / "world.kb"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(journal, "SNAPSHOT_AFTER", size)  # snapshots at any distance
-        seen, past = [], {}
+        seen: list[Change] = []
+        past: dict[int, Any] = {}
         with opened(path) as kb:
             kb.subscribe(seen.append)
             past[0] = everything(kb)
@@ -309,7 +312,8 @@ def test_a_key_outlives_a_restart_and_compaction(path, compact):
 def test_when_the_disk_is_full_nothing_is_changed_and_it_is_said(path):
     with opened(path) as kb:
         kb.apply(Delta(nodes=THINGS), author="a")
-        before, heard = everything(kb), []
+        before = everything(kb)
+        heard: list[Change] = []
         kb.subscribe(heard.append)
         kb.apply(Delta(), author="a", along=lambda c: c.execute("PRAGMA max_page_count = 1"))
         large = Delta(nodes={f"cup-{n}": "cup" for n in range(5000)})
@@ -372,7 +376,8 @@ def test_closing_inside_a_transaction_drops_it(kb):
 
 def test_what_cannot_be_written_as_text_is_refused(path):
     with opened(path) as kb:
-        for how in ({"author": "\ud800"}, {"author": "a", "key": "\ud800"}):
+        wrong: list[dict[str, Any]] = [{"author": "\ud800"}, {"author": "a", "key": "\ud800"}]
+        for how in wrong:
             with pytest.raises(InputError, match="not a text that can be written"):
                 kb.apply(QUIET, **how)
         assert kb.version == 0

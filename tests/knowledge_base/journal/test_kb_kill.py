@@ -9,6 +9,7 @@ import multiprocessing
 import os
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import kb_writer
 import pytest
@@ -36,7 +37,7 @@ def killed_after(processes, path: Path, durability: str, versions: int) -> int:
     process = processes.Process(target=kb_writer.write, args=(str(path), durability, say))
     process.start()
     say.close()
-    last = [hear.recv() for _ in range(versions)][-1]
+    last: int = [hear.recv() for _ in range(versions)][-1]
     process.kill()
     try:
         while True:  # what it acknowledged before it died
@@ -54,7 +55,7 @@ class Expected:
     def __init__(self) -> None:
         self.kb = KnowledgeBase(kb_writer.SCHEMA)
 
-    def at(self, version: int) -> tuple:
+    def at(self, version: int) -> tuple[Any, ...]:
         while self.kb.version < version:
             self.kb.apply(kb_writer.change(self.kb.version + 1), author="writer")
         assert self.kb.version == version

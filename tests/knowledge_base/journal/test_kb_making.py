@@ -73,7 +73,7 @@ def test_what_cannot_be_made_leaves_nothing(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device")
         link(source, target, **how)
 
-    monkeypatch.setattr(sidecar_files.os, "link", full)
+    monkeypatch.setattr(os, "link", full)
     with pytest.raises(StoreError, match=r"cannot make the store '.*s.kb': No space left on device"):
         KnowledgeBase.open(SCHEMA, tmp_path / "s.kb")
     assert list(tmp_path.iterdir()) == []

@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from dsc.runs.archive import has_run
 from dsc.runs.archive import records_of as run_records
 from knowledge_base import Delta, InputError, KnowledgeBase, Schema, StoreError, fact
 from knowledge_base.cli.changes import new
+from knowledge_base.journal.journal import Journal
 from knowledge_base.journal.sidecar_files import ENDINGS, WriterLock, is_database, store_owning
 
 SCHEMA = Schema.parse("(define (domain d) (:types cup) (:predicates (clean ?c - cup)) (:constants c1 - cup))")
@@ -24,7 +26,7 @@ OTHER = "import sqlite3, sys; c = sqlite3.connect(sys.argv[1]); c.execute('SELEC
 
 
 @pytest.fixture
-def store(tmp_path) -> Path:
+def store(tmp_path: Path) -> Path:
     with KnowledgeBase.open(SCHEMA, tmp_path / "s.kb") as kb:
         kb.apply(CLEAN, "me")
     return tmp_path / "s.kb"
@@ -93,7 +95,7 @@ def refused(folder: Path, action, *, name: str) -> StoreError:
     return caught.value
 
 
-OPENINGS = {
+OPENINGS: dict[str, Callable[[Path], object]] = {
     "write": lambda path: KnowledgeBase.open(SCHEMA, path),
     "lasting": lambda path: KnowledgeBase.open(SCHEMA, path, durability="power"),
     "new": lambda path: KnowledgeBase.open(SCHEMA, path, new=True),
@@ -324,6 +326,7 @@ def test_a_store_into_which_the_log_was_being_put_has_all_of_it(tmp_path, read_o
     with KnowledgeBase.open(SCHEMA, path) as kb:
         for number in range(200):
             kb.apply(Delta(nodes={f"c{number}x": "cup"}), "me" * 200)
+        assert isinstance(kb._history, Journal)
         kb._history._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         died = tmp_path / "died"
         died.mkdir()

@@ -23,6 +23,7 @@ from dsc.viewer.record_sources import records_of
 from knowledge_base import Delta, KnowledgeBase, Schema, StoreError, fact
 from knowledge_base.cli import app as kb
 from knowledge_base.journal import file as store_file
+from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.file import connect
 
 SCHEMA = Schema.parse("(define (domain d) (:types cup) (:predicates (clean ?c - cup)) (:constants c1 - cup))")
@@ -215,6 +216,7 @@ def test_a_store_that_is_written_while_it_is_read_without_locks_is_not_believed(
     shutil.copy(kept[False], tmp_path)
     monkeypatch.setattr("knowledge_base.journal.file.is_still", lambda path: True)
     with KnowledgeBase.open(None, tmp_path / "s.kb", read_only=True) as world:
+        assert isinstance(world._history, Archive)
         newest = world._history._last
 
         def late(connection):
@@ -235,7 +237,12 @@ def test_a_copy_is_made_once_and_again_when_the_store_was_written(kept, tmp_path
     monkeypatch.setattr("knowledge_base.journal.file.is_still", lambda path: True)
     copied = []
     copyfile = shutil.copyfile
-    monkeypatch.setattr(store_file.shutil, "copyfile", lambda *which: (copied.append(which), copyfile(*which)))
+
+    def copying(*which):
+        copied.append(which)
+        return copyfile(*which)
+
+    monkeypatch.setattr(shutil, "copyfile", copying)
     with KnowledgeBase.open(None, tmp_path / "s.kb", read_only=True) as world:
         assert (world.version, world.oldest, len(copied)) == (2, 0, 2)
         with connect(tmp_path / "s.kb", "rw") as other:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
+from typing import Any
 
 import kb_writer
 import pytest
@@ -13,6 +14,7 @@ from kb_strategies import SCHEMA, THINGS, deltas, removals
 from kb_worlds import PROPERTY, everything, graph_content
 
 from knowledge_base import (
+    Change,
     ConditionCancelledError,
     ConflictError,
     Delta,
@@ -46,14 +48,14 @@ def replica(writer, path):
         yield kb
 
 
-def heard(condition) -> list:
+def heard(condition) -> list[Any]:
     told = []
     condition.subscribe(lambda firing: told.append((firing.version, firing.truth)), falls=True)
     return told
 
 
 def test_a_replica_takes_in_what_was_committed_in_order(writer, replica):
-    told = []
+    told: list[Change] = []
     replica.subscribe(told.append)
     fired = heard(replica.install("(on ?x shelf)"))
     made = [writer.apply(delta, author=f"author {i}") for i, delta in enumerate((ON_SHELF, OFF_SHELF, ON_SHELF))]
@@ -176,7 +178,7 @@ class Clock:
     """Remembers which timers still run."""
 
     def __init__(self) -> None:
-        self.running = set()
+        self.running: set[Any] = set()
 
     def now(self) -> float:
         return 0.0

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from typing import Any
 
 import pytest
 from kb_interrupts import interrupted as interrupted_at
@@ -165,7 +167,8 @@ def test_an_interrupt_at_any_moment_at_which_a_block_is_left_loses_nothing_in_si
     """What is told afterwards is in the file, or refused; and nobody waits for ever."""
     was_interrupted, moment = True, 0
     while was_interrupted:
-        path, told = tmp_path / f"world{moment}.kb", []
+        path = tmp_path / f"world{moment}.kb"
+        told: list[str] = []
 
         def tell_more(kb, told):
             with suppress(StoreError):
@@ -176,8 +179,9 @@ def test_an_interrupt_at_any_moment_at_which_a_block_is_left_loses_nothing_in_si
             block = kb.together()
             block.__enter__()
             tell(kb, "p")
-            was_interrupted = interrupted_at(moment, partial(block.__exit__, None, None, None))
-            del block
+            leave: Callable[[], Any] = partial(block.__exit__, None, None, None)
+            was_interrupted = interrupted_at(moment, leave)
+            del block, leave
             other = threading.Thread(target=tell_more, args=(kb, told), daemon=True)
             other.start()
             other.join(5)

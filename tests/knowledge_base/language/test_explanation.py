@@ -212,6 +212,7 @@ def test_what_cannot_be_computed_does_no_harm_where_another_part_decides(weights
         assert str(why.deciding) == leaf
         failed = next(node for node in nodes(why) if node.text.startswith("(>"))
         assert not failed.truth
+        assert failed.detail is not None
         assert "cannot be computed: <text>:1:" in failed.detail
         assert "division by zero" in failed.detail
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+from typing import Any
 
 import pytest
 from kb_strategies import SCHEMA, THINGS
@@ -67,7 +68,7 @@ def test_what_can_be_read_can_be_used_in_every_way(kb, form: str, leaf: str) -> 
     flips = text.count("(not") + text.count("(imply") * (form == "premise")
 
     def use() -> bool:
-        truth = kb.ask(text)
+        truth: bool = kb.ask(text)
         assert bool(kb.query(text)) == truth
         why = kb.explain(text)
         assert why.truth == truth
@@ -123,9 +124,12 @@ def test_deeper_text_is_refused_where_it_is_too_deep(kb) -> None:
 
 # --- values that were built in Python
 
-DEEP = functools.reduce(lambda e, _: ex.Not(e), range(100_000), ex.Atom("quiet"))
-DEEP_TERM = functools.reduce(lambda t, _: ex.Arithmetic("-", (t,)), range(100_000), ex.Call("time"))
-DEEP_EFFECT = functools.reduce(lambda e, _: eff.AllOf((e,)), range(100_000), eff.Add(ex.Atom("quiet")))
+QUIET: Any = ex.Atom("quiet")
+TIME: Any = ex.Call("time")
+BECOMES_QUIET: Any = eff.Add(QUIET)
+DEEP = functools.reduce(lambda e, _: ex.Not(e), range(100_000), QUIET)
+DEEP_TERM = functools.reduce(lambda t, _: ex.Arithmetic("-", (t,)), range(100_000), TIME)
+DEEP_EFFECT = functools.reduce(lambda e, _: eff.AllOf((e,)), range(100_000), BECOMES_QUIET)
 TOO_DEEP = "this is nested more than 100 deep"
 
 
@@ -166,7 +170,7 @@ def test_walking_through_deep_values_is_an_error_and_no_crash(walk) -> None:
 
 
 def test_the_deepest_value_that_is_taken_is_as_deep_as_the_deepest_text(kb) -> None:
-    deepest = functools.reduce(lambda e, _: ex.Not(e), range(MAX_DEPTH - 1), ex.Atom("quiet"))
+    deepest = functools.reduce(lambda e, _: ex.Not(e), range(MAX_DEPTH - 1), QUIET)
     assert kb.ask(deepest) == kb.ask(to_text(deepest))
     with pytest.raises(InputError, match=TOO_DEEP):
         kb.ask(ex.Not(deepest))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import pytest
 from hypothesis import assume, given
@@ -125,7 +126,7 @@ class Asked:
 
     def __init__(self, world) -> None:
         self._world = world
-        self.matched = []
+        self.matched: list[Any] = []
 
     def __getattr__(self, name: str):
         return getattr(self._world, name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Literal
 
 import pytest
 from hypothesis import given
@@ -58,8 +59,11 @@ def test_odd_names_are_refused_or_read_back(name: str) -> None:
     agrees(name)
 
 
+SURROGATES: tuple[Literal["Cs"]] = ("Cs",)
+
+
 @given(
-    st.text(st.characters(exclude_categories=("Cs",)), min_size=1, max_size=8)
+    st.text(st.characters(exclude_categories=SURROGATES), min_size=1, max_size=8)
     | st.text('a\r\n\\"n', min_size=1, max_size=6)
 )
 def test_every_text_is_read_back(text: str) -> None:

@@ -138,7 +138,7 @@ REFUSED = [
     (fact("pose", "cup1", "map"), (10**400,), InputError, "at most 1e308"),
     (fact("pose", "cup1"), POSE, SchemaError, "takes 2 arguments"),
     (fact("pose", "cup1", "mop"), POSE, UnknownNameError, "did you mean 'map'"),
-    (fact("pose", "cup1", POSE), POSE, SchemaError, "is of type thing, not"),
+    (fact("pose", "cup1", POSE), POSE, SchemaError, "is of type thing, not"),  # type: ignore[arg-type]
     (fact("poise", "cup1", "map"), POSE, UnknownNameError, "did you mean 'pose'"),
 ]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -66,7 +68,7 @@ def test_a_replacement_by_what_is_true_alone_changes_nothing(kb):
 
 
 def test_conditions_see_one_step(kb):
-    told = []
+    told: list[Any] = []
     kb.install("(exists (?p - place) (at cup ?p))").subscribe(told.append, falls=True)
     moved = kb.install("(at cup yard)")
     moved.subscribe(lambda firing: told.append(firing.version))

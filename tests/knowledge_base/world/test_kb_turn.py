@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import partial
+from typing import Any
 
 import pytest
 from kb_interrupts import interrupted
@@ -244,8 +245,8 @@ def keeps(
     turn: ReadWriteLock, how: Callable[[ReadWriteLock], None], begun: threading.Event, over: threading.Event
 ) -> None:
     """Keep others waiting until one waits, or has given up."""
-    how_long = {changes: turn.changing, is_alone: turn.alone, asks: lambda: turn}[how]
-    with how_long():
+    ways: dict[object, Callable[[], Any]] = {changes: turn.changing, is_alone: turn.alone, asks: lambda: turn}
+    with ways[how]():
         begun.set()
         while not (over.is_set() or any(turn.waiting)):
             time.sleep(0)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
+from typing import Any
 
 from fake_engines import FIRST, GOAL, PROBLEM, SECOND, START
 
@@ -9,6 +10,8 @@ from planning.engines.race import CachingPlanner
 from planning.plan import Plan, PlanFound, ProvenUnsolvable, TimedOut
 from planning.strips import Problem
 
+assert FIRST.step is not None
+assert SECOND.step is not None
 FOUND = PlanFound(Plan((FIRST.step, SECOND.step)), "fake", 1.5, 0.2, cost=2)
 
 
@@ -32,7 +35,7 @@ def solve(planner, *problems):
 
 
 def test_the_same_problem_is_asked_once_and_the_answer_says_so():
-    counting = Counting(FOUND)
+    counting: Any = Counting(FOUND)
     first, second = solve(CachingPlanner(counting), PROBLEM, replace(PROBLEM, init=tuple(reversed(PROBLEM.init))))
     assert counting.asked == 1
     assert first == FOUND
@@ -42,7 +45,7 @@ def test_the_same_problem_is_asked_once_and_the_answer_says_so():
 
 
 def test_what_differs_in_anything_is_another_problem():
-    counting = Counting(FOUND)
+    counting: Any = Counting(FOUND)
     others = [
         replace(PROBLEM, init=(START, GOAL)),
         replace(PROBLEM, goal=(START,)),
@@ -55,13 +58,13 @@ def test_what_differs_in_anything_is_another_problem():
 
 def test_a_proof_is_remembered_and_running_out_of_time_is_not():
     for outcome, asked in [(ProvenUnsolvable("fake", "no"), 1), (TimedOut("fake", 5), 2)]:
-        counting = Counting(outcome)
+        counting: Any = Counting(outcome)
         solve(CachingPlanner(counting), PROBLEM, PROBLEM)
         assert counting.asked == asked
 
 
 def test_what_was_not_asked_for_longest_is_forgotten():
-    counting = Counting(FOUND)
+    counting: Any = Counting(FOUND)
     one, two, three = (replace(PROBLEM, domain=name) for name in "abc")
     solve(CachingPlanner(counting, largest=2), one, two, one, three, one)
     assert counting.asked == 3
@@ -71,7 +74,8 @@ def test_what_was_not_asked_for_longest_is_forgotten():
 
 def test_the_best_that_was_found_is_remembered():
     async def run():
-        caching = CachingPlanner(Counting(FOUND, replace(FOUND, cost=1)))
+        counting: Any = Counting(FOUND, replace(FOUND, cost=1))
+        caching = CachingPlanner(counting)
         costs = [found.cost async for found in caching.plans(PROBLEM, 5)]
         again = [found.cost async for found in caching.plans(PROBLEM, 5)]
         return costs, again

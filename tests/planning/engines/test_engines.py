@@ -11,6 +11,7 @@ import tempfile
 import threading
 from importlib.metadata import requires
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fake_engines import HANGING, PROBLEM, READY, answering, descendants, gone, lights_out
@@ -52,7 +53,7 @@ def scripted():
 
 def asked(process, problem, seconds=60.0):
     """The one answer."""
-    answers = []
+    answers: list[dict[str, Any]] = []
     process.ask(written(problem), Deadline(seconds), answers.append)
     (answer,) = answers
     answer.pop("translated", None)  # it differs from time to time
@@ -91,7 +92,7 @@ def test_a_fact_deleted_and_added_is_kept(engine):
 
 
 def test_rubbish_is_answered_and_survived(engine):
-    answers = []
+    answers: list[dict[str, Any]] = []
     engine.ask(b'{"no": "problem"}\n', Deadline(60), answers.append)
     assert "KeyError" in answers[0]["failed"]
     assert engine.alive
@@ -182,7 +183,7 @@ TEEMING = READY + (
 def test_after_a_kill_nothing_that_the_worker_started_lives(scripted):
     process = scripted(TEEMING)
     process.start(60)
-    family = set()
+    family: set[Any] = set()
 
     def heard(_answer):
         family.update(descendants(process._pid), [process._pid])
@@ -267,7 +268,7 @@ def test_what_an_engine_leaves_among_its_temporary_files_goes_with_its_process(s
 def test_what_is_said_before_the_end_is_heard_in_order(scripted):
     process = scripted(answering('{"actions": [1]}', '{"actions": [2]}'))
     process.start(60)
-    heard = []
+    heard: list[Any] = []
     process.ask(written(PROBLEM), Deadline(60), heard.append)
     assert heard == [{"actions": [1]}, {"actions": [2]}]
 

@@ -33,6 +33,8 @@ def outcome(script, problem=PROBLEM, seconds=20.0, **options):
 
 def test_a_plan_is_steps_and_durations():
     found = outcome(answering(SOLVED))
+    assert FIRST.step is not None
+    assert SECOND.step is not None
     assert isinstance(found, PlanFound)
     assert found.plan == Plan((FIRST.step, SECOND.step))
     assert found.seconds < 20

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import aclosing
+from typing import Any
 
 import pytest
 from fake_engines import (
@@ -177,11 +178,12 @@ def test_two_at_most_race_and_only_those_that_can():
 
 def test_a_large_problem_is_left_to_those_that_are_made_for_it():
     class Large:
-        features = frozenset()
+        features: frozenset[str] = frozenset()
         actions = range(5000)
 
-    assert [one.name for one in chosen(Large, usable=lambda _: True)] == ["fast-downward"]
-    assert chosen(Large, usable=lambda one: one.name == "pyperplan") == [engine("pyperplan")]
+    large: Any = Large
+    assert [one.name for one in chosen(large, usable=lambda _: True)] == ["fast-downward"]
+    assert chosen(large, usable=lambda one: one.name == "pyperplan") == [engine("pyperplan")]
 
 
 def test_features_are_needs_and_costs_a_wish():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from typing import Any
 
 import pytest
 from fake_engines import PROBLEM, descendants, gone, lights_out, session
@@ -51,7 +52,7 @@ def process_of():
 
 
 def answers(process, problem, seconds=60.0):
-    heard = []
+    heard: list[dict[str, Any]] = []
     try:
         process.ask(written(problem), Deadline(seconds), heard.append)
     except OutOfTimeError:  # an engine that goes on to look for better plans

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from typing import Any
 
 import pytest
 from errands import DOMAIN, HOLDER, ROOMS, ROUND, when_asked
@@ -137,6 +138,9 @@ def test_a_program_that_is_interrupted_ends_when_planners_have_stopped(monkeypat
     monkeypatch.setattr("planning.execution.planner_call.STOPPING", 5)
     planner = Tidy()
 
+    main: asyncio.Task[Any] | None = None
+    going_on: list[asyncio.Task[None]] = []
+
     async def interrupted(sequencer):
         await planner.begun.wait()
         await asyncio.sleep(0)
@@ -147,7 +151,6 @@ def test_a_program_that_is_interrupted_ends_when_planners_have_stopped(monkeypat
         main = asyncio.current_task()
         going_on.append(asyncio.get_running_loop().create_task(interrupted(sequencer)))
 
-    main, going_on = None, []
     with caplog.at_level(logging.ERROR, "asyncio"), pytest.raises(asyncio.CancelledError):
         run(planner, prepare=prepare)
     assert planner.tidied_up

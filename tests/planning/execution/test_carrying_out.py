@@ -11,6 +11,7 @@ from errands import DOMAIN, HOLDER, ROOMS, ROUND, when_asked
 from obedient_robot import FAILED, ObedientRobot, plots
 
 from dsc import Event, parse_plot
+from dsc.trace import Record
 from knowledge_base import Delta, fact
 from planning import Executive, Plan, PlannerProcess, PlanStep
 from planning.execution.plan_records import why_broken
@@ -35,7 +36,7 @@ class Run:
         told = [fact("at", "a"), *(fact("in", t, "a") for t in things), *(fact("way", *one.split()) for one in links)]
         nodes = {**dict.fromkeys(ROOMS, "room"), **dict.fromkeys(things, "thing")}
         self.knowledge.apply(Delta(nodes=nodes, added=(*told, *known)), "test")
-        self.records = []
+        self.records: list[Record] = []
         program.listen(self.records.append)
 
         def ready(sequencer):
@@ -184,7 +185,11 @@ class Improves(BreadthFirst):
             self.closed = True
 
     def prepare(self, sequencer):
-        sequencer.trace.listen(lambda record: record.data.get("skill") == "robot.act" and self.begun.set())
+        def look(record):
+            if record.data.get("skill") == "robot.act":
+                self.begun.set()
+
+        sequencer.trace.listen(look)
 
 
 def found(*steps):
@@ -274,6 +279,7 @@ def test_a_planner_that_misbehaves_ends_in_no_plan_and_is_named(how, said, monke
     run = Run("(at c)", planner=planner)
     assert run.end.finished
     assert run.done == []
+    assert run.how is not None
     assert said in run.how
     assert said in run.said("none")[0]["reason"]
     assert planner.cancelled == (how == "hangs")

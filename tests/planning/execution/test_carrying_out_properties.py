@@ -7,6 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from obedient_robot import ObedientRobot, plots
 
+from dsc.trace import Record
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
@@ -113,7 +114,7 @@ def carry_out(domain, goal, facts, changes, failures):
         for seconds, delta in changes:
             sequencer.change(delta, "somebody", after=seconds)
 
-    records = []
+    records: list[Record] = []
     program.listen(records.append)
     arguments = {"goal": goal, "holder": "", "replans": 20, "seconds": 5}
     return program.run("achieve", arguments, prepare=prepare), robot, records

@@ -42,7 +42,7 @@ class Run:
         self.knowledge.apply(
             Delta(nodes=nodes, added=(*doors, fact("at", "a"), fact("lies", "cup", lies), *known)), "t"
         )
-        self.types = []
+        self.types: list[str] = []
         program.listen(lambda record: self.types.append(record.type))
 
         def prepare(sequencer):

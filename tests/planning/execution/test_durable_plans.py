@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from dsc.errors import ChangedError
 from dsc.runs.archive import archive
 from dsc.sequencer.clock import run_real, run_simulated
 from dsc.sequencer.replay import replay
+from dsc.trace import Record
 from knowledge_base import Delta, InputError, KnowledgeBase, fact
 from knowledge_base.errors import StoreError
 from planning import Executive, PlannerProcess, PlanningDomain
@@ -78,7 +80,8 @@ def planner():
 @pytest.fixture
 def whole(planner, tmp_path):
     """A run in which somebody breaks a lamp, so that it plans twice; its records, and copies from each boundary."""
-    copies, records = [], []
+    copies: list[Path] = []
+    records: list[Record] = []
     (alive := tmp_path / "alive").mkdir()
 
     def prepare(sequencer):
@@ -102,7 +105,7 @@ def test_wherever_it_is_broken_off_it_goes_on_with_the_same_plan(whole, planner)
     assert kinds.count("plan.found") == 2
     assert kinds.count("plan.broken") == 1
     for copy in copies[1:]:
-        heard = []
+        heard: list[Record] = []
         with executive(planner, copy) as robot:
             robot.listen(heard.append)
             assert robot.resume().finished
@@ -163,7 +166,7 @@ def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, plan
 
     async def begun(robot, copy):
         robot.knowledge.apply(Delta(nodes={"a": "lamp"}, added=(fact("works", "a"),)), "me")
-        seen = []
+        seen: list[Path] = []
 
         def prepare(sequencer):
             sequencer.listen(lambda _: seen.append(copied(copy.parent, tmp_path / f"inside{len(seen)}")))
@@ -196,7 +199,7 @@ def test_what_is_known_and_what_was_run_lasts_from_one_program_to_the_next(plann
         assert robot.knowledge.ask("(on a)")
         assert robot.achieve("(on a)").finished
     with archive(tmp_path / "run.kb") as runs:
-        assert [run.ended["finished"] for run in runs.runs()] == [True, True]
+        assert [run.ended and run.ended["finished"] for run in runs.runs()] == [True, True]
 
 
 def test_plans_that_are_over_are_not_remembered(whole):

@@ -4,6 +4,8 @@ import asyncio
 import copy
 import shutil
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 from breadth_first import BreadthFirst
@@ -12,6 +14,7 @@ from obedient_robot import FAILED, plots
 
 from dsc import Component, Outcome, SkillCall, parse_plot, skill
 from dsc.runs.archive import archive
+from dsc.trace import Record
 from knowledge_base import Delta, fact
 from planning import Executive, PlanStep
 from planning.validation import Validation
@@ -26,14 +29,15 @@ class LastingRobot(Component):
         super().__init__()
         self.concurrent = concurrent
         self.script = {step: list(answers) for step, answers in (script or {}).items()}
-        self.done, self.ended = [], {}
+        self.done: list[str] = []
+        self.ended: dict[str, Outcome] = {}
         self.crash = crash
-        self.knowledge = None
+        self.knowledge: Any = None
 
     def again(self):
         """The same robot, as the next program finds it."""
         other = LastingRobot(concurrent=self.concurrent)
-        other.script, other.done, other.ended = map(copy.deepcopy, (self.script, self.done, self.ended))
+        other.script, other.done, other.ended = copy.deepcopy((self.script, self.done, self.ended))
         return other
 
     @skill(outcomes={"did": {}, "failed": {}}, after_crash="same_id")
@@ -122,7 +126,8 @@ class Kept:
 
     def __init__(self, tmp_path, goal, how, also=lambda sequencer: None):
         self.goal, self.more = goal, {name: how[name] for name in ("ways", "foresight") if name in how}
-        self.copies, self.records = [], []
+        self.copies: list[tuple[Path, Any]] = []
+        self.records: list[Record] = []
         self.robot = LastingRobot(how.get("script"), how.get("concurrent", False))
         (alive := tmp_path / "alive").mkdir()
         self.path = alive / "run.kb"

@@ -1,7 +1,8 @@
 """The executive with planners that misbehave: nothing is executed that is no plan, and nothing ever waits for ever."""
 
 import asyncio
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import pytest
 
@@ -9,6 +10,7 @@ from dsc import Component, Event, Library, Outcome, SkillCall, Stream, parse_plo
 from dsc.components.parameters import Parameter
 from dsc.errors import PlotError
 from dsc.reflection import MODELS, design_facts
+from dsc.trace import Record
 from knowledge_base import Delta, InputError, KnowledgeBase, fact
 from planning import Executive, Plan, PlanningDomain, PlanStep
 from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
@@ -50,7 +52,7 @@ class Lamps(Component):
     def __init__(self):
         super().__init__()
         self.switched = []
-        self.answer = None
+        self.answer: Callable[[str], Outcome] | None = None
 
     @skill(outcomes={"lit": {}, "bulb_blown": {"lamp": "lamp"}, "nothing": {}}, types={"lamp": "lamp"})
     async def light(self, call: SkillCall, lamp: str) -> Outcome:
@@ -117,7 +119,7 @@ def test_a_goal_that_holds_already_asks_nobody():
 )
 def test_the_ways_not_to_find_a_plan_are_told_apart(answer, said):
     robot, lamps = executive(Answers(answer))
-    records = []
+    records: list[Record] = []
     robot.listen(records.append)
     end = robot.run("light_up")
     assert lamps.switched == []
@@ -149,7 +151,12 @@ def test_replanning_is_bounded_by_the_budget():
 
     lamps.answer = blind
     reasons = []
-    robot.listen(lambda record: record.type == "plan.gave_up" and reasons.append(record.data["reason"]))
+
+    def listening(record):
+        if record.type == "plan.gave_up":
+            reasons.append(record.data["reason"])
+
+    robot.listen(listening)
     assert how(robot.run("light_up")) == "gave_up"
     assert planner.asked == 3  # the first plan and two replans
     assert reasons == ["the budget of 2 new plans is used up: nothing"]
@@ -160,7 +167,7 @@ class Hanging:
 
     def __init__(self):
         self.cancelled = False
-        self.asked = None
+        self.asked: Any = None
 
     async def solve(self, problem, seconds):
         self.asked()
@@ -205,7 +212,7 @@ def test_what_somebody_else_breaks_is_noticed_while_a_step_runs():
         told = Delta(nodes={"c": "lamp"}, added=(fact("works", "c"),))
         asyncio.get_running_loop().call_later(0.5, sequencer.change, told, "somebody")
 
-    records = []
+    records: list[Record] = []
     robot.listen(records.append)
     end = robot.run("light_up", prepare=prepare)
     assert how(end) == "reached"
@@ -253,7 +260,7 @@ def test_a_skill_that_works_for_another_state_is_somebody_else_to_the_monitor():
     robot.knowledge.apply(
         Delta(nodes={"a": "lamp", "b": "lamp"}, added=(fact("works", "a"), fact("works", "b"))), "test"
     )
-    records = []
+    records: list[Record] = []
     robot.listen(records.append)
     assert robot.run("watching").finished
     (broken,) = [record for record in records if record.type == "plan.broken"]
@@ -336,7 +343,7 @@ def test_a_plan_is_watched_also_after_one_of_its_steps_has_planned_for_itself():
     robot = Executive(NESTED, [LIGHT_ALL, GO_AND_LIGHT, walk], [Lamps(), legs], planner=planner)
     works = tuple(fact("works", lamp) for lamp in "ab")
     robot.knowledge.apply(Delta(nodes={"a": "lamp", "b": "lamp"}, added=works), "test")
-    records = []
+    records: list[Record] = []
     robot.listen(records.append)
 
     def prepare(sequencer):
@@ -508,7 +515,7 @@ def test_a_skill_that_misbehaves_is_a_failed_step(wrong, reason):
 @pytest.mark.parametrize(("wrong", "reason"), MISBEHAVIOUR)
 def test_a_skill_that_misbehaves_once_does_not_keep_the_goal_from_being_reached(wrong, reason):
     robot, _ = light(Once(wrong))
-    records = []
+    records: list[Record] = []
     robot.listen(records.append)
     with robot:
         assert robot.achieve("(on l1)").reached
@@ -554,7 +561,7 @@ def test_a_rule_answers_a_step_whose_skill_fails():
 
 def test_a_goal_is_given_bounds_and_may_be_prepared():
     robot, lamps = light(lambda _: Outcome("nothing"))
-    records = []
+    records: list[Record] = []
     robot.listen(records.append)
 
     def prepare(sequencer):

@@ -49,6 +49,7 @@ def test_the_nearest_end_is_kept_and_reached_in_the_fewest_steps():
     how = local_repair(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL)
     assert how.end == STEPS[1:]  # from d to b at once, not by way of a
     plan = how.repaired(solved(how), STEPS, DOMAIN, here, GOAL)
+    assert plan is not None
     assert plan.steps == (PlanStep("go", ("d", "b")), *STEPS[1:])
     assert validate(plan, DOMAIN, here, GOAL).valid
 

@@ -1,5 +1,7 @@
 """The monitor by itself: what breaks a plan, what shortens it, whose doing counts when, and what costs nothing."""
 
+from typing import Any
+
 import pytest
 
 from knowledge_base import Delta, KnowledgeBase, fact
@@ -49,7 +51,7 @@ class Watched:
         told = tuple(fact(*one.split()) for one in known.split(", "))
         self.kb.apply(Delta(nodes={**nodes, "bob": "robot", "eve": "robot"}, added=(*told, *facts)), "test")
         self.progress = PlanProgress(steps, DOMAIN, goal, before)
-        self.news = []
+        self.news: list[Any] = []
         self.monitor = Monitor(self.progress, DOMAIN, self.kb, lambda author: author == "bob", self.news.append)
         self.monitor.look("earlier")
 

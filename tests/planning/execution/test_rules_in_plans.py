@@ -6,6 +6,7 @@ import pytest
 
 from dsc import Component, Event, Outcome, SkillCall, parse_plot, skill
 from dsc.errors import PlotError
+from dsc.trace import Record
 from knowledge_base import Delta, fact
 from planning import Executive, PlanningDomain
 
@@ -81,7 +82,7 @@ class Studio(Component):
         self.done.append(("wipe", thing))
         return Outcome("wiped", observed=Delta(removed=(fact("dirty", thing),)))
 
-    async def _do(self, call, what, thing, ends, *seen):
+    async def _do(self, call, what, thing, ends, *seen) -> Outcome:
         await call.clock.sleep(self.seconds.get((what, thing), 1.0))
         self.done.append((what, thing))
         return Outcome(ends, observed=Delta(added=seen))
@@ -136,7 +137,7 @@ def started(records):
 def test_what_comes_after_a_step_that_is_left_out_begins_once(left_out, parallel):
     """The step that is left out counts as done, so that nobody thinks there are steps of no use."""
     rule = "rules: [{before: light, when: (dirty ?step.thing), do: {tell: (lit ?step.thing), then: continue}}]"
-    records = []
+    records: list[Record] = []
     end, studio, _ = away(rule, fact("dirty", left_out), records=records, parallel=parallel)
     assert (end.finished, end.emitted) == (True, ())
     assert len(studio.done) == 3
@@ -150,7 +151,8 @@ def test_the_step_at_work_is_not_interrupted_when_a_later_one_turns_out_to_be_of
     def guest(sequencer):
         sequencer.change(Delta(added=(fact("shown", "pot"),)), "guest", after=1.5)
 
-    studio, records = Studio(), []
+    studio = Studio()
+    records: list[Record] = []
     plots = [parse_plot(text) for text in (HOLDER, *PLOTS)]
     with Executive(DOMAIN, plots, [studio]) as robot:
         robot.listen(records.append)
@@ -238,7 +240,7 @@ def test_a_rule_that_leads_away_again_and_again_ends_with_giving_up():
     holder = HOLDER.replace(
         "goal: (forall (?t - thing) (shown ?t))", "goal: (forall (?t - thing) (shown ?t))\n    budget: {replans: 3}"
     )
-    records = []
+    records: list[Record] = []
     rule, beside = "rules: [{before: light, do: {then: aside}}]", "  aside: {on: {done: all}}\n"
     end, studio, _ = away(rule, holder=holder, beside=beside, records=records)
     assert end.finished
@@ -301,7 +303,8 @@ def test_leaving_a_plan_takes_what_runs_in_it_and_its_watching_along():
     slow = PLOTS[0].replace(
         "a: {entry: {trigger: studio.light", "a: {exit: {switch: studio, to: dark}, entry: {trigger: studio.light"
     )
-    studio, records = Studio(blurred=["cup"]), []
+    studio = Studio(blurred=["cup"])
+    records: list[Record] = []
     studio.concurrent = True
     studio.seconds = {("light", "pot"): 50.0}
     plots = [

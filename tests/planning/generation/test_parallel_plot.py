@@ -6,6 +6,7 @@ from dsc import ActionPlot, Component, Library, Outcome, parse_plot, skill, vali
 from dsc.drawing import draw
 from dsc.skills import signatures
 from dsc.text.plot_files import plot_to_yaml
+from dsc.trace import Record
 from knowledge_base import Delta, fact
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.text import parse_condition, to_text
@@ -157,7 +158,7 @@ states:
     for plot in (inner, outer):
         library.add(plot)
     found = usage([outer], library)
-    assert (found.components, found.seconds, found.anything) == ({"light", "drill", "door"}, 20.0, False)
+    assert (found.components, found.seconds, found.anything) == (frozenset({"light", "drill", "door"}), 20.0, False)
 
 
 def test_a_sketch_uses_plots_called_like_the_actions():
@@ -243,7 +244,7 @@ def executed(plan, goal, facts, *workers, change=None):
     robot.knowledge.apply(
         Delta(nodes=dict.fromkeys("ab", "lamp"), added=facts, values={fact("slowness", "a"): 1.0}), "me"
     )
-    records = []
+    records: list[Record] = []
     robot.listen(records.append)
     arguments = {"goal": goal, "holder": "", "replans": 0, "seconds": 5}
     prepare = None if change is None else lambda sequencer: sequencer.change(change, "somebody", after=2.0)

@@ -22,13 +22,13 @@ class Everybody(Component):
 
     def __init__(self, domain, world, seed):
         super().__init__()
-        self.domain, self.world, self.seed = domain, world, seed
+        self.planning_domain, self.world, self.seed = domain, world, seed
 
     @skill(outcomes={"acted": {}})
     async def act(self, call, action, x=""):
         await call.clock.sleep(10 * uniform(self.seed, call.action_id, "duration"))
         step = PlanStep(action, (x,) if x else ())
-        return Outcome("acted", observed=self.domain.effects(step, self.world))
+        return Outcome("acted", observed=self.planning_domain.effects(step, self.world))
 
 
 def plot_for(action):

@@ -1,5 +1,7 @@
 """From plan to plot: the generated plot is a plot like any other, and says what each step needs."""
 
+from typing import Any
+
 import pytest
 
 from dsc import ActionPlot, Library, parse_plot, validate_plot
@@ -71,7 +73,9 @@ def test_assumed_effects_are_told_whole_also_what_depends_on_the_world():
 """)
     empty = primitive("tip_over", "empty", {"box": "box"}, effects="assumed")
     plot = plot_from_plan(Plan((PlanStep("empty", ("b1",)),)), domain, Library([empty]))
-    assert to_text(plot.state("step_1").on["done"][0].tell) == (
+    tell = plot.state("step_1").on["done"][0].tell
+    assert tell is not None
+    assert to_text(tell) == (
         "(and (emptied b1) (assign (weight b1) 0)"
         " (forall (?t - thing) (when (in ?t b1) (and (gone ?t) (not (in ?t b1))))))"
     )
@@ -125,7 +129,8 @@ def test_it_inherits_what_is_inserted_before_its_steps_and_which_are_left_out():
     plot = made(INSERTING.rules, library)
     assert [rule.label for rule in plot.rules] == ["before take: clean", "before go: continue"]
     expanded = library.expanded(plot)
-    go, take = expanded.state("step_1_before_1"), expanded.state("step_2_before_0")
+    go: Any = expanded.state("step_1_before_1")
+    take: Any = expanded.state("step_2_before_0")
     assert [(to_text(way.guard), way.target) for way in go.choice[:-1]] == [("(robot-in store)", "step_1_skipped")]
     assert to_text(take.choice[0].guard) == "(in box store)"
     assert expanded.state(take.choice[0].target).arguments["parcel"].value == "box"

@@ -7,6 +7,7 @@ import pytest
 from trace_replay import Replay
 
 from dsc.chance import uniform
+from dsc.trace import Record
 from knowledge_base.world.overlay import Overlay
 from planning.engines.planner import PlannerProcess
 
@@ -16,6 +17,7 @@ EXAMPLE = Path(__file__).parents[3] / "examples" / "two_tables.py"
 @pytest.fixture(scope="module")
 def two_tables():
     spec = importlib.util.spec_from_file_location("two_tables", EXAMPLE)
+    assert spec is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -34,7 +36,7 @@ def is_robot_of(author, step):
 
 
 def run(two_tables, planner, items, seed, *, parallel=True):
-    records = []
+    records: list[Record] = []
     robots = two_tables.team(items, parallel=parallel, seed=seed, planner=planner)
     before = Overlay(robots.knowledge.snapshot())
     robots.listen(records.append)

@@ -48,7 +48,7 @@ def test_what_must_hold_all_the_time_is_provided_by_who_has_begun(cellar):
         "0 -(unused m)-> 1", "0 -(free)-> 2", "1 -(light m)-> 2", "1 -(light m)-> 3", "2 -(free)-> 3",
         "2 -(mended f)-> 4", "3 -(mended g)-> 4",
     ]  # fmt: skip
-    assert (order.before, order.begin_before) == ({(2, 3)}, {(1, 3)})
+    assert (order.before, order.begin_before) == (frozenset({(2, 3)}), frozenset({(1, 3)}))
 
 
 def test_a_later_step_may_provide_what_an_earlier_one_needs_at_its_end(cellar):

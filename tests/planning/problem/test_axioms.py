@@ -38,7 +38,7 @@ GRID = """(define (domain grid) (:types room)
 """
 
 
-def grid(*facts):
+def grid(*facts) -> tuple[PlanningDomain, KnowledgeBase]:
     domain = PlanningDomain.parse(GRID, "grid.pddl")
     world = KnowledgeBase(domain.schema)
     doors = tuple(fact("door", *pair) for pair in DOORS)

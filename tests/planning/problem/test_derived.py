@@ -35,7 +35,7 @@ ROOMS = """(define (domain rooms) (:types room robot thing)
 """
 
 
-def rooms(*facts, text=ROOMS):
+def rooms(*facts, text=ROOMS) -> tuple[PlanningDomain, KnowledgeBase]:
     domain = PlanningDomain.parse(text, "rooms.pddl")
     kb = KnowledgeBase(domain.schema)
     nodes = {**dict.fromkeys("abcd", "room"), "robby": "robot", "cup": "thing", "can": "thing"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
+from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,7 +14,7 @@ from searching import cheapest, solution
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
-from planning.plan import PlanStep
+from planning.plan import Plan, PlanStep
 from planning.problem.construction import ProblemBuilder, build_problem
 from planning.validation import validate
 
@@ -22,7 +23,7 @@ def least_cost(domain, start, limit, goal):
     """What the cheapest plan costs, None without a plan: searched in the domain's own terms, nothing posed."""
     steps = [PlanStep(name, (arg,)) for name, arg in itertools.product(domain.actions, THINGS)]
     counter, seen = itertools.count(), set()
-    agenda = [(0, next(counter), start)]
+    agenda: list[tuple[Any, int, Any]] = [(0, next(counter), start)]
     while agenda:
         cost, _, state = heapq.heappop(agenda)
         if state in seen:
@@ -54,6 +55,7 @@ def test_what_is_posed_has_a_plan_exactly_if_there_is_one_and_at_the_same_cost(a
     plan = solution(problem)
     assert (plan is None) == (least is None)
     for found in (plan, None if chosen is None else whole.plan(chosen)):
+        assert found is None or isinstance(found, Plan)
         assert found is None or validate(found, domain, world, goal).valid
 
 
