@@ -1,4 +1,4 @@
-"""The clean-up-table robot, wired: simulated world, components, knowledge, plots, planner."""
+"""Deployment of the clean-up-table robot: simulated world, components, knowledge base, plots and planner."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ MAIN_PLOT = "clean_up_table"
 
 @dataclass(slots=True)
 class CleanUpTable:
-    """A table to be cleared, with the robot program that clears it.
+    """A table to be cleared, with the robot program that clears the table.
 
     Attributes:
-        world: the simulated truth.
-        executive: the robot program over it.
+        world: the simulated world, with its true state.
+        executive: the robot program.
         tally: counts the records of the run.
         resumes: whether `run` resumes an interrupted run.
-        profile: the robot's settings profile; `None` is the default robot.
+        profile: the settings profile of the robot; `None` for the default robot.
     """
 
     world: TableWorld
@@ -59,7 +59,7 @@ class CleanUpTable:
     profile: Profile | None = None
 
     def __enter__(self) -> Self:
-        """Return the deployment; `close` runs at the end of the block."""
+        """Return the deployment; the end of the `with` block calls `close`."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -67,21 +67,21 @@ class CleanUpTable:
         self.close()
 
     def close(self) -> None:
-        """Close the executive and the world's file."""
+        """Close the executive and the file of the world."""
         self.executive.close()
         if isinstance(self.world, DurableWorld):
             self.world.close()
 
     def run(self, *, simulated: bool = True, prepare: Callable[[Sequencer], None] | None = None) -> Report:
-        """Clear the table and return the report, also if the operator ends the run (Ctrl-C).
+        """Clear the table and return the report, also if the operator ends the run with Ctrl-C.
 
         Args:
-            simulated: time jumps from event to event; a resumed run keeps its kind of time.
+            simulated: whether time jumps from event to event; a resumed run keeps its kind of time.
             prepare: called with the sequencer before the run starts.
 
         Raises:
             StoreError: the store cannot be read or written.
-            ChangedError: plots or domain differ from those of the run to resume.
+            ChangedError: plots or domain differ from their versions at the start of the resumed run.
         """
         started = time.perf_counter()
 
@@ -103,12 +103,12 @@ class CleanUpTable:
             more(sequencer)
 
     def _kept(self) -> dict[str, Any]:
-        """Return the header with the profile, from which a resumed run is deployed."""
+        """Return the header of the run with the profile, which a resumed run needs."""
         settings = {} if self.profile is None else {"settings": self.profile.model_dump(by_alias=True)}
         return {**self.header(), **settings}
 
     def header(self) -> dict[str, Any]:
-        """Return the inputs that determine a run, for the first line of its trace."""
+        """Return the inputs that determine a run, for the first line of the trace."""
         plots = "".join(sorted(plot.digest for plot in self.executive.library))
         return {
             "run": NAME,
@@ -130,20 +130,20 @@ def deploy(
     durability: Durability = "process",
     profile: Profile | None = None,
 ) -> CleanUpTable:
-    """Wire everything for one run; the caller closes it.
+    """Deploy everything for one run; the caller must close the result.
 
     Args:
         scenario: the items on the table; by default `Scenario.default`.
-        seed: seed of the faults; by default the scenario's.
-        faults: chance of a fault per skill call in [0, 1]; by default the scenario's.
-        planner: finds plans; by default pyperplan in a separate process.
+        seed: the seed of the faults; by default the seed of the scenario.
+        faults: the chance of a fault per skill call, in [0, 1]; by default the chance of the scenario.
+        planner: the planner; by default pyperplan in a separate process.
         listener: called with every record of the run.
-        store: a file without a run, to keep the run in; a sidecar file keeps the world.
+        store: a file without a run, which then keeps the run; a sidecar file keeps the world.
         durability: the events that the run survives, see `Executive`.
-        profile: one of `ROBOTS` and the values of its parameters; by default the one on wheels.
+        profile: the robot, one of `ROBOTS`, and the values of its parameters; by default the robot on wheels.
 
     Raises:
-        InputError: the scenario or the profile is wrong, or the store has a run already.
+        InputError: the scenario or the profile contains an error, or the store already contains a run.
         StoreError: the store cannot be opened, or the world cannot be written.
     """
     world = (scenario or Scenario.default()).world(seed, faults)
@@ -168,10 +168,10 @@ def resumed(
     listener: Listener | None = None,
     durability: Durability = "process",
 ) -> CleanUpTable:
-    """Wire everything to resume the run in a store; arguments as for `deploy`.
+    """Deploy everything to resume the run in a store; for the arguments see `deploy`.
 
     Raises:
-        StoreError: the store or its world is missing or unreadable, or the run belongs to another program.
+        StoreError: the store or the world is missing or unreadable, or the run belongs to another program.
     """
     with archive(store) as runs:
         run = unfinished(runs)
@@ -208,25 +208,25 @@ def _wired(
 
 
 def on_wheels(world: TableWorld) -> list[Component]:
-    """Return the components with a base on wheels and an arm with a hand."""
+    """Return the components of the robot with a base on wheels and an arm with a hand."""
     return [Base(world), Arm(world), Camera(world), Voice(world)]
 
 
 def on_tracks(world: TableWorld) -> list[Component]:
-    """Return the components with a base on tracks and a suction arm."""
+    """Return the components of the robot with a base on tracks and a suction arm."""
     return [Tracks(world), SuctionArm(world), PatientCamera(world), Voice(world)]
 
 
 ROBOTS = {"on_wheels": on_wheels, "on_tracks": on_tracks}
-"""The robots for this task, by their names in profiles."""
+"""The robots for this task, by their names in profiles; each is a function that returns components."""
 PROFILES = HOME / "profiles"
 
 
 def robot(profile: Profile | None) -> Callable[[TableWorld], list[Component]]:
-    """Return the factory of components for the robot of a profile.
+    """Return the function that returns the components of the profile's robot.
 
     Raises:
-        UnknownNameError: there is no such robot.
+        UnknownNameError: the profile names an unknown robot.
     """
     name = "on_wheels" if profile is None or profile.robot is None else profile.robot
     if name not in ROBOTS:
@@ -237,29 +237,29 @@ def robot(profile: Profile | None) -> Callable[[TableWorld], list[Component]]:
 
 @cache
 def plots() -> tuple[ActionPlot, ...]:
-    """Return the plots of this domain, cached, since plots are immutable."""
+    """Return the plots of this ready world; cached, because plots are immutable."""
     return tuple(load_library(HOME / "plots"))
 
 
 @cache
 def library() -> Library:
-    """Return the library of the unadapted plots, cached with its derived tables for all runs."""
+    """Return the library of the plots without a profile; cached, because runs share its derived tables."""
     return Library([*plots(), achieve_plot()])
 
 
 @cache
 def domain() -> PlanningDomain:
-    """Return the planning domain, cached."""
+    """Return the planning domain of this ready world; cached."""
     return PlanningDomain.from_pddl(HOME / "domain.pddl")
 
 
 def bundle() -> Bundle:
-    """Return the bundle of plots and planning domain, for a base, an arm, a camera and a voice."""
+    """Return a bundle with the plots and the planning domain; the robot needs a base, an arm, a camera and a voice."""
     return Bundle(NAME, plots(), domain=domain(), about="clear a table: cups to the sink, cans to the bin")
 
 
 class _SceneWriter:
-    """Writes a `scene` record after each outcome that changed the drawing."""
+    """A trace listener that writes a record `scene` after each event that changed the scene."""
 
     def __init__(self, world: TableWorld, sequencer: Sequencer) -> None:
         self._world = world

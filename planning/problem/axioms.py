@@ -1,13 +1,13 @@
-"""Recursive derived predicates whose bodies actions change, compiled into actions that derive them.
+"""Recursive derived predicates whose inputs actions change, compiled into actions that derive facts.
 
-An expression cannot replace `(above ?a ?b)` where actions move blocks, and no engine here supports axioms. Each axiom
-becomes a bookkeeping action that adds its head. Each action that may falsify a derived fact deletes all of them, and
-bookkeeping actions derive them again (Gazen & Knoblock 1997; Thiébaux, Hoffmann & Nebel 2005).
+An expression cannot replace `(above ?a ?b)` if actions move blocks, and no engine of this project supports axioms. Each
+axiom becomes a bookkeeping action that adds its head. Each action that may falsify a derived fact deletes all derived
+facts, and bookkeeping actions derive them again (Gazen & Knoblock 1997; Thiébaux, Hoffmann & Nebel 2005).
 
-A fact derived in this way holds in the original domain. A fact not yet derived may hold too, so a condition cannot
-require that such a predicate is false.
+A fact that is derived in this way is true in the original domain. A fact that is not yet derived may be true too, so no
+condition may require that such a predicate is false.
 
-Plans of that kind are for display only: a monitor watches facts and numbers, never derived predicates.
+Such plans are for display only, because a monitor observes facts and numbers, and no derived predicates.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from planning.problem.expressions import denied, name_of, names_of
 from planning.problem.relevance import relevant
 from planning.strips import GroundAction, Problem, UnsupportedActionError, UnsupportedGoalError
 
-_DERIVE = "derive "  # with a blank, which no declared name contains
+_DERIVE = "derive "  # the blank distinguishes the name from every declared name
 
 
 @dataclass(frozen=True, slots=True)
 class Derivable:
-    """A domain whose axioms are actions, and the derivation that it comes from.
+    """A domain in which actions replace the axioms.
 
     Attributes:
         original: the derivation of the domain with derived predicates.
         domain: the domain without derived predicates, which engines and explanations use.
-        predicates: the predicates that its bookkeeping actions derive.
+        predicates: the predicates that the bookkeeping actions derive.
     """
 
     original: Derivation
@@ -47,7 +47,7 @@ class Derivable:
 
     @staticmethod
     def of(domain: PlanningDomain) -> Derivable | None:
-        """Return `None` without such a predicate, or if durative actions may falsify a derived fact."""
+        """Return the compiled domain; `None` if it is not needed, or if durative actions may falsify a derived fact."""
         original = derivation(domain)
         predicates = frozenset(original.unsupported)
         plain = original.domain
@@ -82,11 +82,11 @@ class Derivable:
         durations: bool = False,
         patience: WorkLimit | None = None,
     ) -> Problem:
-        """As `planning.problem.construction.build_problem`; plans show no steps that derive facts.
+        """Return the problem, as `planning.problem.construction.build_problem`; its plans omit bookkeeping actions.
 
         Raises:
-            UnsupportedGoalError, UnsupportedActionError: also if a condition requires that a
-                derived predicate is false.
+            UnsupportedGoalError, UnsupportedActionError: also if a condition requires that a derived predicate is
+                false.
         """
         wanted = self.original.expand(goal)
         self._refuse_denied(wanted)
@@ -95,11 +95,11 @@ class Derivable:
         )
 
     def without_axioms(self, world: World, goal: Expression) -> tuple[PlanningDomain, World, Expression]:
-        """Domain, world and goal without derived predicates; an explanation of 'no plan' speaks of these."""
+        """Return domain, world and goal without derived predicates, for an explanation of 'no plan'."""
         return self.domain, self.world(world), self.original.expand(goal)
 
     def _refuse_denied(self, goal: Expression) -> None:
-        """Raise an error if a condition needs a derived fact to be false; bookkeeping proves only true ones."""
+        """Raise an error if a condition requires that a derived fact is false, which bookkeeping cannot prove."""
         for atom in self._unknowable(goal):
             raise UnsupportedGoalError(self._said("the goal", atom), place=atom.place)
         for action in relevant(goal, None, self.domain.actions.values()).actions:
@@ -120,7 +120,7 @@ class Derivable:
 
 @dataclass(frozen=True, slots=True)
 class _Harmed:
-    """The predicates whose changes may falsify a derived fact, by direction of the change."""
+    """The predicates whose changes may falsify a derived fact, by the direction of the change."""
 
     when_false: frozenset[str]
     when_true: frozenset[str]
@@ -133,7 +133,7 @@ class _Harmed:
         return _Harmed(frozenset(wanted), frozenset((asked - wanted) | unwanted))
 
     def by(self, effect: Effect) -> bool:
-        """Return whether the effect may falsify a derived fact; a numeric effect may, in either direction."""
+        """Return whether the effect may falsify a derived fact; a numeric effect may do so in both directions."""
         return any(
             name_of(leaf) in (self.when_false if isinstance(leaf, Delete) else self.when_true)
             for leaf in effect_leaves(effect)
@@ -148,7 +148,7 @@ def _forgotten(predicate: str, domain: PlanningDomain) -> Effect:
 
 
 def _deriving(axiom: Axiom, body: Expression) -> Iterator[PlanningAction]:
-    """Yield an action for each alternative; variables of `exists` become parameters, which joins bind."""
+    """Yield an action for each alternative; variables of `exists` become parameters, so that joins bind them."""
     match body:
         case Or(parts):
             for part in parts:
@@ -166,7 +166,7 @@ def _names(parameters: Collection[TypedVariable]) -> set[str]:
 
 
 def _kept_books(problem: Problem) -> Problem:
-    """Return the problem with bookkeeping actions that no plan shows and that cost nothing."""
+    """Return the problem with bookkeeping actions that have no step and no cost."""
 
     def whole() -> Problem:
         return _kept_books(problem.unsliced()) if problem.unsliced is not None else problem

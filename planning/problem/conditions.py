@@ -1,8 +1,8 @@
-"""Ground conditions after partial evaluation: the residual formula that a planner decides.
+"""Ground conditions after partial evaluation: the residual, whose truth depends on the plan.
 
-Quantifiers are expanded over the known objects. Types, equality, numbers, and predicates that no action changes are
-evaluated on the world, computed predicates included. The residual is in negation normal form; its leaves are literals
-and bounds on numbers that actions change.
+Quantifiers are expanded over the known objects. Types, equality, numbers, and predicates that no action changes
+(including computed predicates) are evaluated on the world. The residual is in negation normal form. Its leaves are
+literals, and bounds on numbers that actions change.
 """
 
 from __future__ import annotations
@@ -32,36 +32,36 @@ class Literal:
     positive: bool = True
 
     def __hash__(self) -> int:
-        """The hash of the dataclass in one call: literals are dictionary keys on the hot path."""
+        """Return the hash of the dataclass, computed in one call because literals are frequent dictionary keys."""
         return hash((self.fact.predicate, self.fact.args, self.positive))
 
     @property
     def negated(self) -> Literal:
-        """The opposite."""
+        """The literal with the opposite truth value."""
         return Literal(self.fact, not self.positive)
 
 
 @dataclass(frozen=True, slots=True)
 class Every:
-    """A conjunction; never empty, never nested."""
+    """A conjunction that is never empty and contains no conjunction."""
 
     parts: tuple[Residual, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Some:
-    """A disjunction; never empty, never nested."""
+    """A disjunction that is never empty and contains no disjunction."""
 
     parts: tuple[Residual, ...]
 
 
 Leaf = Literal | NumericBound
 Residual = bool | Leaf | Every | Some
-"""The residual of a condition: decided already, or a formula of literals and bounds."""
+"""The residual of a condition: a truth value, or a formula of literals and bounds."""
 
 
 def every(parts: Iterable[Residual]) -> Residual:
-    """Return the simplified conjunction."""
+    """Return the simplified conjunction of the residuals."""
     kept: dict[Residual, None] = {}
     for part in parts:
         if part is False:
@@ -72,7 +72,7 @@ def every(parts: Iterable[Residual]) -> Residual:
 
 
 def some(parts: Iterable[Residual]) -> Residual:
-    """Return the simplified disjunction."""
+    """Return the simplified disjunction of the residuals."""
     kept: dict[Residual, None] = {}
     for part in parts:
         if part is True:
@@ -83,7 +83,7 @@ def some(parts: Iterable[Residual]) -> Residual:
 
 
 def negation(residual: Residual) -> Residual:
-    """Return the negation, in negation normal form."""
+    """Return the negation of the residual, in negation normal form."""
     match residual:
         case bool():
             return not residual
@@ -100,14 +100,14 @@ def negation(residual: Residual) -> Residual:
 
 
 def _apart(left: Quantity, right: Quantity) -> Residual:
-    """Return `!=` as a disjunction, for engines take only `<` and `>`."""
+    """Return `!=` as a disjunction of `<` and `>`, since engines support only these operators."""
     return Some((NumericBound("<", left, right), NumericBound(">", left, right)))
 
 
 def alternatives(residual: Residual) -> Iterator[tuple[Leaf, ...]]:
-    """Yield the disjunctive normal form, one conjunction of leaves at a time, without contradictory ones.
+    """Yield the conjunctions of the disjunctive normal form, without contradictory ones.
 
-    The number of conjunctions may be exponential; the caller bounds it.
+    The number of conjunctions may be exponential, so the caller must limit it.
     """
     match residual:
         case bool():
@@ -125,14 +125,14 @@ def alternatives(residual: Residual) -> Iterator[tuple[Leaf, ...]]:
 
 @dataclass(frozen=True, slots=True)
 class GroundEffect:
-    """One ground effect: a literal becomes true, or a number changes, if the condition held before."""
+    """One ground effect: a literal becomes true, or a number changes, if the condition held before the effect."""
 
     condition: Residual
     what: Literal | Assignment
 
 
 def is_so(fact: Fact, world: World) -> bool:
-    """Return whether the fact holds; a world stores no facts of computed predicates."""
+    """Return whether the fact is true; computed predicates are evaluated, since a world stores no facts of them."""
     if fact.predicate in world.schema.computed:
         return holds(Atom(fact.predicate, tuple(map(ex.Constant, fact.args))), world)
     return world.holds(fact.predicate, fact.args)
@@ -143,9 +143,9 @@ class Grounder:
     """Partial evaluation of conditions and effects on a world.
 
     Attributes:
-        world: the present.
-        changing: the predicates and functions that the considered actions change.
-        keep_false: keep unchangeable facts that do not hold in the residual, so that a goal can name the missing ones.
+        world: the present world.
+        changing: the predicates and functions that the relevant actions change.
+        keep_false: whether residuals keep unchangeable facts that are false, so that messages can identify them.
         patience: the limit of the work; each choice of objects counts.
     """
 
@@ -155,9 +155,9 @@ class Grounder:
     patience: WorkLimit = field(default_factory=WorkLimit, compare=False)
 
     def precondition(self, e: Expression, bindings: Mapping[str, Value]) -> Residual:
-        """Return the residual, but keep each fact that must hold or not hold, unchangeable ones included.
+        """Return the residual of `e`, in which each fact that must be true or false is kept, even if it cannot change.
 
-        The result does not depend on these facts, so that it stays valid when an external change touches them.
+        The result does not depend on these facts, so it stays valid if an external change affects them.
         """
         match e:
             case ex.And(parts):
@@ -170,7 +170,7 @@ class Grounder:
                 return self.residual(e, bindings)
 
     def residual(self, e: Expression, bindings: Mapping[str, Value], *, wanted: bool = True) -> Residual:
-        """Return the residual of `e`, or of its negation if not `wanted`.
+        """Return the residual of `e`, or of the negation of `e` if `wanted` is false.
 
         Raises:
             UnsupportedActionError: an argument of a fact is a number that actions change.
@@ -199,7 +199,7 @@ class Grounder:
         bindings: Mapping[str, Value],
         condition: Residual = True,  # noqa: FBT002  a formula that is decided already
     ) -> Iterator[GroundEffect]:
-        """Yield the ground effects on changing predicates and functions."""
+        """Yield the ground effects on the predicates and functions in `changing`."""
         match effect:
             case Add(atom) | Delete(atom):
                 if atom.predicate in self.changing:
@@ -221,10 +221,10 @@ class Grounder:
     def choices(
         self, variables: Iterable[ex.TypedVariable], bindings: Mapping[str, Value]
     ) -> Iterator[dict[str, Value]]:
-        """Yield the bindings extended by every choice of objects for `variables`.
+        """Yield `bindings`, extended by every combination of objects for `variables`.
 
         Raises:
-            WorkLimitError: the limit is reached before the last choice.
+            WorkLimitError: the limit has passed before the last combination.
         """
         chosen = list(variables)
         for values in itertools.product(*map(self.objects, chosen)):
@@ -232,12 +232,12 @@ class Grounder:
             yield {**bindings, **dict(zip((v.name for v in chosen), values, strict=True))}
 
     def objects(self, variable: ex.TypedVariable) -> dict[str, None]:
-        """Return the objects of the variable's types, as a set in order."""
+        """Return the objects of the variable's types, as an ordered set."""
         types = variable.types or ("object",)
         return dict.fromkeys(name for one in types for name in self.world.objects(one))
 
     def fact(self, atom: Atom | ex.Call, bindings: Mapping[str, Value]) -> Fact:
-        """Return the atom or numeric fluent with values for its terms.
+        """Return the atom or numeric fluent with the values of its terms as arguments.
 
         Raises:
             UnsupportedActionError: a term is a number that actions change.

@@ -1,13 +1,13 @@
-"""Problem construction: the part of a world and a domain that matters for a goal, as a ground problem for an engine.
+"""Problem construction: the part of a world and a domain that matters for a goal, as a ground problem.
 
-The steps, in order:
+Construction consists of these steps, in this order:
 
 - Select the relevant actions.
-- Ground them by relaxed reachability, and evaluate all conditions that cannot change.
+- Ground these actions by relaxed reachability, and evaluate all conditions that cannot change.
 - Compile a disjunctive goal into bookkeeping actions after the last real action.
 - Prune facts and actions that cannot contribute.
-- Remove objects that others can replace.
-- Make negative conditions positive.
+- Remove objects that other objects can replace.
+- Replace negative conditions by positive ones.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ from planning.problem.temporal import build_temporal_problem, durative
 from planning.quantities import NumericBound
 from planning.strips import Problem, UnsupportedActionError, UnsupportedGoalError
 
-# Names with blanks, which clash with no declared name.
+# Names with blanks differ from every declared name.
 _ACTING, _FINISHED = Literal(Fact("still acting")), Literal(Fact("finished acting"))
 _ONE_OF = "one of"
-_MOST_KEPT = 8  # goals of different kinds, each with its ground actions
+_MOST_KEPT = 8  # kinds of goals, each with its ground actions
 
 
 def build_problem(
@@ -54,31 +54,31 @@ def build_problem(
     durations: bool = False,
     patience: WorkLimit | None = None,
 ) -> Problem:
-    """Return the problem of reaching `goal` from `world`, which it does not change.
+    """Return the problem of reaching `goal` from `world`; `world` stays unchanged.
 
-    `ProblemBuilder` keeps ground actions of the same domain for later problems.
+    The `ProblemBuilder` of the domain is cached, and keeps ground actions for later problems.
 
     Args:
-        domain: the planning actions.
-        world: the present.
+        domain: the planning domain.
+        world: the present world.
         goal: the condition to reach.
-        metric: the plan metric; by default the domain's `(total-cost)`, minimized, if it is declared.
-        durations: also construct `timed`, for an engine that plans with durations.
+        metric: the plan metric; by default the least `(total-cost)` if the domain declares that function.
+        durations: whether to construct `timed` too, for an engine that supports durations.
         patience: the limit of the work; unlimited if omitted.
 
     Raises:
-        InputError: the goal has a free variable, or names something undeclared or unknown.
-        UnsupportedGoalError: the goal has a fact about a number that actions change, a derived predicate without
-            support, or a condition that no engine can foresee (`unforeseeable`).
-        UnsupportedActionError: a relevant action has one of these, or too many alternatives.
-        WorkLimitError: the limit is reached, as it may be with many objects for many parameters.
+        InputError: the goal has a free variable, or contains an undeclared or unknown name.
+        UnsupportedGoalError: the goal contains a fact about a number that actions change, an unsupported derived
+            predicate, or a condition that no engine can foresee (`unforeseeable`).
+        UnsupportedActionError: a relevant action contains such a condition, or has too many alternatives.
+        WorkLimitError: the limit has passed, e.g. with many objects and many parameters.
     """
     builder = _builders.find(domain, None) or _builders.keep(domain, None, ProblemBuilder(domain))
     return builder.build_problem(world, goal, metric, durations=durations, patience=patience)
 
 
 def check_goal(goal: Expression, world: World) -> None:
-    """Raise an `InputError` unless the goal fits the schema and names only objects of this world."""
+    """Raise `InputError` if the goal does not fit the schema or contains a missing object."""
     check(goal, world.schema, objects=things_of(world))
 
 
@@ -88,10 +88,10 @@ class GroundedProblem:
 
     Attributes:
         relevant: the relevant actions, predicates and functions.
-        things: all objects with their types.
-        wanted: the residual of the goal; `False` if it can never hold.
-        task: the ground problem; `None` if the goal can never hold.
-        assembly: makes a `Problem` from the task.
+        things: the type of each object, by the object's name.
+        wanted: the residual of the goal; `False` if the goal can never hold.
+        task: the ground problem in numbers; `None` if the goal can never hold.
+        assembly: constructs a `Problem` from the task.
     """
 
     relevant: Relevant
@@ -102,9 +102,9 @@ class GroundedProblem:
 
 
 class ProblemBuilder:
-    """Constructs the problems of one domain, and keeps ground actions for the next problem.
+    """Builder of the problems of one domain, which keeps ground actions for the next problem.
 
-    A new builder returns the same problem, only later. Threads may share a builder.
+    A new builder returns equal problems but takes longer. Several threads may use one builder.
     """
 
     def __init__(self, domain: PlanningDomain) -> None:
@@ -140,7 +140,7 @@ class ProblemBuilder:
         return replace(problem, one_at_a_time=True, timed=timed if durations else None)
 
     def _one_at_a_time(self, world: World, goal: Expression, metric: Metric | None, patience: WorkLimit) -> Problem:
-        """Return the problem with durative actions as instantaneous ones."""
+        """Return the problem in which durative actions are instantaneous."""
         amount = metric_of(metric, world.schema)
         with self._lock:
             grounded = self.grounded(world, goal, amount, patience)
@@ -156,12 +156,12 @@ class ProblemBuilder:
     def grounded(
         self, world: World, goal: Expression, metric: Term | None = None, patience: WorkLimit | None = None
     ) -> GroundedProblem:
-        """Return the ground problem of a checked goal, partially evaluated.
+        """Return the ground problem of a checked goal after partial evaluation.
 
         Args:
-            world: the present, with derived facts.
+            world: the present world, with derived facts.
             goal: the condition to reach.
-            metric: the term to minimize.
+            metric: the term to minimize; `None` without a metric.
             patience: the limit of the work.
 
         Raises:
@@ -187,7 +187,7 @@ class ProblemBuilder:
         return GroundedProblem(matters, things, wanted, Task(numbering, init, goal_numbers, ways), assembly)
 
     def _relevant(self, goal: Expression, metric: Term | None) -> Relevant:
-        """Return the relevant part of the domain, cached by the predicates and functions of the goal."""
+        """Return the relevant part of the domain; cached by the predicates and functions of the goal."""
         key = frozenset(names_of(goal)), metric
         if key not in self._matters:
             if len(self._matters) >= _MOST_KEPT:
@@ -198,9 +198,9 @@ class ProblemBuilder:
     def _prepared(
         self, matters: Relevant, metric: Term | None, world: World, things: Mapping[str, str], patience: WorkLimit
     ) -> tuple[OperatorCache, Assembly]:
-        """Return the cached ground actions if they are valid for this world, else new ones."""
+        """Return the cached ground actions if they are valid for this world; otherwise new ground actions."""
         key = (tuple(action.name for action in matters.actions), matters.changing, metric)
-        known = self._kept.pop(key, None)  # removed while in use, so that an error leaves no partial entry
+        known = self._kept.pop(key, None)  # removed during use, so that an error leaves no partial entry
         if known is None or not known[0].serves(world, things):
             groundwork = OperatorCache(matters, metric, world, things)
             known = groundwork, Assembly(groundwork.numbering)
@@ -213,7 +213,7 @@ class ProblemBuilder:
     def _sliced(
         self, task: Task, assembly: Assembly, world: World, things: Mapping[str, str], notes: tuple[str, ...]
     ) -> Problem:
-        """Return the problem without objects that others can replace; their actions return with `unsliced`."""
+        """Return the slice, without objects that others can replace; `unsliced` constructs the whole problem."""
         left, gone = task.left or {}, spared(task)
 
         def problem(task: Task, world: World | None) -> Problem:
@@ -260,9 +260,9 @@ def _evenly_priced(task: Task) -> Task:
 def _with_conjunctive_goal(
     ways: OperatorIndex, goal: Residual, numbering: Numbering
 ) -> tuple[OperatorIndex, tuple[int, ...]]:
-    """Return the goal as literals and bounds; bookkeeping actions add a fact for each disjunction in it.
+    """Return the goal as literals and bounds, and the operators with bookkeeping actions for each disjunction.
 
-    A plan takes them only after the last real action, since a later action may falsify a disjunct.
+    A plan contains bookkeeping actions only after the last real action, since a later action may falsify a disjunct.
     """
     bookkeeping: list[Variant] = []
     wanted = tuple(map(numbering.of, _conjunction(goal, bookkeeping)))
@@ -294,7 +294,7 @@ _builders: IdentityCache[PlanningDomain, ProblemBuilder] = IdentityCache(size=8)
 
 
 def said(numbering: Numbering, missing: int, goal: Expression) -> str:
-    """Return a goal number in the words of the goal's author."""
+    """Return an unreachable part of the goal as text."""
     what = numbering.named(missing)
     if isinstance(what, Fact) and what.predicate == _ONE_OF:
         return to_text(goal)

@@ -1,8 +1,8 @@
-"""Derived predicates (PDDL 2.2 axioms): compiled away, or evaluated where no action changes their inputs.
+"""Derived predicates (PDDL 2.2 axioms): compiled away, or evaluated if no action changes their inputs.
 
-The condition of a non-recursive predicate replaces each atom with it. A recursive one, such as `above`, becomes facts
-if no action changes its inputs: the least fixpoint, stratum by stratum as in Datalog. Otherwise planning does not
-support it.
+Each atom of a non-recursive predicate is replaced by the predicate's condition. A recursive predicate, such as `above`,
+is replaced by facts if no action changes its inputs: the least fixpoint, stratum by stratum as in Datalog. Other
+recursive predicates are not supported by planning.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ _AXIOMS = "planners with axioms of their own, such as Fast Downward run by itsel
 
 
 def derivation(domain: PlanningDomain) -> Derivation:
-    """Return the derivation of a domain, cached by identity.
+    """Return the derivation of a domain; cached by identity.
 
     Raises:
-        SchemaError: a predicate follows from its own negation.
+        SchemaError: a predicate depends on its own negation.
     """
     return _known.find(domain, None) or _known.keep(domain, None, Derivation(domain))
 
 
 class Derivation:
-    """A domain without its derived predicates, and the expressions or facts that replace them.
+    """A domain without its derived predicates, and the expressions or facts that replace these predicates.
 
     Attributes:
-        original: the domain as its author wrote it.
-        domain: the domain with derived predicates replaced by their conditions where possible.
+        original: the domain with derived predicates.
+        domain: the domain in which conditions replace the non-recursive derived predicates.
         changing: the predicates and functions that actions change.
-        unsupported: the recursive predicates that actions affect, each with the inputs that actions change.
+        unsupported: the inputs that actions change, by the recursive predicate that depends on them.
     """
 
     def __init__(self, domain: PlanningDomain) -> None:
@@ -74,10 +74,10 @@ class Derivation:
         self.domain = domain
 
     def expand(self, e: Expression) -> Expression:
-        """Return the condition with derived predicates replaced by their conditions; recursive ones stay."""
+        """Return the condition with each non-recursive derived predicate replaced by its condition."""
         if not self._axioms:
             return e
-        # The same object for the same condition: other caches use its identity as the key.
+        # An equal condition must give an identical object, because other caches use its identity as the key.
         return self._expanded.find(e, None) or self._expanded.keep(e, None, self._expand(e))
 
     def _expand(self, e: Expression) -> Expression:
@@ -94,20 +94,20 @@ class Derivation:
         return self._closed(world, [one for one in self._circles if self.unsupported.keys().isdisjoint(one)])
 
     def complete(self, world: World) -> World:
-        """Return the world with the current facts of all recursive predicates."""
+        """Return the world with the facts of all recursive predicates."""
         return self._closed(world, self._circles)
 
     def _closed(self, world: World, circles: Collection[frozenset[str]]) -> World:
         if not circles:
             return world
         closed = Overlay(world)
-        for circle in circles:  # each comes after the strata of its inputs
+        for circle in circles:  # each set of predicates comes after its inputs
             while facts := [fact for fact in self._consequences(circle, closed) if not _holds(fact, closed)]:
                 closed.apply(Delta(added=tuple(dict.fromkeys(facts))))
         return closed
 
     def at(self, world: World) -> Settled:
-        """Return the domain for this world; it is valid until an input of a recursive predicate changes."""
+        """Return the domain for this world; the result is valid until an input of a recursive predicate changes."""
         closed = self.world(world)
         supported = [name for circle in self._circles for name in sorted(circle) if name not in self.unsupported]
         facts = frozenset(
@@ -118,7 +118,7 @@ class Derivation:
         return Settled(self, facts, frozenset(supported))
 
     def may_change(self, e: Expression) -> bool:
-        """Return whether some action may make the expanded condition true or false; `False` is certain."""
+        """Return whether some action may change the truth of the condition; the result `False` is certain."""
         changing = self.changing.union(self._schema.computed, self.unsupported)
         fixed = self._schema.predicates.keys() - changing
         return not all(name in fixed or self._schema.is_type(name, 1) for name in names_of(e))
@@ -129,7 +129,7 @@ class Derivation:
         return bool(self._recursive)
 
     def why(self, name: str) -> str:
-        """Return why a predicate has no support, and the planners that have it."""
+        """Return why a predicate is not supported, and which planners support it."""
         changing = ", ".join(f"'{one}'" for one in sorted(self.unsupported[name]))
         return (
             f"'{name}', a derived predicate that follows from itself (at {self._axioms[name][0].place}) and from what"
@@ -137,7 +137,7 @@ class Derivation:
         )
 
     def _dependencies(self, axioms: Iterable[Axiom]) -> nx.DiGraph[str]:
-        """Return the graph from each predicate to its inputs, derived or not."""
+        """Return the graph with an edge from each predicate to each of its inputs."""
         graph: nx.DiGraph[str] = nx.DiGraph()
         for axiom in axioms:
             graph.add_node(axiom.predicate)
@@ -153,7 +153,7 @@ class Derivation:
         return graph
 
     def _instance(self, axiom: Axiom, atom: Atom) -> Expression:
-        """Return the axiom's condition for the atom's arguments, with type tests where the axiom narrows a type."""
+        """Return the axiom's condition for the atom's arguments, with type tests if the axiom restricts a type."""
         declared = self._schema.predicates[axiom.predicate].parameters
         tests = tuple(
             type_test(own, term)
@@ -175,12 +175,12 @@ class Derivation:
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """A domain without derived predicates, which the knowledge base alone can evaluate.
+    """A domain without derived predicates, so that the knowledge base can evaluate its conditions.
 
     Attributes:
         derivation: the derivation of the domain.
         facts: the facts that replace the recursive predicates.
-        predicates: the recursive predicates replaced.
+        predicates: the recursive predicates that these facts replace.
     """
 
     derivation: Derivation = field(compare=False, repr=False)

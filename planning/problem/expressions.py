@@ -1,4 +1,4 @@
-"""Expressions of a domain: the names they read and change, and replacement of conditions in them."""
+"""Functions on expressions of a domain: the names that they read and change, and replacement of conditions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from planning.domain import PlanningAction
 
 
 def inside(e: Expression | Term) -> list[Expression | Term]:
-    """Return the expression with all expressions and terms in it, in the order of the text."""
+    """Return the expression and all expressions and terms in it, in the order of the text."""
     found: list[Expression | Term] = []
     agenda = [e]
     while agenda:
@@ -25,22 +25,22 @@ def inside(e: Expression | Term) -> list[Expression | Term]:
 
 
 def names_of(e: Expression | Term) -> list[str]:
-    """Return the predicates, types and functions in an expression; repeated ones again."""
+    """Return the predicates, types and functions in an expression, with repetitions."""
     return [name for one in inside(e) if (name := name_in(one)) is not None]
 
 
 def name_in(e: Expression | Term) -> str | None:
-    """Return the expression's own predicate or function, or `None`."""
+    """Return the predicate or function of the outermost expression; `None` if it has neither."""
     return e.function if isinstance(e, ex.Call) else e.predicate if isinstance(e, Atom) else None
 
 
 def conditions_of(action: PlanningAction) -> tuple[Expression, ...]:
-    """Return the precondition and the conditions of conditional effects."""
+    """Return the precondition of the action and the conditions of its conditional effects."""
     return (action.precondition, *eff.effect_conditions(action.effect))
 
 
 def name_of(leaf: eff.Add | eff.Delete | eff.NumericEffect) -> str:
-    """Return the predicate or function of a change."""
+    """Return the predicate or function that the effect changes."""
     return leaf.call.function if isinstance(leaf, eff.NumericEffect) else leaf.atom.predicate
 
 
@@ -50,7 +50,7 @@ def changed(effect: eff.Effect) -> frozenset[str]:
 
 
 def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
-    """Yield the atoms under an odd number of negations; with `wanted` false, under an even number."""
+    """Yield the atoms under an odd number of negations; if `wanted` is false, under an even number."""
     match e:
         case Atom():
             yield from () if wanted else (e,)
@@ -65,7 +65,7 @@ def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
 
 
 def with_atoms(e: Expression, instead: Callable[[Atom], Expression]) -> Expression:
-    """Return the condition with each of its atoms replaced."""
+    """Return the condition in which `instead` has replaced each atom."""
     match e:
         case Atom():
             return instead(e)
@@ -80,7 +80,7 @@ def with_atoms(e: Expression, instead: Callable[[Atom], Expression]) -> Expressi
 
 
 def rewritten(action: PlanningAction, rewrite: Callable[[Expression], Expression]) -> PlanningAction:
-    """Return the action with each of its conditions rewritten."""
+    """Return the action in which `rewrite` has replaced each condition."""
     timed = action.timed and replace(
         action.timed,
         start=rewrite(action.timed.start),
@@ -106,6 +106,6 @@ def _rewritten(effect: eff.Effect, rewrite: Callable[[Expression], Expression]) 
 
 
 def type_test(parameter: ex.TypedVariable, term: Term) -> Expression:
-    """Return the test that a term is of the parameter's type; values are checked where they are written."""
+    """Return the test that a term has the parameter's type; the types of values need no test."""
     types = [one for one in parameter.types or (ROOT_TYPE,) if one not in VALUE_TYPES]
     return ex.Or(tuple(Atom(one, (term,)) for one in types)) if types else ex.TRUE

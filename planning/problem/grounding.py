@@ -1,4 +1,4 @@
-"""Grounding: a planning action as a join over facts, and its variants for given arguments."""
+"""Grounding: planning actions as joins over facts, and the variants of an action for given arguments."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from planning.problem.conditions import (
 from planning.quantities import Assignment, combined, fluents
 from planning.strips import UnsupportedActionError
 
-_MOST_CONDITIONS = 6  # of one ground action; each doubles the number of variants
+_MOST_CONDITIONS = 6  # conditions of effects of one ground action; each doubles the number of variants
 _MOST_ALTERNATIVES = 64
 _AS_THEY_ARE = "planners that take ADL as it is, such as Fast Downward run by itself"
 
@@ -37,10 +37,10 @@ class Variant:
     """One alternative of a ground action: a conjunction and unconditional effects.
 
     Attributes:
-        step: the step; `None` for bookkeeping that no plan shows.
-        condition: literals and bounds that must hold before.
-        effects: literals that become true; none contradicts another.
-        assignments: numeric changes, one for each fluent.
+        step: the plan step; `None` for a bookkeeping action, which no plan shows.
+        condition: the literals and bounds that must hold before.
+        effects: the literals that become true, without contradictions.
+        assignments: the numeric changes, one for each fluent.
     """
 
     step: PlanStep | None
@@ -50,10 +50,10 @@ class Variant:
 
 
 def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Grounder) -> Iterator[Variant]:
-    """Yield one variant for each alternative of the precondition and conditional effects.
+    """Yield a variant for each alternative of the precondition and the conditional effects.
 
     Raises:
-        UnsupportedActionError: there are too many variants, or two effects change a number differently.
+        UnsupportedActionError: there are too many variants, or two effects change one number in different ways.
     """
     precondition = grounder.precondition(action.precondition, bindings)
     if precondition is False:
@@ -80,9 +80,10 @@ def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Gr
 
 
 def _eased(effects: list[GroundEffect]) -> list[GroundEffect]:
-    """Return the same effects with weaker conditions: a delete needs no condition that its fact is true.
+    """Return equivalent effects with weaker conditions.
 
-    An add needs no condition that its fact is false, unless another effect deletes the fact at the same time.
+    A delete needs no condition that its fact is true. An add needs no condition that its fact is false, unless another
+    effect deletes the fact at the same time.
     """
     if all(one.condition is True for one in effects):
         return effects
@@ -113,7 +114,7 @@ def _bounded(condition: Residual, action: PlanningAction) -> list[tuple[Leaf, ..
 
 def _literals(changes: Iterable[Literal | Assignment]) -> tuple[Literal, ...]:
     literals = dict.fromkeys(c for c in changes if isinstance(c, Literal))
-    # PDDL: a fact both deleted and added is true.
+    # PDDL: a fact that is both deleted and added is true.
     return tuple([one for one in literals if one.positive or one.negated not in literals])
 
 
@@ -137,7 +138,7 @@ def _both(first: Assignment, second: Assignment, action: PlanningAction) -> Assi
 
 
 class ReachedFacts:
-    """Facts, indexed by predicate, and by predicate, position and value."""
+    """An index of facts by predicate, and by predicate, argument position and value."""
 
     def __init__(self, facts: Iterable[Fact] = ()) -> None:
         self._index: dict[tuple[Value, ...], list[Fact]] = {}
@@ -150,7 +151,7 @@ class ReachedFacts:
             self._index.setdefault(key, []).append(fact)
 
     def candidates(self, atom: Atom, bindings: Mapping[str, Value]) -> Sequence[Fact]:
-        """Return a short list that contains every fact which fits `atom`."""
+        """Return a short list that contains at least every fact that matches `atom`."""
         found: Sequence[Fact] = self._index.get((atom.predicate,), ())
         for position, term in enumerate(atom.args):
             value = term.value if isinstance(term, Constant) else bindings.get(_name(term))
@@ -166,12 +167,12 @@ def _name(term: object) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JoinRule:
-    """An action as a join.
+    """A planning action as a join over facts.
 
     Attributes:
         action: the planning action.
         atoms: the positive conjuncts of its precondition.
-        allowed: the objects that each parameter may take.
+        allowed: the objects that each parameter may have as its value.
     """
 
     action: PlanningAction
@@ -185,7 +186,7 @@ class JoinRule:
         return JoinRule(action, atoms, {p.name: grounder.objects(p) for p in action.parameters})
 
     def unify(self, atom: Atom, fact: Fact, bindings: Mapping[str, Value]) -> dict[str, Value] | None:
-        """Return the bindings extended so that the atom is the fact, or `None`."""
+        """Return the bindings, extended so that the atom equals the fact; `None` if that is not possible."""
         extended = dict(bindings)
         for term, value in zip(atom.args, fact.args, strict=True):
             if isinstance(term, Constant):
@@ -200,10 +201,10 @@ class JoinRule:
     def join(
         self, reached: ReachedFacts, atoms: tuple[Atom, ...], bindings: dict[str, Value], patience: WorkLimit
     ) -> Iterator[dict[str, Value]]:
-        """Yield all bindings under which the atoms are reached; the join starts with the most selective atom.
+        """Yield all bindings for which the atoms are reached; the join starts with the most selective atom.
 
         Raises:
-            WorkLimitError: the limit is reached; each fact tried counts.
+            WorkLimitError: the limit has passed; each tested fact counts.
         """
         if not atoms:
             yield bindings
@@ -218,7 +219,7 @@ class JoinRule:
 
 
 def joined_atoms(action: PlanningAction, schema: Vocabulary) -> tuple[Atom, ...]:
-    """Return the positive conjuncts of an action's precondition that a join can bind."""
+    """Return the positive conjuncts of the action's precondition that a join can bind."""
     return tuple(
         atom
         for atom in conjuncts(action.precondition)

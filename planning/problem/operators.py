@@ -34,9 +34,9 @@ from planning.quantities import Assignment, linear
 
 
 class Consulted:
-    """A world that records the answers it gives, so that they can be compared with another world.
+    """A world that records its answers, so that another world can be compared with them.
 
-    It has the objects of all worlds so far.
+    It contains the objects of all worlds so far.
     """
 
     def __init__(self, world: World, things: Mapping[str, str]) -> None:
@@ -46,15 +46,15 @@ class Consulted:
         self.things = dict(things)
 
     def agrees(self, world: World, things: Mapping[str, str]) -> bool:
-        """Return whether `world`, with these objects and their types, gives all recorded answers."""
+        """Return whether `world`, with these objects and types, has equal values for all recorded queries."""
         return (
-            {**things, **self.things} == {**self.things, **things}  # no object has another type
+            {**things, **self.things} == {**self.things, **things}  # no object has changed its type
             and all(world.holds(f.predicate, f.args) is truth for f, truth in self._truths.items())
             and all(world.value(f.predicate, f.args) == number for f, number in self._contents.items())
         )
 
     def follow(self, world: World, things: Mapping[str, str]) -> bool:
-        """Read from `world` from now on; return whether it has new objects."""
+        """Use `world` for later queries; return whether it contains new objects."""
         before, self._world = len(self.things), world
         self.things.update(things)
         return len(self.things) > before
@@ -65,17 +65,17 @@ class Consulted:
         return self._world.schema
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
-        """Return whether the fact is true, and record the answer."""
+        """Return whether the fact is true, and record the result."""
         truth = self._truths[Fact(predicate, args)] = self._world.holds(predicate, args)
         return truth
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
-        """Return the value of the function, and record it."""
+        """Return the value of the function, and record the result."""
         content = self._contents[Fact(function, args)] = self._world.value(function, args)
         return content
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterable[tuple[Value, ...]]:
-        """Return the facts that match the pattern, unrecorded: grounding checks each fact separately."""
+        """Return the facts that match the pattern; not recorded, since grounding tests each fact separately."""
         return self._world.match(predicate, pattern)
 
     def objects(self, type_name: str) -> Iterable[str]:
@@ -83,22 +83,22 @@ class Consulted:
         return [name for name, own in self.things.items() if self.schema.is_a(own, type_name)]
 
     def type_of(self, name: str) -> str | None:
-        """Return the object's type."""
+        """Return the type of the object; `None` if the object is missing."""
         return self.things.get(name)
 
 
 class OperatorCache:
-    """Ground operators over all facts reached so far.
+    """The ground operators over all facts that were reached so far.
 
     Attributes:
-        numbering: the numbers of their literals, bounds and fluents.
-        ways: all ground operators of the worlds so far; their order does not depend on the worlds.
+        numbering: the numbers of the operators' literals, bounds and fluents.
+        ways: the ground operators for all worlds so far, in an order that does not depend on the worlds.
 
     Args:
         relevant: the relevant part of the domain.
-        metric: the term to minimize.
-        world: the first world it is valid for.
-        things: the objects of this world with their types.
+        metric: the term to minimize; `None` without a metric.
+        world: the first world for which the operators are valid.
+        things: the type of each object in that world.
     """
 
     def __init__(self, relevant: Relevant, metric: Term | None, world: World, things: Mapping[str, str]) -> None:
@@ -111,28 +111,28 @@ class OperatorCache:
         self._costs = Costs.of(metric, self._grounder)
         self._rules: list[JoinRule] = []
         self._reached = ReachedFacts()
-        self._met: dict[str, set[tuple[Value, ...]]] = {}  # by predicate
+        self._met: dict[str, set[tuple[Value, ...]]] = {}  # arguments by predicate
         self._queue: deque[Fact] = deque()
         self._done: set[PlanStep] = set()
         self.ways = OperatorIndex([])
         self._found_so_far = 0
 
     def serves(self, world: World, things: Mapping[str, str]) -> bool:
-        """Return whether the cached operators are also valid for this world."""
+        """Return whether the cached operators are valid for this world too."""
         same = not self._over_all or list(things) == list(self._world.things)
         return same and self._world.agrees(world, things)
 
     def extend(self, world: World, things: Mapping[str, str], patience: WorkLimit) -> None:
-        """Add the operators that only this world makes possible.
+        """Add the operators that become possible in this world.
 
         Args:
-            world: the next world it is valid for.
-            things: the objects of this world with their types.
-            patience: the limit of the work; discard the cache after an error.
+            world: the next world for which the operators must be valid.
+            things: the type of each object in that world.
+            patience: the limit of the work; after an error the caller must discard the cache.
 
         Raises:
             UnsupportedActionError: see `planning.problem.grounding.variants`.
-            WorkLimitError: the limit is reached.
+            WorkLimitError: the limit has passed.
         """
         self._grounder = replace(self._grounder, patience=patience)
         found = list(self._found(world, more=self._world.follow(world, things)))
@@ -166,7 +166,7 @@ class OperatorCache:
                     yield from self._take(rule, bindings)
 
     def _meet(self, predicate: str, facts: Iterable[tuple[Value, ...]]) -> None:
-        """Queue the facts of a predicate that are new."""
+        """Add the new facts of a predicate to the queue."""
         met = self._met.setdefault(predicate, set())
         for args in facts:
             if args not in met:
@@ -192,12 +192,12 @@ class OperatorCache:
         return numbered(variant, self.numbering, cost, self._found_so_far)
 
     def _key(self, way: GroundOperator) -> tuple[int, tuple[str, ...]]:
-        """Return a sort key that does not depend on the world; variants of a step are found together."""
+        """Return a sort key that does not depend on the world; the variants of a step have equal keys."""
         return (self._order[way.step.action], way.step.args) if way.step else (len(self._order), ())
 
 
 def numbered(variant: Variant, numbering: Numbering, cost: float | None, number: int = -1) -> GroundOperator:
-    """Return the variant in numbers."""
+    """Return the operator of a variant, in numbers."""
     made = [numbering.of(effect) for effect in variant.effects]
     touched = [numbering.fluent(one.fluent) for one in variant.assignments]
     return GroundOperator(
@@ -212,12 +212,12 @@ def numbered(variant: Variant, numbering: Numbering, cost: float | None, number:
 
 
 def things_of(world: World) -> dict[str, str]:
-    """Return all objects with their types."""
+    """Return the type of each object of the world, by the object's name."""
     return {name: world.type_of(name) or ROOT_TYPE for name in world.objects(ROOT_TYPE)}
 
 
 def _ranges_over_all(action: PlanningAction, schema: Vocabulary) -> bool:
-    """Return whether the variants depend on all objects of a type, not only on those in facts."""
+    """Return whether the variants depend on all objects of a type, and not only on objects in facts."""
     bound = {term.name for atom in joined_atoms(action, schema) for term in atom.args if isinstance(term, Variable)}
     return (
         any(parameter.name not in bound for parameter in action.parameters)
@@ -235,7 +235,7 @@ TOTAL_COST = Call("total-cost")
 
 
 def metric_of(metric: Metric | None, schema: Vocabulary) -> Term | None:
-    """Return the term to minimize: by default `(total-cost)`, if it is declared."""
+    """Return the term to minimize; by default `(total-cost)` if it is declared, otherwise `None`."""
     if metric is not None:
         return metric.term if metric.direction == "minimize" else Arithmetic("-", (metric.term,))
     declared = schema.functions.get(TOTAL_COST.function)
@@ -251,21 +251,21 @@ def ignored(metric: Term) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """Action costs.
+    """The action costs that follow from a metric.
 
     Attributes:
-        coefficients: factor of each numeric fluent in the metric; `None` if the metric is not a linear sum.
+        coefficients: the factor of each numeric fluent in the metric; `None` if the metric is not a linear sum.
     """
 
     coefficients: Mapping[Fact, float] | None
 
     @staticmethod
     def of(metric: Term | None, grounder: Grounder) -> Costs | None:
-        """Return the costs by a metric; `None` without one."""
+        """Return the costs for a metric; `None` without a metric."""
         if metric is None:
             return None
         declared = grounder.world.schema.functions
-        known = all(name in declared for name in names_of(metric))  # PDDL has `total-time` without a declaration
+        known = all(name in declared for name in names_of(metric))  # PDDL allows `total-time` without a declaration
         return Costs(linear(grounder.quantity(metric, {})) if known else None)
 
     def cost(self, assignments: Iterable[Assignment]) -> float | None:

@@ -1,14 +1,14 @@
-"""Reduction of a ground problem (S1.5): operators that can contribute to the goal, and objects that matter.
+"""Reduction of a ground problem (S1.5): removal of useless operators and of objects that other objects can replace.
 
-Pruning is exact: the pruned problem has a plan if and only if the whole one has, at the same cost.
+Pruning is exact: the pruned problem has a plan if and only if the original problem has a plan of equal cost.
 
-Object *o* is removed, such as a surface with nothing on it, if a kept object *s* can replace it. No initial fact, goal
-or number mentions *o*. For each ground action with *o*, the action with *s* exists. It needs no more, adds no less,
-deletes no more and costs no more; or the action changes nothing.
+An object *o*, such as a surface with nothing on it, is removed if a kept object *s* can replace it. No initial fact,
+goal or number may contain *o*. For each ground action with *o*, the action with *s* must exist. The action with *s*
+must need no more, add no less, delete no more and cost no more; or the action with *o* changes nothing.
 
-Replacing *o* by *s* then turns a plan into one without *o*, with one exception. A fact about *o* and the same fact
-about *s* may both be required while an action deletes one of them. No cheap proof excludes this case. A slice without a
-plan therefore proves nothing, and the engine solves the whole problem.
+Replacing *o* by *s* then turns a plan into a plan without *o*, with one exception. A fact about *o* and the same fact
+about *s* may both be required while an action deletes one of them. No fast proof excludes this case. If a slice has no
+plan, nothing is proven, and the engine solves the whole problem.
 """
 
 from __future__ import annotations
@@ -25,13 +25,14 @@ def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:
     """Return the task without parts that cannot matter.
 
     Pruning removes operators that are impossible or cannot contribute, and literals that no condition reads. It also
-    removes literals and bounds that hold now and that no operator can falsify.
+    removes literals and bounds that hold initially and that no operator can falsify.
 
     Args:
-        task: a pruned or unpruned task.
-        possible: by position, whether an operator is reachable (1) or not (0).
+        task: the task; it may already be pruned.
+        possible: for each position, whether the operator is reachable (1) or not (0).
     """
-    # The next problem differs mostly in its facts; possible operators and deletable facts, the key, stay the same.
+    # Successive problems differ mostly in their facts. The key, possible operators and deletable facts, mostly stays
+    # equal.
     key = (bytes(possible), task.goal, task.settled)
     kept = task.ways.known("slice" if task.left else "whole", lambda: _RelevantParts(task.ways, task.numbering))
     contribution = task.ways.known(key, lambda: _contributing(task, bytearray(possible)))
@@ -44,7 +45,7 @@ def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:
 
 
 class _RelevantParts:
-    """A cache of the relevant parts of operators; the next problem mostly reuses it."""
+    """A cache of the relevant parts of operators, most of which the next problem reuses."""
 
     def __init__(self, ways: OperatorIndex, numbering: Numbering) -> None:
         self._ways, self._numbering = ways, numbering
@@ -53,7 +54,7 @@ class _RelevantParts:
         self._left: dict[int, GroundOperator] = {}
 
     def of(self, positions: Iterable[int], asked: frozenset[int], settled: frozenset[int]) -> dict[int, GroundOperator]:
-        """Return by position the relevant parts of the operators that add a literal in `asked`."""
+        """Return, by position, the relevant parts of those operators that add a literal in `asked`."""
         left = self._left
         if left:
             for one in (asked ^ self._asked) | (settled ^ self._settled):
@@ -71,9 +72,9 @@ class _Contribution:
     """The literals and operators that contribute to a goal.
 
     Attributes:
-        wanted: the literals and bounds of the goal and of contributing operators' needs.
+        wanted: the literals and bounds of the goal, and those that contributing operators need.
         positions: the operators that add a wanted literal, or change a number of a wanted bound.
-        lasting: the wanted literals that stay true once they hold: no operator deletes them or changes their numbers.
+        lasting: the wanted literals that stay true after they become true, because no operator falsifies them.
     """
 
     wanted: frozenset[int]
@@ -82,7 +83,7 @@ class _Contribution:
 
 
 def _contributing(task: Task, open_: bytearray) -> _Contribution:
-    """Return the contribution to the task's goal by the operators that are `open_`, by position."""
+    """Return the contribution to the task's goal by the operators whose entry in `open_` is 1."""
     ways, adders, wants, settled = task.ways.all, task.ways.adders, task.numbering.wants, task.settled
     inputs = _inputs(ways, task.numbering)
     wanted, agenda = set(task.goal), list(task.goal)
@@ -111,7 +112,7 @@ def _contributing(task: Task, open_: bytearray) -> _Contribution:
 
 
 def _inputs(ways: Iterable[GroundOperator], numbering: Numbering) -> Mapping[int, Iterable[int]]:
-    """Return a mapping from each fluent to the fluents in amounts assigned to it."""
+    """Return, for each fluent, the fluents in the amounts that are assigned to it."""
     found: dict[int, set[int]] = {}
     for way in ways if numbering.fluents else ():
         for one in way.assignments:
@@ -133,7 +134,7 @@ def _clean(way: GroundOperator, asked: frozenset[int], settled: frozenset[int], 
 
 
 def spared(task: Task) -> list[int]:
-    """Return the positions of the operators that are redundant, since each mentions a replaceable object."""
+    """Return the positions of the redundant operators; each of them contains a replaceable object."""
     left, naming = task.left or {}, task.ways.naming
     mentions = _mentions(task, left, _settled(task, left))
     if not mentions:
@@ -143,7 +144,7 @@ def spared(task: Task) -> list[int]:
     last: dict[str, str] = task.ways.known("replaced", dict)
     gone: set[int] = set()
     for name, listed in mentions.items():
-        # The same object mostly replaces it again.
+        # The object that replaced it in the last problem mostly replaces it again.
         for other in [last[name], *stand_ins] if last.get(name) in stand_ins else stand_ins:
             exchange = exchanges.get((name, other))
             if exchange is None:
@@ -156,7 +157,7 @@ def spared(task: Task) -> list[int]:
 
 
 def _settled(task: Task, left: Mapping[int, GroundOperator]) -> set[str]:
-    """Return the objects that must stay."""
+    """Return the objects that must not be removed."""
     objects, bounds = task.numbering.objects, task.numbering.bounds
     settled = set[str]().union(*map(objects.__getitem__, (*task.init, *task.goal)))
     for way in left.values() if task.numbering.fluents else ():
@@ -167,7 +168,7 @@ def _settled(task: Task, left: Mapping[int, GroundOperator]) -> set[str]:
 
 
 def _mentions(task: Task, left: Mapping[int, GroundOperator], settled: set[str]) -> Mapping[str, Sequence[int]]:
-    """Return a mapping from each removable object to the operators with it in their step or literals."""
+    """Return, for each removable object, the operators with that object in their step or literals."""
     found: dict[str, dict[int, None]] = {}
     for name, positions in task.ways.naming.items():
         if name not in settled and (here := [i for i in positions if i in left]):
@@ -186,7 +187,7 @@ def _mentions(task: Task, left: Mapping[int, GroundOperator], settled: set[str])
 
 
 def _about(task: Task) -> Mapping[str, Sequence[int]]:
-    """Return a mapping from each object to the literals and bounds about it."""
+    """Return, for each object, the literals and bounds that contain it."""
     about: dict[str, list[int]] = {}
     for one in task.ways.touching:
         for thing in task.numbering.objects[one]:
@@ -195,7 +196,7 @@ def _about(task: Task) -> Mapping[str, Sequence[int]]:
 
 
 class _Exchange:
-    """The replacement of `name` by `other`, with the operator that covered each one, for the next problem."""
+    """The replacement of `name` by `other`; keeps the proof for each operator for the next problem."""
 
     def __init__(self, name: str, other: str, task: Task) -> None:
         self._name, self._other, self._ways = name, other, task.ways
@@ -204,7 +205,7 @@ class _Exchange:
         self._proofs: dict[int, tuple[GroundOperator, int, GroundOperator]] = {}
 
     def covers(self, positions: Iterable[int], left: Mapping[int, GroundOperator]) -> bool:
-        """Return whether an operator about `other` is as good as each of these operators, which mention `name`."""
+        """Return whether, for each of these operators about `name`, an operator about `other` is as good."""
         proofs = self._proofs
         for i in positions:
             proof = proofs.get(i)
@@ -234,7 +235,7 @@ class _Exchange:
         return False
 
     def _of_same_step(self, i: int) -> Sequence[int]:
-        """Return the operators of the step with `other` instead of `name`."""
+        """Return the operators of the step in which `other` replaces `name`."""
         step = self._ways.all[i].step
         if step is None:
             return self._ways.of_step.get(None, ())

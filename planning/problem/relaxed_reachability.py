@@ -1,9 +1,9 @@
-"""Relaxed reachability: the facts and operators possible without deletes, updated incrementally after a change.
+"""Relaxed reachability: the facts and operators that are possible without deletes, updated after a change.
 
-The next problem starts from other facts, but mostly reaches the same ones. Each fact is kept with the operator that
-reached it first; all needs of that operator come before the fact. A fact that no longer holds initially is proven
-again, or is gone. Each fact that only an impossible operator reached then needs another operator. The search starts
-from scratch if a bounded number of tests cannot decide.
+The next problem starts from other facts, but mostly reaches equal facts. Each reached fact is kept with the operator
+that reached it first; all needs of that operator were reached before the fact. If a fact no longer holds initially, it
+is proven again or removed. If an operator becomes impossible, each fact that it reached needs another operator. If a
+limited number of tests cannot decide, the search starts from the beginning.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from dataclasses import dataclass, field
 from planning.problem.task import GroundOperator, Numbering, Task
 from planning.quantities import helps
 
-_GIVEN = -1  # instead of an operator: the fact holds initially
+_GIVEN = -1  # replaces the position of an operator if the fact holds initially
 _DEEPEST = 50
-_MOST_LOOKS = 3000  # at operators; more tests take longer than a search from scratch
+_MOST_LOOKS = 3000  # tested operators; more tests take longer than a new search
 
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """The relaxed reachable facts and operators.
+    """The facts and operators that are reachable without deletes.
 
     Attributes:
-        facts: the literals, bounds and fluents reached, each after the needs of its operator, with the operator's
-            position.
-        taken: by position, whether an operator is possible (1) or not (0).
+        facts: the reached literals, bounds and fluents, each with the position of the operator that reached it. The
+            needs of that operator come earlier.
+        taken: for each position, whether the operator is possible (1) or not (0).
     """
 
     facts: Mapping[int, int]
@@ -34,7 +34,7 @@ class Reach:
 
 
 def reachable(task: Task) -> Reach:
-    """Return the relaxed reachable set; a bound is possible once a number can change towards it."""
+    """Return the set reachable without deletes; a bound is possible if a number can change in its direction."""
     last: list[Reach] = task.ways.known("reach", list)
     found = _Again(last[0], task).reach() if last and not task.numbering.supports else None
     last[:] = [found or _worked_out(task)]
@@ -77,13 +77,13 @@ def _helped(bounds: Iterable[int], way: GroundOperator, numbering: Numbering) ->
 
 @dataclass(slots=True)
 class _Again:
-    """The incremental update of an earlier relaxed reachable set.
+    """The update of the reachable set of an earlier task.
 
     Attributes:
-        before: the earlier result.
+        before: the result for the earlier task.
         task: the task with other initial facts.
-        proven: facts proven from the new initial facts alone, with their operators.
-        gone: facts that are no longer reachable.
+        proven: the facts that follow from the new initial facts, each with its operator.
+        gone: the facts that are no longer reachable.
         looks: the number of operators that may still be tested.
     """
 
@@ -94,7 +94,7 @@ class _Again:
     looks: int = _MOST_LOOKS
 
     def reach(self) -> Reach | None:
-        """Return the same result as a search from scratch; `None` if a bounded number of tests cannot decide."""
+        """Return the result of a new search; `None` if a limited number of tests cannot decide."""
         task, before, users = self.task, self.before.facts, self.task.ways.users
         given = set(task.init)
         fresh = [one for one in given if one not in before]
@@ -113,14 +113,14 @@ class _Again:
         return Reach({**dict.fromkeys(task.init, _GIVEN), **proven, **kept}, taken)
 
     def _regained(self, lost: int, given: set[int]) -> bool:
-        """Return whether a fact that is no longer initial is proven or certainly gone."""
+        """Return whether a fact that no longer holds initially is proven or certainly unreachable."""
         if lost not in self.task.ways.adders:
             self.gone.add(lost)
             return True
         return self._proves(lost, given, ())
 
     def _proves(self, fact: int, given: set[int], path: tuple[int, ...]) -> bool:
-        """Return whether initial and proven facts prove this one; with `False` it may still be reachable."""
+        """Return whether initial and proven facts prove this fact; after `False` the fact may still be reachable."""
         if fact in given or fact in self.proven:
             return True
         if fact in path or len(path) == _DEEPEST:
@@ -142,7 +142,7 @@ class _Again:
         return False
 
     def _left(self, given: set[int]) -> bytearray:
-        """Return the operators possible without the facts in `gone`; extend `gone` by facts without operators."""
+        """Return the operators that are possible without the facts in `gone`; add facts without operators to `gone`."""
         ways, taken, agenda = self.task.ways, bytearray(self.before.taken), list(self.gone)
         while agenda:
             for i in ways.users.get(agenda.pop(), ()):
@@ -156,7 +156,7 @@ class _Again:
         return taken
 
     def _instead(self, taken: bytearray, given: set[int]) -> dict[int, int] | None:
-        """Return another operator for each fact whose operator became impossible; `None` if one is not found."""
+        """Return another operator for each fact whose operator became impossible; `None` if a fact has none."""
         before, old = self.before.facts, self.before.taken
         instead: dict[int, int] = {}
         hit = [

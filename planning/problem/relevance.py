@@ -1,4 +1,4 @@
-"""Relevance for a goal (S1.5; exact, like `reduction`), and relevant constructs that engines cannot plan with."""
+"""Relevance for a goal (S1.5; exact, as in `reduction`), and relevant constructs that engines do not support."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Relevant:
     """The relevant part of a domain for a goal.
 
     Attributes:
-        actions: the planning actions that change a predicate or function that a goal or relevant condition reads.
-        changing: the predicates that these actions change, and those changed functions that a condition or cost reads.
+        actions: the planning actions that change a predicate or function that the goal or a relevant condition reads.
+        changing: the predicates that these actions change, and the changed functions that a condition or cost reads.
     """
 
     actions: tuple[PlanningAction, ...]
@@ -30,7 +30,7 @@ class Relevant:
 
 
 def relevant(goal: Expression, metric: Term | None, actions: Iterable[PlanningAction]) -> Relevant:
-    """Return the actions that change what the goal or another relevant action reads; `metric` adds none."""
+    """Return the actions that change what the goal or a relevant action reads; `metric` adds functions, not actions."""
     actions, needed = tuple(actions), frozenset(names_of(goal))
     while True:
         found = tuple(action for action in actions if needed & changed(action.effect))
@@ -47,7 +47,7 @@ def relevant(goal: Expression, metric: Term | None, actions: Iterable[PlanningAc
 
 
 def _amounts(leaves: Iterable[Add | Delete | NumericEffect], of: Collection[str]) -> list[list[str]]:
-    """Return the names in each amount assigned to these functions."""
+    """Return the names in each amount that is assigned to one of these functions."""
     return [names_of(one.value) for one in leaves if isinstance(one, NumericEffect) and name_of(one) in of]
 
 
@@ -55,12 +55,12 @@ def refuse_unsupported(goal: Expression, actions: Iterable[PlanningAction], deri
     """Raise an error if the goal or a relevant action has a condition that no engine can foresee.
 
     Args:
-        goal: the expanded goal.
-        actions: the relevant actions of the derivation's domain.
+        goal: the goal, with derived predicates expanded.
+        actions: the relevant actions, with derived predicates expanded.
         derived: the derivation of the domain.
 
     Raises:
-        UnsupportedGoalError, UnsupportedActionError: with the condition, the reason and the place.
+        UnsupportedGoalError, UnsupportedActionError: the message contains the condition, the reason and the place.
     """
     schema = derived.domain.schema
     content = {name for name in derived.changing & schema.functions.keys() if schema.result(name) != "number"}
@@ -88,7 +88,7 @@ def _unforeseeable(e: Expression, derived: Derivation, content: set[str]) -> Ite
 
 
 def _read_by(atom: Atom, derived: Derivation) -> Iterator[Expression | Term]:
-    """Yield the expressions that actions change and that a computed atom reads, directly or through others."""
+    """Yield the changeable expressions that a computed atom reads, directly or through other computed atoms."""
     computed = derived.domain.schema.computed
     for read in computed[atom.predicate].inputs(atom.args) if atom.predicate in computed else ():
         for part in inside(read):
@@ -103,9 +103,9 @@ class Construct:
     """A condition on numbers that actions change.
 
     Attributes:
-        owner: `the goal`, or the planning action with the condition.
+        owner: `the goal`, or the planning action that contains the condition.
         text: the condition, in PDDL.
-        place: its place in the source file.
+        place: the place of the condition in the source file.
     """
 
     owner: str
@@ -113,13 +113,13 @@ class Construct:
     place: Place | None
 
     def __str__(self) -> str:
-        """One line: `jars.pddl:7:9: planning action 'pour' compares numbers that actions change: (> (litres ?a) 0)`."""
+        """Return one line, e.g. `jars.pddl:7:9: planning action 'pour' compares numbers ...: (> (litres ?a) 0)`."""
         said = f"{self.owner} compares numbers that actions change: {self.text}"
         return f"{self.place}: {said}" if self.place else said
 
 
 def numeric_constructs(domain: PlanningDomain, goal: Expression) -> Iterator[Construct]:
-    """Yield the numeric conditions relevant to `goal`: the goal's own first, then those of actions."""
+    """Yield the numeric conditions that are relevant to `goal`: first those of the goal, then those of actions."""
     derived = derivation(domain)
     goal = derived.expand(goal)
     matters = relevant(goal, None, derived.domain.actions.values())
@@ -133,12 +133,12 @@ def numeric_constructs(domain: PlanningDomain, goal: Expression) -> Iterator[Con
 
 
 def why_no_engine(domain: PlanningDomain, goal: Expression, nobody: NobodyCan) -> str:
-    """Return in one line the construct that no installed engine supports, its place, and an engine to install.
+    """Return one line: the construct that no installed engine supports, its place, and an engine to install.
 
     Args:
         domain: the planning domain.
         goal: the condition to reach.
-        nobody: the engine selection's answer.
+        nobody: the refusal by the choice of engines.
     """
     construct = next(numeric_constructs(domain, goal), None)
     return nobody.message if construct is None else f"{construct}; {nobody.who}"

@@ -1,4 +1,4 @@
-"""A ground problem in numbers, which are compared and looked up faster than values, and the `Problem` made from it."""
+"""A ground problem in numbers, since numbers are compared and looked up faster than facts; and its `Problem`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from planning.quantities import Assignment, NumericBound, fluents, worth
 from planning.strips import GroundAction, Problem
 
 NOT = "not "
-"""The prefix of a predicate for a negative literal (positive normal form). No declared name has a blank."""
+"""The prefix of the predicate of a complementary fact (positive normal form). No declared name has a blank."""
 
 
 _T = TypeVar("_T")
@@ -24,7 +24,7 @@ _V = TypeVar("_V")
 
 
 class LazyTable(dict[int, _V]):
-    """A mapping that computes each entry on first access."""
+    """A mapping that computes each value on first access."""
 
     def __init__(self, work_out: Callable[[int], _V]) -> None:
         super().__init__()
@@ -39,12 +39,12 @@ class Numbering:
     """A growing table of numbers for literals, bounds and fluents; a number never changes its meaning.
 
     Attributes:
-        facts: number -> the literal in positive normal form.
-        bounds: number -> the bound.
+        facts: the literal of each number, in positive normal form.
+        bounds: the bound of each number.
         fluents: the numbers of numeric fluents.
-        objects: number -> the objects that the literal, bound or fluent is about.
-        wants: bound -> the fluents in it.
-        supports: fluent -> the bounds with it.
+        objects: the objects that the literal, bound or fluent of each number contains.
+        wants: the fluents of each bound.
+        supports: the bounds with each fluent.
     """
 
     def __init__(self) -> None:
@@ -73,7 +73,7 @@ class Numbering:
         return number
 
     def named(self, number: int) -> Fact | NumericBound:
-        """Return the fact or bound of the number; a negative literal has the fact that it denies."""
+        """Return the fact or bound of the number; for a negative literal, the negated fact."""
         return self._named[number >> 1]
 
     def _fact(self, number: int) -> Fact:
@@ -95,14 +95,14 @@ class Numbering:
         for predicate, listed in self._by_predicate.items():
             if predicate in computed:
                 held.update([number + (not is_so(Fact(predicate, args), world)) for number, args in listed])
-            else:  # one query for all: most facts of the predicate have a number
+            else:  # one query for all facts, since most facts of the predicate have a number
                 known = set(world.match(predicate, (None,) * len(listed[0][1])))
                 for number, args in listed:
                     held.add(number + (args not in known))
         return held
 
     def images(self, name: str, other: str) -> Mapping[int, int]:
-        """Return a mapping from each literal to the same literal about `other` instead of `name`."""
+        """Return a mapping from each literal to the literal with `other` instead of `name`."""
         if (name, other) not in self._images:
             self._images[name, other] = LazyTable(lambda number: self._renamed(number, name, other))
         return self._images[name, other]
@@ -143,16 +143,16 @@ _MOST_KNOWN = 16
 
 
 class GroundOperator(NamedTuple):
-    """One variant of a ground action in numbers; a tuple, since each problem makes thousands.
+    """One variant of a ground action in numbers; a tuple, since each problem has thousands of operators.
 
     Attributes:
-        step: the step; `None` for bookkeeping.
+        step: the plan step; `None` for a bookkeeping action.
         needs: literals and bounds that must hold before.
-        adds: literals that hold afterwards, and fluents that it changes.
+        adds: literals that hold afterwards, and fluents that the operator changes.
         deletes: literals that no longer hold afterwards.
-        assignments: the changes of these fluents.
-        cost: `None` if its change of the metric is not a cost.
-        number: an identity that the operator keeps when pruning removes parts of it.
+        assignments: the changes of the fluents.
+        cost: the cost; `None` if the operator's change of the metric is not a cost.
+        number: an identity, which stays the same when pruning removes parts of the operator.
     """
 
     step: PlanStep | None
@@ -168,21 +168,21 @@ Key = tuple[str, tuple[str, ...]] | None
 
 
 def key(step: PlanStep | None) -> Key:
-    """Return the step by value, which is hashed much faster than the step."""
+    """Return action and arguments of the step as a tuple, because a tuple is hashed faster than a step."""
     return None if step is None else (step.action, step.args)
 
 
 class OperatorIndex:
-    """Ground operators in order, with indexes built on first use; positions refer to operators."""
+    """Ground operators in order, with indexes that are computed on first use; an index contains positions."""
 
     def __init__(self, ways: Sequence[GroundOperator]) -> None:
         self.all = ways
         self._known: dict[Hashable, Any] = {}
 
     def known(self, key: Hashable, work_out: Callable[[], _T]) -> _T:
-        """Return the cached result for `key`, or compute and cache it."""
+        """Return the cached result for `key`, or compute and cache the result of `work_out`."""
         found: _T = self._known.pop(key) if key in self._known else work_out()
-        self._known[key] = found  # the latest is evicted last
+        self._known[key] = found  # at the end, so that the least recently used result is evicted first
         if len(self._known) > _MOST_KNOWN:
             del self._known[next(iter(self._known))]
         return found
@@ -194,32 +194,32 @@ class OperatorIndex:
 
     @cached_property
     def users(self) -> Mapping[int, Sequence[int]]:
-        """Literal or bound -> the operators that need it."""
+        """The positions of the operators that need each literal or bound."""
         return _positions([way.needs for way in self.all])
 
     @cached_property
     def adders(self) -> Mapping[int, Sequence[int]]:
-        """Literal or fluent -> the operators that add or change it without needing it."""
+        """The positions of the operators that add each literal, or change each fluent, without needing it."""
         return _positions([[one for one in way.adds if one not in way.needs] for way in self.all])
 
     @cached_property
     def touching(self) -> Mapping[int, Sequence[int]]:
-        """Literal, bound or fluent -> the operators that need, add, change or delete it."""
+        """The positions of the operators that need, add, change or delete each literal, bound or fluent."""
         return _positions([{*way.needs, *way.adds, *way.deletes} for way in self.all])
 
     @cached_property
     def naming(self) -> Mapping[str, Sequence[int]]:
-        """Object -> the operators whose steps name it."""
+        """The positions of the operators whose step has each object as an argument."""
         return _positions([set(way.step.args) if way.step else set() for way in self.all])
 
     @cached_property
     def of_step(self) -> Mapping[Key, Sequence[int]]:
-        """Step, see `key` -> its operators."""
+        """The positions of the operators of each step; for the keys see `key`."""
         return _positions([(key(way.step),) for way in self.all])
 
 
 def _positions(those: Iterable[Iterable[_T]]) -> dict[_T, list[int]]:
-    """Return for each value the positions of the collections with it."""
+    """Return, for each value, the positions of the collections that contain it."""
     found: dict[_T, list[int]] = {}
     for i, values in enumerate(those):
         for value in values:
@@ -233,11 +233,11 @@ class Task:
 
     Attributes:
         numbering: the facts, bounds and fluents of the numbers.
-        init: literals and bounds that hold.
-        goal: literals and bounds to reach.
+        init: the literals and bounds that hold initially.
+        goal: the literals and bounds to reach.
         ways: the ground operators.
-        left: position of an operator -> its relevant part; `None` before pruning.
-        settled: literals and bounds that pruning removed, since they hold in every reachable state.
+        left: the relevant part of each operator, by position; `None` before pruning.
+        settled: literals and bounds that pruning removed, because they hold in every reachable state.
     """
 
     numbering: Numbering
@@ -252,7 +252,7 @@ _MOST_KEPT = 20_000  # ground actions; a problem of 50 items has 3,000
 
 
 class Assembly:
-    """Makes problems from tasks that share a numbering and ground operators."""
+    """Constructor of problems from tasks that share a numbering and ground operators."""
 
     def __init__(self, numbering: Numbering) -> None:
         self._numbering = numbering
@@ -265,10 +265,10 @@ class Assembly:
 
         Args:
             domain: the name of the domain.
-            task: the pruned task, in numbers.
-            things: all objects with their types.
-            world: the source of the values of numeric fluents; `None` if the task has no fluents.
-            notes: remarks for readers.
+            task: the pruned task.
+            things: the type of each object, by the object's name.
+            world: the world with the values of numeric fluents; `None` if the task has no fluents.
+            notes: remarks for users.
         """
         init, _ = self._split(task.init)
         goal, bounds = self._split(task.goal)

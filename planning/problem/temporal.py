@@ -1,8 +1,8 @@
 """Construction of a temporal problem: ground actions with conditions and effects at start, over all and at end.
 
-Relaxed reachability runs over the two ends of an action. An end is possible if the start is, and if the conditions over
-all and at end can hold. A goal that is unreachable here stays unreachable with concurrent actions; the sequential
-relaxation cannot prove that.
+Relaxed reachability treats start and end of an action as two operators. An end is possible if the start is possible
+and the conditions over all and at end can hold. A goal that is unreachable here is also unreachable with concurrent
+actions; the problem with one action at a time cannot prove that.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from planning.problem.task import NOT, GroundOperator, OperatorIndex, Task, as_f
 from planning.strips import ActionSpan, GroundAction, Problem, UnsupportedActionError
 
 LONGEST = 1e6
-"""Upper bound in seconds of an action whose domain sets none."""
+"""The upper bound, in seconds, of the duration of an action without an upper bound in the domain."""
 
-_MOST_ALTERNATIVES = 64  # of one step
-_ENDS, _BEGUN = " ends", "begun "  # with blanks, which no declared name contains
+_MOST_ALTERNATIVES = 64  # alternatives of one step
+_ENDS, _BEGUN = " ends", "begun "  # the blanks distinguish the names from every declared name
 
 
 class _NotOfFactsError(Exception):
-    """The temporal problem needs numeric conditions or a disjunctive goal, which no temporal engine here supports."""
+    """Error: the problem needs numeric conditions or a disjunctive goal, which no supported temporal engine handles."""
 
 
 def durative(domain: PlanningDomain, goal: Expression) -> bool:
-    """Return whether durative actions matter for the goal, in which derived predicates have been replaced."""
+    """Return whether durative actions matter for the goal; derived predicates in it must have been replaced."""
     if all(action.timed is None for action in domain.actions.values()):
         return False
     return any(action.timed is not None for action in _relevant(domain, goal).actions)
@@ -50,20 +50,20 @@ def durative(domain: PlanningDomain, goal: Expression) -> bool:
 def build_temporal_problem(
     domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit
 ) -> Problem | None:
-    """Return the problem with durations; `None` if it has numeric conditions or a disjunctive goal.
+    """Return the problem with durations; `None` if it contains numeric conditions or a disjunctive goal.
 
     Args:
-        domain: without derived predicates, as `planning.problem.derived.derivation` has it.
-        world: the present, with derived facts.
+        domain: the domain without derived predicates, see `planning.problem.derived.derivation`.
+        world: the present world, with derived facts.
         goal: the condition to reach, without derived predicates.
         patience: the limit of the work.
 
     Raises:
-        WorkLimitError: the limit is reached.
+        WorkLimitError: the limit has passed.
     """
     matters = _relevant(domain, goal)
     actions = {action.name: domain.actions[action.name] for action in matters.actions}
-    # Durations read functions too.
+    # The bounds of durations read functions too.
     changing = matters.changing.union(*(changed(action.effect) for action in matters.actions))
     try:
         wanted = _literals(Grounder(world, matters.changing, keep_false=True, patience=patience).residual(goal, {}))
@@ -78,7 +78,7 @@ def build_temporal_problem(
 
 
 def _relevant(domain: PlanningDomain, goal: Expression) -> Relevant:
-    """Return the relevant part of the domain; an action has its conditions and effects of all times."""
+    """Return the relevant part of the domain; each action has its conditions and effects of all times."""
     return relevant(goal, None, map(_whole, domain.actions.values()))
 
 
@@ -99,7 +99,7 @@ def _literals(wanted: Residual) -> tuple[Literal, ...]:
 
 
 def _start(action: PlanningAction) -> PlanningAction:
-    """Return the start of an action as an instantaneous action; one without duration is unchanged."""
+    """Return the start of a durative action as an instantaneous action; any other action unchanged."""
     timed = action.timed
     return action if timed is None else replace(action, precondition=timed.start, effect=timed.start_effect)
 
@@ -117,7 +117,7 @@ def _possible(
     world: World,
     patience: WorkLimit,
 ) -> tuple[list[PlanStep], tuple[str, ...]]:
-    """Return the relaxed reachable steps, and the goal literals that are unreachable."""
+    """Return the steps that are reachable without deletes, and the goal literals that are not."""
     actions = tuple(actions)
     later = [one for action in actions if action.timed for one in _end(action, action.timed.over_all, action.timed.end)]
     ends = replace(matters, actions=(*map(_start, actions), *later))
@@ -146,14 +146,14 @@ def _possible(
 
 @dataclass(frozen=True, slots=True)
 class _Grounding:
-    """Makes ground actions of possible steps."""
+    """Constructor of the ground actions of possible steps."""
 
     actions: Mapping[str, PlanningAction]
     grounder: Grounder
     world: World
 
     def of(self, step: PlanStep) -> Iterator[GroundAction]:
-        """Yield one action for each alternative; one alternative over all holds for the whole duration."""
+        """Yield an action for each alternative; one alternative over all holds for the whole duration."""
         action = self.actions[step.action]
         bindings = {p.name: arg for p, arg in zip(action.parameters, step.args, strict=True)}
         starts = list(variants(_start(action), bindings, self.grounder))
@@ -201,7 +201,7 @@ def _facts(leaves: Iterable[Leaf]) -> tuple[Fact, ...]:
 
 
 def _restricted(name: str, actions: list[GroundAction], goal: tuple[Fact, ...], world: World) -> Problem:
-    """Return the problem without facts that no condition reads, or that hold and that no action deletes."""
+    """Return the problem without facts that no condition reads, and without facts that hold and are never deleted."""
     asked = dict.fromkeys([*goal, *(fact for action in actions for fact in _needed(action))])
     gone = {fact for action in actions for fact in (*action.deletes, *(action.span.deletes if action.span else ()))}
     present = [fact for fact in asked if _holds(fact, world)]
