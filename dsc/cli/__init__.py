@@ -1,1 +1,1 @@
-"""Commands `dsc plot`, `dsc runs` and `dsc view`; each imports its work when called, so that help stays light."""
+"""Commands `dsc plot`, `dsc runs` and `dsc view`; each imports its modules when called, so that `--help` is fast."""

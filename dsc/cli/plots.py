@@ -1,4 +1,4 @@
-"""`dsc plot`: check, show and draw action plots from the command line."""
+"""Command `dsc plot`: check, show, draw, convert, compare and clone action plots."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ app = typer.Typer(
 )
 
 BAD_INPUT = 2
-"""Exit status of `check` with findings, and of bad input to any command."""
+"""Exit status of `check` with findings, and of every command with invalid input."""
 UNKNOWN_PLOT = "known plot"
-"""The rule of findings that an unreadable neighbouring file may cause."""
+"""The rule of findings that may result from an unreadable neighbouring file."""
 MAX_BROKEN = 3
-"""Number of those files that are named."""
+"""Maximum number of unreadable neighbouring files that are reported."""
 PIPE_WIDTH = 160
 """Columns of a tree that is not printed on a terminal."""
 
@@ -61,9 +61,10 @@ def check(
     json: Annotated[bool, typer.Option("--json", help="Print a JSON list of findings.")] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Warnings count, too.")] = False,
 ) -> None:
-    """Say what is wrong with plots, one finding a line; also what is allowed and hardly meant, as warnings.
+    """Report the mistakes of plots, one finding per line; warnings report forms that are allowed but rarely intended.
 
-    A plot may use the other plots in its folder. Exit status: 0 nothing found, or warnings alone, 2 findings.
+    A plot may use the other plots in its folder. Exit status: 0 without findings, or with warnings only; 2 with
+    findings.
     """
     from dsc.components.robot import robot_of
     from dsc.text.plot_files import Neighbours
@@ -107,7 +108,7 @@ def show(
         shown = library.expanded(plot) if expanded else plot
         drawing = "" if out is None else draw(plot, library)
     except UnknownNameError as error:
-        # A missing plot may be in an unreadable file; then the error names the file.
+        # A missing plot may be in an unreadable file; then the error identifies the file.
         raise (broken or [error])[0] from None
     if out is not None:
         out.write(drawing)
@@ -124,7 +125,7 @@ def import_(
         str, typer.Option("--out", metavar="FILE.yaml", help="Where the plot goes; - is standard output.")
     ] = "-",
 ) -> None:
-    """Read an SCXML chart as a plot of dialect `scxml`; name constructs that a plot lacks."""
+    """Read an SCXML chart as a plot of dialect `scxml`; report constructs that a plot cannot express."""
     from dsc.dynamic.library import Library
     from dsc.scxml.reader import parse_scxml
     from dsc.text.plot_files import plot_to_yaml
@@ -144,7 +145,7 @@ def export(
     to: Annotated[str, typer.Option("--to", metavar="FORM", help="scxml, mermaid, plantuml or svg.")],
     out: Annotated[str, typer.Option("--out", metavar="OUT", help="Where it goes; - is standard output.")] = "-",
 ) -> None:
-    """Write a plot in another form; name constructs that the form lacks."""
+    """Write a plot in another form; report constructs that the form cannot express."""
     from dsc.drawing import draw
     from dsc.scxml.writer import to_scxml
     from dsc.text.plot_files import Neighbours, load_plot
@@ -177,7 +178,7 @@ def diff(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print a JSON list of differences.")] = False,
 ) -> None:
-    """Say what is different between two plots. Exit status: 0 nothing, 1 something."""
+    """Report the differences between two plots. Exit status: 0 without differences, 1 with differences."""
     from dsc.drawing.svg import above
     from dsc.text.plot_difference import differences, draw_difference
     from knowledge_base.output_files import Output
@@ -206,7 +207,7 @@ def clone(
         list[Path] | None, typer.Option("--profile", metavar="P.yaml", help="A profile to be cloned with them.")
     ] = None,
 ) -> None:
-    """Clone a plot for another robot, with all plots that it depends on; clones that were made before are used."""
+    """Clone a plot for another robot, with all plots that it depends on; existing clones are used."""
     from dsc.text.cloning import clone_files, write_clones
 
     found = clone_files(file, prefix, into, profile or ())
@@ -231,7 +232,7 @@ def schema(
 def _findings(
     file: Path, domain: Path | None, neighbours: Neighbours, components: tuple[Component, ...] | None
 ) -> list[Finding]:
-    """Findings about one file; an unreadable file is one finding."""
+    """Return the findings about one file; an unreadable file is one finding."""
     from dsc.validation import review_plot, validate_plot
 
     known = _schema(file, domain)
@@ -249,7 +250,7 @@ def _findings(
 
 
 def _load(file: Path) -> ActionPlot:
-    """A plot, whose file says by its name if it is a chart in SCXML."""
+    """Return the plot in a file; the file is read as SCXML if its name ends in `.scxml`."""
     from dsc.scxml.reader import parse_scxml
     from dsc.text.plot_files import load_plot
     from dsc.text.yaml import read_file
@@ -284,7 +285,7 @@ def _as_data(file: Path, finding: Finding) -> dict[str, Any]:
 
 
 def _files(library: Library) -> list[Path]:
-    """Files of its plots."""
+    """Return the files from which the plots of a library were read."""
     places = [plot.place(("plot",)) for plot in library]
     return [Path(place.source) for place in places if place is not None and place.source]
 

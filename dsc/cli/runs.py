@@ -1,6 +1,6 @@
 """Commands `dsc runs` and `dsc view`: inspect kept runs, and show a run in the browser; they only read the store.
 
-`page` shows a page of `dsc run --view`, too: its address is printed before the content exists.
+Function `page` also shows the page of `dsc run --view`: it prints the address before the run has begun.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Store = Annotated[Path, typer.Argument(metavar="FILE", help="The store.")]
 Number = Annotated[int | None, typer.Option("--run", min=1, help="Which run.  [default: the last one]")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 MOST_COMPLAINTS = 5
-"""Upper bound of damaged records named on the terminal; the rest is counted."""
+"""Maximum number of damaged records that are reported on the terminal; further ones are counted."""
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 picks a free one.")]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
 P = TypeVar("P", "LivePage", "Viewer")
@@ -53,7 +53,7 @@ def list_(file: Store, as_json: AsJson = False) -> None:
 
 @app.command()
 def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
-    """Print the macrosteps of a run, one a line, and the running skills of an unfinished run."""
+    """Print the macrosteps of a run, one per line, and the running skills of an unfinished run."""
     from dsc.runs.archive import archive
 
     with archive(file) as runs:
@@ -73,7 +73,10 @@ def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
 
 @app.command()
 def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
-    """Replay the messages of a run and compare the results. Exit status: 0 the same, 1 a difference."""
+    """Replay the messages of a run and compare the results.
+
+    Exit status: 0 without a difference, 1 with a difference.
+    """
     from dsc.sequencer.replay import replay as again
 
     done = again(file, run)
@@ -89,7 +92,7 @@ def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
 
 @app.command()
 def check(file: Store) -> None:
-    """Check that each row of a store, runs and knowledge, is as written; it reads all rows."""
+    """Check that each row of a store, of runs and of knowledge, is as it was written; the command reads all rows."""
     from dsc.runs.archive import archive
     from knowledge_base.journal.archive import Archive
 
@@ -105,7 +108,7 @@ def view_command(
     port: Port = 0,
     no_open: NoOpen = False,
 ) -> None:
-    """Look at a recorded run, or at a store as others change it, in the browser; Ctrl-C ends it."""
+    """Show a recorded run, or a store while other programs change it, in the browser until Ctrl-C."""
     viewer_installed()
     from dsc.viewer.access import PageAddress
     from dsc.viewer.record_sources import records_of
@@ -125,7 +128,7 @@ def page(shown: P, *, opens: bool) -> Iterator[P]:
     if opens:
         import webbrowser
 
-        with suppress(webbrowser.Error):  # the address is printed: people can open it themselves
+        with suppress(webbrowser.Error):  # the address is printed, so that people can open it themselves
             webbrowser.open(shown.one_time_url)
     try:
         yield shown
@@ -143,7 +146,7 @@ def until_interrupt(viewer: LivePage | Viewer) -> None:
 
 
 def viewer_installed() -> None:
-    """Raise `InputError` unless the extra is installed."""
+    """Raise `InputError` unless the packages of the extra `viewer` are installed."""
     from importlib.util import find_spec
 
     missing = [name for name in ("starlette", "uvicorn", "websockets") if find_spec(name) is None]
@@ -172,7 +175,7 @@ def _open(runs: RunArchive, run: RunRow) -> list[dict[str, Any]]:
 
 
 def _taken(step: StepRow) -> str:
-    """The message of the macrostep, in the words of the trace."""
+    """Return the message of the macrostep, in the terms of the trace."""
     events = [one.data for one in step.records if one.type == "event"]
     if events:
         return f"{events[-1]['name']} ({events[-1]['source']})"
@@ -183,7 +186,7 @@ def _taken(step: StepRow) -> str:
 
 
 def _innermost(configuration: Iterable[str]) -> Iterator[str]:
-    """The active states without active states inside."""
+    """Yield the active states that have no active states inside them."""
     active = list(configuration)
     yield from (path for path in active if not any(other.startswith(path + "/") for other in active))
 
@@ -196,7 +199,7 @@ def _step_form(step: StepRow) -> dict[str, Any]:
 
 
 def _complain(file: Path, log: RecordLog) -> None:
-    """Name on the terminal the records that the page cannot show."""
+    """Report on the terminal the damaged records, which the page cannot show."""
     for complaint in log.complaints[:MOST_COMPLAINTS]:
         typer.echo(complaint, err=True)
     if (more := len(log.complaints) - MOST_COMPLAINTS) > 0:
