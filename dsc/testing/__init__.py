@@ -1,6 +1,6 @@
-"""Tools for tests of plots: rehearsals, substitutes, predicates over steps, coverage; faults, crashes and invariants.
+"""Tools for tests of plots: rehearsals, substitutes, predicates over steps, coverage, faults, crashes and invariants.
 
-No other room of the project imports it.
+No other package of the project imports this one.
 """
 
 from knowledge_base._lazy import lazy_exports

@@ -15,17 +15,17 @@ from knowledge_base.errors import InputError, Place, UnknownNameError
 
 
 class Coverage:
-    """Counts over many runs, one run after another.
+    """Counter of the reached parts of plots, over many runs in sequence.
 
-    A substitute of a plot (`Library.substitute`) does not count for the original. A rule counts in its plot, also when
-    it answered in a generated plot that inherited it.
+    A substitute of a plot (`Library.substitute`) does not count for the original. A rule counts in the plot that
+    declares it, also when it handled a failure in a generated plot that inherited it.
 
     Args:
         plots: the library, or its plots.
-        only: names of the plots to be covered; by default all.
+        only: names of the plots to cover; by default all plots.
 
     Raises:
-        UnknownNameError: `only` names a missing plot.
+        UnknownNameError: `only` has the name of a missing plot.
     """
 
     def __init__(self, plots: Iterable[ActionPlot], only: Collection[str] = ()) -> None:
@@ -33,14 +33,14 @@ class Coverage:
         wanted = [self._library.plot(name) for name in only] or list(self._library)
         self._items = {plot.name: {item.key: item for item in items_of(plot)} for plot in wanted}
         self._reached: set[tuple[str, Key]] = set()
-        self._inside: dict[str, str | None] = {}  # path of the host state -> plot; None if not covered
+        self._inside: dict[str, str | None] = {}  # path of the host state -> plot; None if the plot is not covered
         self._seen: dict[int, tuple[ActionPlot, bool]] = {}
 
     def add(self, *steps: Step) -> None:
-        """Count the contents of the steps; also a listener for `Sequencer.listen`.
+        """Count the states, transitions and rules of the steps; the method is also a listener for `Sequencer.listen`.
 
         Raises:
-            InputError: the steps of a run before these are missing.
+            InputError: the steps begin in the middle of a run.
         """
         for micro in (micro for step in steps for micro in step.microsteps):
             for taken in micro.taken:  # a transition precedes the plots that it binds
@@ -51,18 +51,18 @@ class Coverage:
                 self._count(self._holding(holder), ("state", name, ()))
 
     def missing(self, plot: str | None = None) -> tuple[CoverageItem, ...]:
-        """Return the missed items, in the order of plots and texts; of one plot, or of all.
+        """Return the missed items of one plot, or of all plots, in the order of the plots and their texts.
 
         Raises:
-            UnknownNameError: that plot is not covered.
+            UnknownNameError: the plot is not covered.
         """
         return tuple(item for name in self._names(plot) for item in self._missing(name))
 
     def count(self, plot: str, kind: Kind) -> tuple[int, int]:
-        """Return the numbers of reached and of all states, transitions or rules of a plot.
+        """Return two numbers of a plot's states, transitions or rules: the reached ones, and all.
 
         Raises:
-            UnknownNameError: that plot is not covered.
+            UnknownNameError: the plot is not covered.
         """
         (name,) = self._names(plot)
         keys = [key for key in self._items[name] if key[0] == kind]
@@ -70,7 +70,7 @@ class Coverage:
 
     @property
     def ratio(self) -> float:
-        """The reached share of all items, from 0 to 1; 1 without items."""
+        """The number of reached items divided by the number of all items, from 0 to 1; 1 without items."""
         reached, total = self._total()
         return reached / total if total else 1.0
 
@@ -81,10 +81,10 @@ class Coverage:
         return "\n".join([head.rstrip(), *(line for name in self._items for line in self._lines(name, width))])
 
     def assert_complete(self, at_least: float = 1.0) -> None:
-        """Raise `AssertionError` with the report if the reached share is smaller.
+        """Raise `AssertionError` with the report if `ratio` is smaller than `at_least`.
 
         Args:
-            at_least: from 0 to 1.
+            at_least: the required ratio, from 0 to 1.
         """
         if self.ratio < at_least:
             reached, total = self._total()
@@ -93,7 +93,7 @@ class Coverage:
             )
 
     def to_json(self) -> dict[str, Any]:
-        """Return, for each plot, the number of reached items and the missed ones, with file and line."""
+        """Return, for each plot, the number of reached items and the missed items, with file and line."""
         return {
             name: {
                 **{f"{kind}s": dict(zip(("reached", "all"), self.count(name, kind), strict=True)) for kind in KINDS},
@@ -107,7 +107,7 @@ class Coverage:
         if taken.rule is None:
             self._count(self._holding(holder), ("transition", source, taken.place))
             return
-        # The innermost plot around has the rule: a generated plot inherits its holder's.
+        # The innermost covered plot around the state has the rule, as a generated plot inherits its host's rules.
         key: Key = ("rule", taken.rule, ())
         for around in _outwards(holder):
             name = self._holding(around)
@@ -122,7 +122,7 @@ class Coverage:
     def _is_ours(self, plot: ActionPlot) -> bool:
         if plot.name not in self._items:
             return False
-        kept = self._seen.get(id(plot))  # the same object comes often; only its first time needs a comparison of texts
+        kept = self._seen.get(id(plot))  # one object occurs often; only the first time needs a comparison of texts
         if kept is None or kept[0] is not plot:
             kept = (plot, self._library.expanded(self._library.plot(plot.name)) == plot)
             self._seen[id(plot)] = kept
@@ -160,7 +160,7 @@ class Coverage:
 
 
 def _outwards(path: str) -> Iterator[str]:
-    """Yield the path of the state that holds a plot, then of the one around it, and so on outwards."""
+    """Yield the path of a plot's host state, then of the host state around it, and so on to the outermost plot."""
     yield path
     while path:
         path = path.rpartition("/")[0]
@@ -170,7 +170,10 @@ def _outwards(path: str) -> Iterator[str]:
 Kind = Literal["state", "transition", "rule"]
 KINDS: tuple[Kind, ...] = ("state", "transition", "rule")
 Key = tuple[Kind, str, Path]
-"""Kind, name (a state's, a transition's source state's, a rule's label), and a transition's place in its state."""
+"""Kind, name, and a transition's place in its state.
+
+The name is a state's, the source state's of a transition, or a rule's label.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,10 +181,10 @@ class CoverageItem:
     """A part of a plot that a run may reach.
 
     Attributes:
-        key: its identity within its plot.
-        text: its short name.
-        path: its path in the plot's form.
-        place: its place in the text, if the plot was read from one.
+        key: identity of the item within its plot.
+        text: description of the item if it was missed.
+        path: path of the item in the plot's form.
+        place: place of the item in the text; `None` if the plot was not read from a text.
     """
 
     key: Key
@@ -191,11 +194,11 @@ class CoverageItem:
 
     @property
     def kind(self) -> Kind:
-        """A state, a transition or a rule."""
+        """Kind of the item: state, transition or rule."""
         return self.key[0]
 
     def __str__(self) -> str:
-        """Return one line with place and name."""
+        """Return one line with place and text."""
         return f"{self.place or '/'.join(map(str, self.path))}: {self.text}"
 
     def to_json(self) -> dict[str, Any]:
@@ -208,8 +211,8 @@ class CoverageItem:
 def items_of(plot: ActionPlot) -> Iterator[CoverageItem]:
     """Yield all items of a plot in its written form, in document order; rules with equal labels are one item.
 
-    The expansion of a rule adds no items: a rule is one item, for any number of states. A history stands for other
-    states and is never entered itself.
+    The expansion of a rule adds no items: a rule is one item, for any number of states. A history state is not an item,
+    as it refers to other states and is never entered itself.
     """
     for name, state, path in plot.walk():
         if not isinstance(state, HistoryState):

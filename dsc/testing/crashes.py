@@ -1,7 +1,7 @@
-"""Crashes of runs with a store at critical moments, and their recovery until the run ends.
+"""Crashes of runs with a store at critical points, and their recovery until the run ends.
 
-`kill -9` leaves the files in their present state. A crash therefore copies the files at the boundary and abandons the
-old program; a new one resumes the run from the copy.
+`kill -9` leaves the files in their present state. A simulated crash therefore copies the files at that point and
+abandons the old program; a new program resumes the run from the copy.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ KILLED = "killed"
 DISK_FULL = "disk full"
 OVERTAKEN = "overtaken"
 _AFTER_COMMIT = (KILLED, KILLED, DISK_FULL, OVERTAKEN, OVERTAKEN)
-"""Faults between commit and dispatch; repeated entries are more likely."""
+"""Faults between commit and dispatch; repeated entries are more probable."""
 _REACHED = (KILLED, OVERTAKEN)
 """Faults outside a commit."""
 _Result = TypeVar("_Result")
@@ -34,11 +34,11 @@ _Component = TypeVar("_Component", bound=Component)
 
 
 class Killed(SystemExit):
-    """The program ends here."""
+    """The simulated end of the program."""
 
 
 class Crashes(Generic[_Result]):
-    """Runs a program with crashes, life after life, until the run has ended.
+    """Executor of a program with crashes, which restarts the program until its run has ended.
 
     A crash may happen at these boundaries:
 
@@ -46,19 +46,20 @@ class Crashes(Generic[_Result]):
     - after a component's action, when its answer is not committed yet;
     - at every call of `reached`.
 
-    After a commit, the disk may be full from then on; SQLite reports it. Except before a commit, another program may
-    take over the run, as on a file system without locks. It runs to the end, while the old program continues unaware.
+    After a commit, the disk may become full; SQLite then reports an error at each write. At each boundary other than a
+    commit's beginning, another program may take over the run, as on a file system without locks. That program runs to
+    the end, while the old program continues to write.
 
     Args:
-        folder: each life has a separate folder inside.
-        seed: of all draws.
-        chance: of a crash at each boundary, in [0, 1].
-        most: crashes of a run, so that it ends.
+        folder: parent of the folders of all program executions.
+        seed: the seed of all draws.
+        chance: probability of a crash at each boundary, in [0, 1].
+        most: maximum number of crashes of a run, so that the run ends.
 
     Attributes:
         fired: number of each fault at each boundary, with keys such as `killed after commit`.
-        problems: writes of an old program after the takeover.
-        life: the number of the current life, from 0.
+        problems: descriptions of writes by an old program after the takeover.
+        life: the number of the present program execution, from 0.
     """
 
     def __init__(self, folder: Path, seed: int, chance: float = 0.02, most: int = 3) -> None:
@@ -78,18 +79,18 @@ class Crashes(Generic[_Result]):
 
     @property
     def folder(self) -> Path:
-        """Folder of the present life: it has the files of the life before, and keeps all files for the next one."""
+        """Folder of the present program execution, with the files of the execution before."""
         return self._root / f"life{self.life}"
 
     def survive(self, live: Callable[[Path], _Result]) -> _Result:
-        """Run `live` in life after life, and return its final result.
+        """Execute `live` repeatedly until the run ends, and return the final result.
 
         Args:
-            live: starts the run in that folder, or resumes the one there, and runs it to its end. Data that outlive the
-                program, e.g. a simulated world, must be in files there.
+            live: starts the run in its argument, a folder, or resumes the run in it, and runs it to its end. Data that
+                outlast the program, e.g. a simulated world, must be in files of that folder.
 
         Raises:
-            StoreError: an error without a crash as its cause.
+            StoreError: a store failed without a simulated crash.
         """
         self._live = live
         self.folder.mkdir()
@@ -111,7 +112,7 @@ class Crashes(Generic[_Result]):
                 return result if self._heir is None else self._heir.result(self.problems)
 
     def watch(self, sequencer: Sequencer) -> None:
-        """Let crashes happen around the commits of this run; call it before the run starts or is resumed."""
+        """Enable crashes around the commits of this run; call this method before the run starts or is resumed."""
         store = sequencer.store
         assert store is not None  # noqa: S101  a run without a store cannot be resumed
         self._store = store.path
@@ -131,7 +132,7 @@ class Crashes(Generic[_Result]):
         store.writing.listen(boundary)
 
     def inject(self, component: _Component) -> _Component:
-        """Let crashes happen after this component's actions, before their answers are committed; return it."""
+        """Enable crashes after this component's actions, before their answers are committed; return the component."""
         execute = component.execute
 
         async def carried_out(skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
@@ -143,7 +144,7 @@ class Crashes(Generic[_Result]):
         return component
 
     async def reached(self, boundary: str) -> None:
-        """Let the program be killed or overtaken here."""
+        """Kill the program at this boundary, or let another program take over, if the draw decides so."""
         happens = self._drawn(boundary, _REACHED)
         if happens == OVERTAKEN:
             self._overtake()
@@ -168,27 +169,27 @@ class Crashes(Generic[_Result]):
         self._heir = _Heir(self._store, self._live, self.folder)
 
     def _leave_behind(self) -> None:
-        """Copy the files for the next life; the dying program has no further crashes."""
+        """Copy the files for the next program execution; the present one has no further crashes."""
         self._calm = True
         _copy(self.folder, self._root / f"life{self.life + 1}")
 
 
 class _Heir(Generic[_Result]):
-    """Another program that has run a run to its end, while the first still writes as its owner."""
+    """A second program that has executed a run to its end, while the first program still writes as its owner."""
 
     def __init__(self, store: Path, live: Callable[[Path], _Result] | None, folder: Path) -> None:
         assert live is not None  # noqa: S101  `survive` has set it
         self._store = store
         self._results: list[_Result] = []
         for lock in folder.glob("*-lock"):
-            lock.unlink()  # as on a file system that knows no locks
+            lock.unlink()  # as on a file system without locks
         thread = threading.Thread(target=lambda: self._results.append(live(folder)), daemon=True)
         thread.start()
         thread.join()
         self._left = _told(store)
 
     def result(self, problems: list[str]) -> _Result:
-        """Return its result; add a problem if the old program has written since."""
+        """Return the second program's result; add a problem if the first program has written since."""
         if _told(self._store) != self._left:
             problems.append("an old sequencer has written to a run that another had taken over")
         if not self._results:

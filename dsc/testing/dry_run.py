@@ -1,4 +1,4 @@
-"""Dry run of the machine alone: events by hand, and a clock that moves on command; without skills and loop."""
+"""Dry run of the machine alone: tests send events and advance a clock, without skills and without an event loop."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class _Due:
-    """A pending event; an exit of its activation, its skill's answer or a withdrawal drops it.
+    """A pending event.
 
-    `action_id` identifies the skill, `sent` the plot instance and the id for a withdrawal.
+    It is dropped when its activation is exited, its skill answers, or its `send` is revoked. `action_id` identifies the
+    skill; `sent` has the plot instance and the id for a revocation.
     """
 
     at: float
@@ -39,16 +40,16 @@ class _Due:
 
 
 class DryRun:
-    """A started plot that waits for calls of the test.
+    """A started plot that reacts only to method calls of the test.
 
     Args:
         plots: the library, or its plots.
-        plot: the name of the one to run.
-        arguments: values for its parameters.
+        plot: the name of the plot to run.
+        arguments: values for the plot's parameters.
         knowledge: the world model, which the plot changes; by default an empty one.
 
     Attributes:
-        library: its plots.
+        library: the available plots.
         machine: the machine, with its state.
         knowledge: the world model.
         now: seconds since the start.
@@ -92,19 +93,20 @@ class DryRun:
         return tuple(event for step in self.steps for event in step.emitted)
 
     def send(self, event: str, /, **attributes: Any) -> Step:
-        """Send an event from outside to all states."""
+        """Send an event from outside to all states; return the step."""
         return self._send(Event(event, attributes))
 
     def answer(
         self, skill: str, event: str, attributes: Mapping[str, Any] | None = None, *, observed: Delta | str = ""
     ) -> Step:
-        """End a running skill (`component.skill`; the one started first, if there are several) with an outcome.
+        """End a running skill with an outcome, and return the step.
 
         Args:
-            skill: its name.
-            event: its outcome, under the skill's own name for it.
+            skill: `component.skill`; of several running executions, the first started one ends.
+            event: the outcome, by the skill's own name for it.
             attributes: the event's attributes.
-            observed: knowledge that comes with it: a change, or a PDDL effect in which `?name` stands for an argument.
+            observed: the outcome's observations: a change, or a PDDL effect. In an effect, `?name` is the value of an
+                argument of the skill.
 
         Returns:
             The step; if it is not `handled`, a sequencer would end the run.
@@ -121,19 +123,26 @@ class DryRun:
         return self._send(Event(start.names.get(event, event), attributes or {}, to=start.activation))
 
     def change(self, what: Delta | str, author: str = "somebody") -> Step:
-        """Change the knowledge from outside: a change, or a PDDL effect on the present world."""
+        """Change the knowledge from outside, and return the step.
+
+        Args:
+            what: a change, or a PDDL effect on the present world.
+            author: the change's author.
+        """
         self.knowledge.apply(change_of(what, self.knowledge), author)
         return self._send(None)
 
     def leave(self) -> Step:
-        """End the run from outside: exit all active states, whose exit actions stop the components."""
+        """End the run from outside: exit all active states, whose exit actions stop the components; return the step."""
         return self._keep(self.machine.leave(self._situation()))
 
     def advance(self, seconds: float) -> tuple[Step, ...]:
-        """Advance the time; pending events come in order, a skill beyond its time limit ends with `timed_out`.
+        """Advance the time; return the steps of pending events, which are sent in order of their times.
+
+        A skill that exceeds its deadline ends with `timed_out`.
 
         Raises:
-            InputError: time does not go backwards.
+            InputError: `seconds` is negative.
         """
         if seconds < 0:
             raise InputError(f"time does not go backwards: {seconds:g} s")

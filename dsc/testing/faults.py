@@ -1,7 +1,8 @@
-"""Faults of components, planners, sequencers and networks, and the order of simultaneous messages.
+"""Faults of components, planners, sequencers and networks, and permutations of simultaneous messages.
 
-Each is a function of the seed and of its subject; no draw depends on the number of earlier draws. A resumed run, whose
-actions keep their ids, therefore meets the same faults again. A seed suffices to reproduce a failure.
+Each fault is a function of the seed and of the fault's subject; no draw depends on the number of earlier draws. A
+resumed run keeps the ids of its actions, and therefore has the same faults again. A seed suffices to reproduce a
+failure.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ from knowledge_base.facts import Delta
 SOMEBODY = "somebody"
 """Author of the changes by others."""
 LATE = 5.0
-"""Upper bound in seconds of the delay of an answer, an event or another's change."""
+"""Maximum delay in seconds of an answer, an event or a change by another author."""
 AT_THE_END = 0.5
-"""Share of external changes and events during an action that come exactly at its end."""
+"""Share of external changes and events that arrive exactly at the end of an action; the others arrive during it."""
 DEAD = 20.0
-"""Seconds until a dead component is back."""
+"""Seconds until a dead component is alive again."""
 
 
 class Fault(StrEnum):
@@ -59,7 +60,7 @@ class Fault(StrEnum):
 
 
 USUAL = frozenset(Fault) - {Fault.ANSWER_LOST}
-"""Faults after which the plot knows what was done: the action had no effect, or its answer arrives at last."""
+"""Faults after which the plot can determine the effect: the action had no effect, or its answer finally arrives."""
 _OF_SKILLS = (
     Fault.SKILL_FAILS, Fault.SKILL_HANGS, Fault.COMPONENT_DIES, Fault.ANSWER_LATE, Fault.ANSWER_TWICE,
     Fault.ANSWER_LOST,
@@ -69,23 +70,23 @@ _Component = TypeVar("_Component", bound=Component)
 
 
 class InjectedError(Exception):
-    """A skill that failed by injection."""
+    """The injected failure of a skill."""
 
 
 class Faults:
-    """Draws faults, injects them, and records them.
+    """Source of faults: draws faults, injects them, and records them.
 
-    A skill that fails or hangs, and one whose component dies, has done nothing. A skill with a lost answer has done its
-    work and then hangs. Events (`@event`) come late, and so in another order, or twice. They are never lost, because a
-    plot might wait for one without end; `LossyTransport` models such losses.
+    A skill that fails or hangs, or whose component dies, has no effect. A skill with a lost answer has its full effect,
+    and then hangs. Events (`@event`) may arrive late, and so reordered, or twice. They are never lost, because a plot
+    might wait for an event without end; `LossyTransport` simulates such losses.
 
     Args:
-        seed: of all draws.
-        chance: of a fault for each call, each event and each planning problem, in [0, 1].
+        seed: the seed of all draws.
+        chance: probability of a fault for each call, each event and each planning problem, in [0, 1].
         kinds: the possible faults.
 
     Attributes:
-        fired: subject -> its fault; a resumed run that meets the fault again adds no entry.
+        fired: faults by subject; a fault that a resumed run repeats adds no entry.
 
     Raises:
         InputError: the chance is outside its range.
@@ -101,9 +102,12 @@ class Faults:
         self._at_end: dict[str, list[Callable[[], None]]] = {}
 
     def draw(self, subject: str, possible: Collection[Fault], part: float = 1.0) -> Fault | None:
-        """Return the fault of a subject, e.g. an action by its id, or `None`; `part` scales the chance.
+        """Return the fault of a subject, e.g. of an action by its id, or `None`; record the fault in `fired`.
 
-        The fault counts as fired.
+        Args:
+            subject: identifies the object of the draw.
+            possible: the kinds that apply to the subject.
+            part: factor for the probability.
         """
         kinds = [kind for kind in possible if kind in self.kinds]
         if not kinds or uniform(self.seed, subject, "fault") >= self.chance * part:
@@ -112,15 +116,15 @@ class Faults:
         return self.fired[subject]
 
     def share(self, subject: str) -> float:
-        """Return the subject's number in [0, 1), for the extent of its fault."""
+        """Return the subject's number in [0, 1), which determines the extent of its fault."""
         return uniform(self.seed, subject, "share")
 
     def counts(self) -> Counter[str]:
-        """Return the number of each kind that fired."""
+        """Return the number of drawn faults of each kind."""
         return Counter(map(str, self.fired.values()))
 
     def inject(self, component: _Component) -> _Component:
-        """Inject faults into all later actions of this component; return it."""
+        """Inject faults into all later actions of this component; return the component."""
         component.execute = _Injected(component, self)  # type: ignore[method-assign]
         return component
 
@@ -128,8 +132,8 @@ class Faults:
         """Let another author change the knowledge during actions, or exactly at their end.
 
         Args:
-            sequencer: of the run, before it starts.
-            changes: returns true changes that another author might make at that moment; one of them is made.
+            sequencer: the sequencer of the run, before the run starts.
+            changes: returns true changes that another author might make at that time; one of them is applied.
         """
 
         def hand_in(subject: str) -> None:
@@ -140,19 +144,19 @@ class Faults:
         self._during_actions(sequencer, Fault.KNOWLEDGE_CHANGED, "during", hand_in)
 
     def interrupt(self, sequencer: Sequencer, event: Event, part: float = 0.3) -> None:
-        """Let an event come from outside during actions or exactly at their end, e.g. an operator's `stop`.
+        """Post an event from outside during actions or exactly at their end, e.g. an operator's `stop`.
 
         Args:
-            sequencer: of the run, before it starts.
+            sequencer: the sequencer of the run, before the run starts.
             event: the event.
-            part: of the chance of other faults; a stopped run has few remaining faults.
+            part: factor for the probability, as a stopped run has few remaining faults.
         """
         self._during_actions(
             sequencer, Fault.INTERRUPTED, f"{event.name} during", lambda _: sequencer.post(event), part
         )
 
     def ended(self, action_id: str) -> None:
-        """Report the end of an action of a component with faults; trigger the faults at this moment."""
+        """Report the end of an action of a component with faults, which triggers the faults at its end."""
         for happen in self._at_end.pop(action_id, ()):
             asyncio.get_running_loop().call_soon(happen)
 
@@ -173,7 +177,7 @@ class Faults:
 
 
 class _Injected:
-    """Replaces a component's `execute`."""
+    """Replacement of a component's method `execute`."""
 
     def __init__(self, component: Component, faults: Faults) -> None:
         self._component = component
@@ -209,7 +213,7 @@ class _Injected:
             await _never(call)
 
     def _events(self, call: SkillCall) -> Callable[[Outcome], None]:
-        """Return a report function that delivers events with the delay or repetition drawn for each."""
+        """Return a report function that posts each event with its drawn delay or repetition."""
         number = 0
 
         def report(outcome: Outcome) -> None:
@@ -241,18 +245,18 @@ async def _never(call: SkillCall) -> NoReturn:
 
 
 class Interleaving:
-    """Shuffles messages of one moment of simulated time by a seed.
+    """Permutation of the messages of one simulated time, by a seed.
 
-    Before each macrostep it waits for all messages of the moment, and draws the source of the next one. Messages of one
-    source keep their order, as every communication pattern promises. Sources are the events and the answer of one
+    Before each macrostep, it waits for all messages of that time, and draws the source of the next message. Messages of
+    one source keep their order, as every communication pattern guarantees. Sources are the events and the answer of one
     action, the chart's timers, the changes of one author, and events from outside. Messages of different sources may
-    come in any order, such as an answer and its timeout.
+    arrive in any order, e.g. an answer and its timeout.
 
     Args:
-        seed: of all draws.
+        seed: the seed of all draws.
 
     Attributes:
-        turned: number of messages taken before an earlier one.
+        turned: number of messages handled before an earlier one.
     """
 
     def __init__(self, seed: int) -> None:
@@ -261,7 +265,7 @@ class Interleaving:
         self._turn = 0
 
     def attach(self, sequencer: Sequencer) -> None:
-        """Shuffle the messages of this sequencer; call it before its run starts or is resumed."""
+        """Permute the messages of this sequencer; call this method before its run starts or is resumed."""
 
         async def settle() -> None:
             await sequencer.clock.settled()
@@ -270,7 +274,7 @@ class Interleaving:
         sequencer.wait_before_events(settle)
 
     def _shuffled(self, waiting: Iterable[Message]) -> Iterable[Message]:
-        """Move one source to the front and keep the order of the others; the next macrostep draws again."""
+        """Move the first message of a drawn source to the front; the other messages keep their order."""
         messages = list(waiting)
         sources = list(dict.fromkeys(map(_source, messages)))
         if len(sources) > 1:
@@ -300,13 +304,13 @@ def _source(message: Message) -> str:
 
 
 class LossyTransport(LocalTransport):
-    """Loses, doubles, delays and so reorders frames; the same seed gives the same faults in simulated time.
+    """Transport that loses, duplicates, delays and so reorders frames; in simulated time, a seed reproduces the faults.
 
     Args:
-        seed: of all draws.
-        loss: chance that a frame is lost.
-        double: chance that one arrives twice.
-        delay: upper bound of a frame's delay in seconds.
+        seed: the seed of all draws.
+        loss: probability that a frame is lost.
+        double: probability that a frame arrives twice.
+        delay: maximum delay of a frame in seconds.
     """
 
     def __init__(self, seed: int, *, loss: float = 0.2, double: float = 0.2, delay: float = 0.1) -> None:
@@ -318,7 +322,7 @@ class LossyTransport(LocalTransport):
         self._sent: Counter[str] = Counter()
 
     def send(self, sender: str, to: str, frame: bytes) -> None:
-        """Send a frame with a separate draw of its faults: the same frame sent again has other faults."""
+        """Send a frame with separately drawn faults: a repetition of a frame has other faults."""
         name = hashlib.blake2b(f"{sender} {to} ".encode() + frame, digest_size=8).hexdigest()
         self._sent[name] += 1
         subject = f"{name} {self._sent[name]}"

@@ -1,4 +1,4 @@
-"""Fixtures of tests: world models in a line or two of PDDL, and stub plots that only end."""
+"""Fixtures of tests: world models in one or two lines of PDDL, and stub plots that only end."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def world(domain: Schema | Path | str = EMPTY, objects: str = "", facts: str = "
 
     Args:
         domain: a schema, a PDDL domain file, or its text.
-        objects: as after `:objects`, e.g. `"cup1 cup2 - cup table - surface"`.
-        facts: as after `:init`, e.g. `"(on cup1 table) (= (failures cup1) 2)"`.
+        objects: text as after `:objects`, e.g. `"cup1 cup2 - cup table - surface"`.
+        facts: text as after `:init`, e.g. `"(on cup1 table) (= (failures cup1) 2)"`.
 
     Raises:
         InputError: a name is not declared, or a text is not PDDL.
@@ -44,7 +44,7 @@ def change_of(what: Delta | str, knowledge: KnowledgeBase, bindings: Bindings | 
     """Return a change as a value; a PDDL effect such as `(not (on ?item table))` applies to the present world.
 
     Raises:
-        InputError: the text is not an effect, or names an undeclared or unbound element.
+        InputError: the text is not an effect, or refers to an undeclared or unbound element.
     """
     if isinstance(what, Delta):
         return what
@@ -59,15 +59,15 @@ def ends_with(
     tell: str | None = None,
     after: float = 0.0,
 ) -> ActionPlot:
-    """Return a plot with the original's interface and role that only ends; for `Library.substitute`.
+    """Return a plot that only ends, with the interface and role of the original; for `Library.substitute`.
 
     Args:
         original: the plot to replace.
         outcome: one of its outcome events, or `done`.
-        attributes: the event's attributes as in a plot: constants, or `?name` for a parameter; with `done`, values for
-            its outputs.
-        tell: a PDDL effect on the knowledge base, in place of the original's work.
-        after: seconds until it ends.
+        attributes: the event's attributes as in a plot: constants, or `?name` for a parameter. With `done`, these are
+            values of its outputs.
+        tell: a PDDL effect on the knowledge base, instead of the original's actions.
+        after: seconds until the plot ends.
 
     Raises:
         UnknownNameError: the original has no such outcome, or the outcome no such attribute.
@@ -96,7 +96,7 @@ def ends_with(
 
 
 def _output(output: PlotVariable) -> dict[str, Any]:
-    """Return an output with a value in every case; it is only read if the outcome is `done`."""
+    """Return an output that always has an initial value; the value is only read if the outcome is `done`."""
     nothing = 0 if output.type == "number" else "nothing"
     return {"type": output.type, "initial": nothing if output.initial is None else output.initial}
 
@@ -117,14 +117,14 @@ def _check(original: ActionPlot, outcome: str, given: Mapping[str, Any]) -> None
 def require_attributes(
     owner: str, outcome: str, declared: Collection[str], given: Collection[str], required: Iterable[str] | None = None
 ) -> None:
-    """Require that an outcome of a plot or skill carries its attributes.
+    """Require that an outcome of a plot or skill has its attributes.
 
     Args:
-        owner: the plot or skill.
-        outcome: its event.
+        owner: name of the plot or skill.
+        outcome: the outcome event.
         declared: names of all attributes.
         given: names of the attributes to validate.
-        required: names of the necessary ones, by default all.
+        required: names of the required attributes; by default all.
 
     Raises:
         UnknownNameError: an attribute is not declared.

@@ -25,8 +25,8 @@ class KeptRun:
 
     Attributes:
         path: the store.
-        ended: `finished` and `problem` of its end; `None` before the end.
-        steps: its macrosteps.
+        ended: `finished` and `problem` of the run's end; `None` before the end.
+        steps: the run's macrosteps.
         knowledge: the present knowledge; read only.
     """
 
@@ -37,22 +37,22 @@ class KeptRun:
 
     @property
     def records(self) -> Iterator[Record]:
-        """Yield the records of its trace, in order."""
+        """The records of the run's trace, in order."""
         return (record for step in self.steps for record in step.records)
 
     @property
     def started(self) -> list[str]:
-        """Return the ids of the started actions, in order, up to the last commit."""
+        """The ids of the started actions, in order, up to the last commit."""
         return [one.data["id"] for one in self.records if one.type == "action" and one.data["action"] == "start"]
 
 
 Invariant = Callable[[KeptRun], Iterable[str]]
-"""Yields a message for each violation."""
+"""Function that yields a message for each violation."""
 
 
 @contextmanager
 def kept_run(store: Path) -> Iterator[KeptRun]:
-    """Yield the last run of a store; raise `StoreError` if there is none."""
+    """Yield the last run of a store; raise `StoreError` if the store has no run."""
     with archive(store) as runs:
         run = runs.run()
         steps = tuple(runs.steps(run.number))
@@ -61,7 +61,7 @@ def kept_run(store: Path) -> Iterator[KeptRun]:
 
 
 def violations(store: Path, invariants: Iterable[Invariant]) -> list[str]:
-    """Return all violations in the last run of a store, or its damage; raise `StoreError` if there is none."""
+    """Return all violations in the last run of a store, or the store's damage; raise `StoreError` without a run."""
     try:
         with kept_run(store) as run:
             return [wrong for invariant in invariants for wrong in invariant(run)]
@@ -70,7 +70,7 @@ def violations(store: Path, invariants: Iterable[Invariant]) -> list[str]:
 
 
 def comes_to_an_end(seconds: float) -> Invariant:
-    """Require an end within this number of seconds of run time."""
+    """Require that the run ends within `seconds` of run time."""
 
     def invariant(run: KeptRun) -> Iterable[str]:
         last = run.steps[-1].time
@@ -83,13 +83,13 @@ def comes_to_an_end(seconds: float) -> Invariant:
 
 
 def executed_once(executed: Iterable[str]) -> Invariant:
-    """Require that each executed action, by id, was committed before, and executed once.
+    """Require that each executed action was committed before its execution, and executed one time.
 
     Args:
-        executed: an id for each execution.
+        executed: the action id of each execution.
 
     Raises:
-        InputError: it is a mapping or a set, which cannot contain an action twice.
+        InputError: `executed` is a mapping or a set, which cannot contain an id twice.
     """
     if isinstance(executed, Mapping | AbstractSet):
         raise InputError(f"executions form a sequence, with repeated ones; a {type(executed).__name__} has an id once")
@@ -110,7 +110,7 @@ def executed_once(executed: Iterable[str]) -> Invariant:
 
 
 def knows(facts: Iterable[Fact], predicates: Iterable[str]) -> Invariant:
-    """Require that the knowledge of these predicates equals the facts that hold in the world."""
+    """Require that the known facts of these predicates equal `facts`, which are true in the world."""
     true, judged = frozenset(facts), frozenset(predicates)
 
     def invariant(run: KeptRun) -> Iterable[str]:
@@ -124,7 +124,7 @@ def knows(facts: Iterable[Fact], predicates: Iterable[str]) -> Invariant:
 
 
 def claims_nothing_false(claims: Callable[[KeptRun], bool], *, reached: bool) -> Invariant:
-    """Require that the run claims the goal only when the world has reached it."""
+    """Require that the run claims its goal only if the world has reached the goal."""
 
     def invariant(run: KeptRun) -> Iterable[str]:
         if claims(run) and not reached:
@@ -134,17 +134,17 @@ def claims_nothing_false(claims: Callable[[KeptRun], bool], *, reached: bool) ->
 
 
 def one_history(run: KeptRun) -> Iterable[str]:
-    """Require that its macrosteps are consecutive: no other program has added any."""
+    """Require that the run's macrosteps are consecutive: no other program has added any."""
     numbers = [step.number for step in run.steps]
     if numbers != list(range(1, len(numbers) + 1)):
         yield f"its macrosteps are numbered {numbers}"
 
 
 def replays(library: Library | None = None) -> Invariant:
-    """Require that a replay of the messages gives the same results.
+    """Require that a replay of the messages has equal results.
 
     Args:
-        library: the plots at its start; by default those of the store.
+        library: the plots at the start of the run; by default those of the store.
     """
 
     def invariant(run: KeptRun) -> Iterable[str]:

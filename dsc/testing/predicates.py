@@ -1,7 +1,7 @@
 """Predicates over a step, or over all steps of a run, for use in `assert`.
 
-A state is named by its name or by its path from the outermost plot, e.g. `clear/execute/step_2`. A `Rehearsal` or a
-`DryRun` knows its library. Its predicates raise `UnknownNameError` for a state, trigger, rule or skill of no plot,
+A state is identified by its name or by its path from the outermost plot, e.g. `clear/execute/step_2`. A `Rehearsal` or
+`DryRun` has its library. Predicates over it raise `UnknownNameError` for a state, trigger, rule or skill of no plot,
 because they could never be true.
 """
 
@@ -24,11 +24,11 @@ from knowledge_base.language.syntax.text import parse_effect
 
 
 class HasSteps(Protocol):
-    """A run that keeps its steps and its plots: a `Rehearsal`, a `DryRun`."""
+    """A run with its steps and its plots, e.g. a `Rehearsal` or a `DryRun`."""
 
     @property
     def library(self) -> Iterable[ActionPlot]:
-        """All plots that it may have used."""
+        """All plots that the run may have used."""
         ...
 
     @property
@@ -38,7 +38,7 @@ class HasSteps(Protocol):
 
 
 Run = Step | Iterable[Step] | HasSteps
-"""Subject of a predicate: one step, several, or an object with steps."""
+"""Subject of a predicate: one step, several steps, or an object with steps."""
 
 
 def entered(run: Run, state: str) -> bool:
@@ -70,10 +70,10 @@ def took(
 
     Args:
         run: the steps.
-        source: the state it leaves.
-        trigger: its event, `after` or `always`.
-        target: the state it leads to.
-        rule: label of the contingency rule it comes from, e.g. `no_path: wait, retry`.
+        source: the transition's source state.
+        trigger: the transition's event, `after` or `always`.
+        target: the transition's target state.
+        rule: label of the contingency rule that generated the transition, e.g. `no_path: wait, retry`.
     """
     _check(run, source, target, trigger=trigger, rule=rule)
     return any(
@@ -86,18 +86,18 @@ def took(
 
 
 def consumed(run: Run, event: str, /, **attributes: Any) -> bool:
-    """Return whether a transition took such an event, from outside or inside; omitted attributes match any value."""
+    """Return whether a transition handled such an event, from outside or inside; omitted attributes match any value."""
     _check(run, trigger=event)
     return any(_is_event(micro.event, event, attributes) for micro in _microsteps(run))
 
 
 def ignored(run: Run, event: str, /, **attributes: Any) -> bool:
-    """Return whether such an event came and no transition took it."""
+    """Return whether such an event arrived and no transition handled it."""
     return any(_is_event(step.event, event, attributes) and not step.handled for step in _steps(run))
 
 
 def emitted(run: Run, event: str, /, **attributes: Any) -> bool:
-    """Return whether the outermost plot emitted such an outcome; see `consumed` for inner plots."""
+    """Return whether the outermost plot emitted such an outcome; for inner plots, see `consumed`."""
     return any(_is_event(one, event, attributes) for step in _steps(run) for one in step.emitted)
 
 
@@ -121,7 +121,7 @@ def configured(run: Run, parameter: str, value: Any) -> bool:
 
 
 def switched(run: Run, component: str, mode: str) -> bool:
-    """Return whether the component was put into the mode."""
+    """Return whether a chart switched the component to the mode."""
     return any(
         (output.component, output.mode) == (component, mode)
         for output in _outputs(run)
@@ -209,7 +209,7 @@ def _fact(form: Atom | Call) -> Fact:
 def _check(
     run: Run, *states: str | None, trigger: str | None = None, rule: str | None = None, skill: str | None = None
 ) -> None:
-    """Raise `UnknownNameError` for a name that cannot occur in a run with plots; a state may be given by its path."""
+    """Raise `UnknownNameError` for a name that cannot occur in a run with plots; a state may also be a path."""
     if isinstance(run, Step | Iterable):
         return
     bound = (bound.plot for micro in _microsteps(run) for bound in micro.bound)  # includes those of rules and planners
@@ -221,9 +221,9 @@ def _check(
 
 
 class _KnownNames:
-    """States, triggers, rules and skills (`component.skill`) of some plots.
+    """Names of the states, triggers, rules and skills (`component.skill`) of some plots.
 
-    With a plot that takes events by prefix (SCXML 3.12.1), any trigger is known.
+    If a plot handles events by prefix (SCXML 3.12.1), any trigger is known.
     """
 
     def __init__(self, plots: Iterable[ActionPlot]) -> None:

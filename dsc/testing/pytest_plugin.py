@@ -1,7 +1,8 @@
-"""Plugin for pytest, on request: `pytest_plugins = ["dsc.testing.pytest_plugin"]`.
+"""Plugin for pytest, enabled by `pytest_plugins = ["dsc.testing.pytest_plugin"]`.
 
-With `dsc_plots = FOLDER ...` in pytest's own settings, the fixture `plot_coverage` counts the steps that tests add
-during the session. The summary ends with its report. Each worker of pytest-xdist counts separately, without a report.
+With `dsc_plots = FOLDER ...` in pytest's settings, the fixture `plot_coverage` counts the steps that tests add during
+the session. The summary ends with the coverage report. Each worker of pytest-xdist counts separately, and prints no
+report.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ def plot_coverage(pytestconfig: pytest.Config) -> Coverage:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    """Print the report, if any test used the fixture."""
+    """Print the coverage report, if any test used the fixture."""
     coverage = config.stash.get(_COVERAGE, None)
     if coverage is not None:
         terminalreporter.section("plot coverage")

@@ -24,9 +24,9 @@ from knowledge_base.store import KnowledgeBase
 SOMEBODY = "somebody"
 """Author of the changes that a test makes."""
 A_DAY = 86400.0
-"""Seconds after which a rehearsal ends by default: every rehearsal ends."""
+"""Seconds after which a rehearsal ends by default, so that every rehearsal ends."""
 MOST_STEPS = 100_000
-"""Upper bound, also for a run in which time does not advance."""
+"""Maximum number of steps, also for a run in which time does not advance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Rehearsal:
     Attributes:
         library: the available plots.
         end: the end of the run.
-        seconds: its duration, in simulated time.
+        seconds: duration of the run, in simulated time.
         steps: all macrosteps; see `predicates`.
         calls: the calls of scripted skills, in order.
         records: the trace.
@@ -58,7 +58,7 @@ class Rehearsal:
 
     @property
     def problem(self) -> str | None:
-        """The reason why it did not, or an error of its last step."""
+        """The reason why the plot did not finish, or an error of its last step; else `None`."""
         return self.end.problem
 
     @property
@@ -80,24 +80,24 @@ def rehearse(
     changes: Iterable[tuple[float, Delta | str]] = (),
     until: float = A_DAY,
 ) -> Rehearsal:
-    """Run a plot to its end in simulated time, which takes almost no real time.
+    """Run a plot to its end in simulated time, which takes almost no real time; return the record of the run.
 
     Args:
         plots: the library, or its plots.
-        plot: the name of the one to run.
-        arguments: values for its parameters.
+        plot: the name of the plot to run.
+        arguments: values for the plot's parameters.
         skills: the answers of scripted skills; see `ScriptedSkills`.
         like: components with the signatures of the scripted skills.
-        components: others to be deployed, unchanged.
+        components: further components to deploy, unchanged.
         knowledge: the world model, which the run changes; see `world`. By default an empty one.
         events: events from outside, each with its second; a name alone has no attributes.
-        changes: changes of the knowledge by others, each with its second: a change, or a PDDL effect on the world at
-            the start.
-        until: seconds after which the run is ended, with that as its problem.
+        changes: changes of the knowledge by others, each with its second. A change is a `Delta`, or a PDDL effect on
+            the world at the start.
+        until: seconds after which the run is ended with a problem.
 
     Raises:
-        InputError: the plot is unknown, an argument is wrong, or an event or change is invalid. The script does not
-            match: a called skill has no answer, or an answer is not one of the skill's.
+        InputError: the plot is unknown, an argument is wrong, or an event or change is invalid. Or the script does not
+            match: a called skill has no answer, or the skill does not declare the answer.
         Exception: an exception of a function of the script, e.g. a failed assertion about its call.
     """
     known = knowledge if knowledge is not None else world()

@@ -1,4 +1,4 @@
-"""Components with scripted skills, which answer by the test's script and record their calls."""
+"""Components with scripted skills, which answer as the test's script declares and record their calls."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ class ScriptedSkills:
 
     Args:
         knowledge: the world model of the run; effects in answers apply to it.
-        script: `component.skill` -> its answers.
-        like: components to imitate: their skills accept only the declared arguments and give only declared answers. A
+        script: answers by skill (`component.skill`).
+        like: components to imitate: their skills accept only declared arguments and return only declared answers. A
             component outside this list accepts any arguments.
 
     Attributes:
-        components: replacements for the real ones, to be deployed.
+        components: the replacements of the real components, to be deployed.
         calls: the calls, in order.
         problems: mismatches of script and run, and exceptions of the script's functions; see `check`.
 
     Raises:
-        InputError: the script names a skill, outcome or attribute that a component in `like` does not have.
+        InputError: the script has a skill, outcome or attribute that a component in `like` lacks.
     """
 
     def __init__(self, knowledge: KnowledgeBase, script: Mapping[str, Replies], like: Iterable[Component] = ()) -> None:
@@ -47,9 +47,9 @@ class ScriptedSkills:
                     component.check(skill, replies.known)
 
     def check(self) -> None:
-        """Raise the first problem: a call without an answer, an answer that is not the skill's, a failed assertion.
+        """Raise the first problem, if any: a missing answer, an undeclared answer, or a failed assertion.
 
-        To the plot such a skill has merely failed, and the plot may handle the failure.
+        For the plot, a skill with such a problem has merely failed, and the plot may handle the failure.
         """
         if self.problems:
             raise self.problems[0]
@@ -59,7 +59,7 @@ class ScriptedSkills:
 
         Raises:
             UnknownNameError: the script does not have the skill.
-            InputError: it has no further answer.
+            InputError: the skill's script has no further answer.
         """
         self.calls.append(call)
         if call.skill not in self._replies:
@@ -68,21 +68,21 @@ class ScriptedSkills:
 
 
 class _ScriptedComponent(Component):
-    """One component of the script, which imitates another's skills or is free."""
+    """One component of the script, which imitates the skills of another component, or accepts any call."""
 
     def __init__(self, name: str, script: ScriptedSkills, imitated: Mapping[str, SkillSignature] | None) -> None:
         super().__init__(name)
         self._script = script
         self._imitates = imitated is not None
         self._signatures = dict(imitated or {})
-        self._outcomes: dict[str, dict[str, dict[str, str | None]]] = {}  # of a free one; they grow with its answers
+        self._outcomes: dict[str, dict[str, dict[str, str | None]]] = {}  # of a free component; its answers extend it
 
     def skills(self) -> dict[str, SkillSignature]:
-        """Return the imitated skills, or the known ones of the script."""
+        """Return the imitated skills, or the skills of the script that are known so far."""
         return self._signatures
 
     async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-        """Wait for the scripted time, and answer."""
+        """Wait for the scripted duration, and return the scripted outcome."""
         made = Call(f"{self.name}.{skill_name}", dict(arguments), call.clock.now())
         answer = self._reply(skill_name, made)
         if isinstance(answer, Exception):
@@ -106,10 +106,10 @@ class _ScriptedComponent(Component):
         return answer
 
     def check(self, skill: str, answers: Iterable[Answer]) -> None:
-        """Check an answer of the skill; a free one may give any answer, and declares it from now on.
+        """Check answers of the skill; a component that imitates no other declares any answer from now on.
 
         Raises:
-            InputError: the skill does not have this answer.
+            InputError: the imitated skill does not have this answer.
         """
         name = skill.partition(".")[2]
         if not self._imitates and name not in self._signatures:
@@ -129,7 +129,7 @@ class _ScriptedComponent(Component):
         except Exception as problem:
             self._script.problems.append(problem)
             raise
-        self.check(call.skill, (answer,))  # a free one declares it again: attributes may differ
+        self.check(call.skill, (answer,))  # a free component declares it again: attributes may differ
         return Outcome(answer.event, answer.attributes, observed)
 
 
@@ -145,12 +145,12 @@ class Answer:
     """The end of a scripted skill.
 
     Attributes:
-        event: its outcome event.
+        event: the outcome event.
         attributes: the event's attributes.
-        after: its duration in seconds of run time; `math.inf` means that it never ends by itself.
-        observed: knowledge that comes with the outcome: a change, or a PDDL effect. In an effect such as
-            `(holding ?item)`, `?name` stands for an argument of the call.
-        reports: its intermediate reports, each `after` the one before.
+        after: duration in seconds of run time; `math.inf` means that the skill never ends by itself.
+        observed: the outcome's observations: a change, or a PDDL effect. In an effect such as `(holding ?item)`,
+            `?name` is the value of an argument of the call.
+        reports: intermediate reports; `after` of each counts from the report before.
     """
 
     event: str
@@ -170,9 +170,12 @@ class Call:
 
 
 Reply = str | Answer | Exception
-"""An answer; an outcome's name alone takes one second; an exception is raised, as by a defective skill."""
+"""An answer of a scripted skill.
+
+An outcome's name alone is an answer after one second. An exception is raised, as by a defective skill.
+"""
 Replies = Reply | Sequence[Reply] | Callable[[Call], Reply]
-"""The same answer to every call, one for each call in order, or the result of a function of the call."""
+"""One answer to every call, a sequence with an answer for each call, or a function of the call."""
 
 
 class RepliesOfSkill:
@@ -220,10 +223,10 @@ class RepliesOfSkill:
 
 
 def check_outcome(skill: str, signature: SkillSignature, answer: Answer) -> None:
-    """Raise an error if a skill of that signature cannot give the answer.
+    """Raise an error if a skill of that signature cannot return the answer.
 
     Raises:
-        UnknownNameError: it has no such outcome, or the outcome no such attribute.
+        UnknownNameError: the skill has no such outcome, or the outcome no such attribute.
         InputError: an attribute is missing.
     """
     if answer.event not in signature.outcomes:

@@ -1,4 +1,4 @@
-"""Test suite for any transport: subclass `TransportSuite` in a test file, with a function that creates a transport.
+"""Test suite for any transport: subclass `TransportSuite` in a test file, with a method that creates a transport.
 
     class TestZenoh(TransportSuite):
         run = staticmethod(run_real)
@@ -6,8 +6,8 @@
         def transport(self) -> Transport:
             return ZenohTransport()
 
-Two endpoints, or a hosted component and its user, talk over one transport. The suite checks the promises of the
-patterns, so that a transport may lose, double, delay and reorder frames.
+Two endpoints, or a hosted component and its client, communicate over one transport. The suite tests the guarantees of
+the communication patterns. A transport may therefore lose, duplicate, delay and reorder frames.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 
 PATIENCE = 20.0
-"""Seconds of loop time within which each promise must be kept."""
+"""Seconds of loop time within which each guarantee must be fulfilled."""
 
 
 class SuiteRobot(Component):
-    """Has every kind of port."""
+    """A component with every kind of port."""
 
     name = "robot"
     modes = ("scanning", "resting")
@@ -56,7 +56,7 @@ class SuiteRobot(Component):
 
     @skill(outcomes={"there": {"to": None}, "passed": {"n": "number"}})
     async def go(self, call: SkillCall, to: str, steps: int = 3) -> Outcome:
-        """Report each step."""
+        """Report each step, and end at the destination."""
         self.log.append(f"go {to}")
         try:
             for n in range(steps):
@@ -74,7 +74,7 @@ class SuiteRobot(Component):
 
     @query({"n": "number"})
     async def doubled(self, n: float) -> dict[str, Any]:
-        """Answer."""
+        """Return the doubled number."""
         return {"n": 2 * n}
 
     @event({"level": "number"})
@@ -93,7 +93,7 @@ class SuiteRobot(Component):
 
 
 class Laser(Component):
-    """Publishes values."""
+    """A component that publishes values."""
 
     name = "laser"
     scan = Push({"metres": "number"})
@@ -106,7 +106,7 @@ class Laser(Component):
 
 
 class Mapper(Component):
-    """Subscribes to values."""
+    """A component that subscribes to values."""
 
     name = "mapper"
     scan = Stream("laser.scan", {"metres": "number"})
@@ -114,7 +114,7 @@ class Mapper(Component):
 
 
 async def until(holds: Callable[[], bool]) -> None:
-    """Wait until a condition holds; fail after `PATIENCE`."""
+    """Wait until `holds()` is true; fail after `PATIENCE` seconds."""
     async with asyncio.timeout(PATIENCE):
         while not holds():  # noqa: ASYNC110  # the condition may have no event
             await asyncio.sleep(0.05)
@@ -133,7 +133,7 @@ async def running(*work: Coroutine[Any, Any, None]) -> AsyncIterator[list[asynci
 
 
 def in_loop(test: Callable[[TransportSuite], Coroutine[Any, Any, None]]) -> Callable[[TransportSuite], None]:
-    """Make a test of a coroutine method, which the suite's `run` executes."""
+    """Convert a coroutine method to a test, which the suite's `run` executes."""
 
     @wraps(test)
     def tested(suite: TransportSuite) -> None:
@@ -143,10 +143,10 @@ def in_loop(test: Callable[[TransportSuite], Coroutine[Any, Any, None]]) -> Call
 
 
 class TransportSuite:
-    """The promises of the patterns.
+    """The guarantees of the communication patterns, as tests.
 
     Attributes:
-        run: runs a coroutine; `run_real` for a transport that needs real time.
+        run: runs a coroutine; use `run_real` for a transport that needs real time.
     """
 
     run: Callable[[Coroutine[Any, Any, Any]], Any] = staticmethod(run_simulated)
@@ -159,7 +159,7 @@ class TransportSuite:
 
     @in_loop
     async def test_a_call_is_carried_out_once_and_answered(self) -> None:
-        """The number of its frames does not matter."""
+        """Each call is executed one time, for any number of frames."""
         transport, done = self.transport(), []
         server, client = Endpoint("server", transport), Endpoint("client", transport)
 
@@ -178,7 +178,7 @@ class TransportSuite:
 
     @in_loop
     async def test_what_cannot_be_done_is_refused_with_the_reason(self) -> None:
-        """Cases: a handler that raises, an unknown kind, an answer other than plain data."""
+        """Cases: a handler that raises an error, an unknown kind, an answer that is not plain data."""
         transport = self.transport()
         server, client = Endpoint("server", transport), Endpoint("client", transport)
 
@@ -196,7 +196,7 @@ class TransportSuite:
 
     @in_loop
     async def test_a_call_has_a_timeout(self) -> None:
-        """Cases: a missing endpoint, and one that has left."""
+        """Cases: an endpoint that never existed, and a closed one."""
         transport = self.transport()
         client, gone = Endpoint("client", transport), Endpoint("gone", transport)
         await gone.close()
@@ -208,7 +208,7 @@ class TransportSuite:
 
     @in_loop
     async def test_nothing_is_shared_by_accident(self) -> None:
-        """Messages are encoded, at any distance."""
+        """Messages are encoded, also inside one process."""
         transport, kept = self.transport(), []
         server, client = Endpoint("server", transport), Endpoint("client", transport)
 
@@ -225,7 +225,7 @@ class TransportSuite:
 
     @in_loop
     async def test_who_came_back_is_somebody_new(self) -> None:
-        """Its calls are separate from those of its earlier life."""
+        """The calls of a restarted endpoint are separate from its earlier calls."""
         transport, done = self.transport(), []
         server = Endpoint("server", transport)
 
@@ -244,7 +244,7 @@ class TransportSuite:
 
     @in_loop
     async def test_the_newest_value_arrives_and_time_never_runs_backwards(self) -> None:
-        """*Push newest*: values may be lost, never go back, and the last one arrives."""
+        """*Push newest*: values may be lost, arrive in order, and the last one arrives."""
         transport = self.transport()
         seen: list[int] = []
         mine, theirs = Endpoint("user", transport), Endpoint("laser", transport)
@@ -276,7 +276,7 @@ class TransportSuite:
 
     @in_loop
     async def test_a_component_that_pushes_is_one_like_any_other(self) -> None:
-        """Its ports share its address with its skills, and its users find them."""
+        """A component's push ports and skills share its address, and remote components find both."""
         transport, laser, mapper = self.transport(), Laser(), Mapper()
         host, other = Host(laser, transport, LoopClock()), Host(mapper, transport, LoopClock())
         remote = await RemoteComponent.connect("laser", transport, PATIENCE)
@@ -294,7 +294,7 @@ class TransportSuite:
 
     @in_loop
     async def test_a_stream_of_something_else_is_refused_with_the_reason(self) -> None:
-        """Case: the published type differs from the subscribed one."""
+        """Case: the publisher lacks a value of the subscription."""
         transport, mapper = self.transport(), Mapper()
         mapper.scan = mapper.streams["scan"] = Stream("laser.scan", {"meters": "number"})
         hosts = [Host(one, transport, LoopClock()) for one in (Laser(), mapper)]
@@ -305,7 +305,7 @@ class TransportSuite:
 
     @in_loop
     async def test_a_publisher_that_came_back_is_heard(self) -> None:
-        """It restarts its count; its subscribers find it."""
+        """The publisher restarts its count, and its subscribers receive its values again."""
         transport = self.transport()
         subscription = Subscription(Endpoint("user", transport), "laser", "scan")
         async with running(subscription.run()):
@@ -330,7 +330,7 @@ class TransportSuite:
 
     @in_loop
     async def test_a_skill_reports_in_order_and_ends_once(self) -> None:
-        """The outcome has its observations; a repeated request with the same id executes nothing."""
+        """The outcome has its observations; a repeated request with an equal id executes nothing."""
         async with self._robot() as (robot, remote, _):
             assert remote.skills() == robot.skills()
             assert robot.life.state is Life.ALIVE
@@ -362,7 +362,7 @@ class TransportSuite:
 
     @in_loop
     async def test_a_silent_death_is_noticed_and_a_return_too(self) -> None:
-        """The skill fails, the component is in FatalError; the next skill finds it again."""
+        """The skill fails, and the component is in FatalError; the next skill connects to it again."""
         transport, robot = self.transport(), SuiteRobot()
         host = Host(robot, transport, LoopClock())
         remote = await RemoteComponent.connect("robot", transport, PATIENCE)
@@ -398,7 +398,7 @@ class TransportSuite:
 
     @in_loop
     async def test_whom_a_component_needs_is_said_when_it_changes(self) -> None:
-        """Either its user or the component itself has made the change."""
+        """Cases: its client has changed the mode, or the component itself has."""
         async with self._robot() as (robot, remote, _):
             assert remote.needed() == ()
             await remote.change_mode("scanning")
@@ -411,7 +411,7 @@ class TransportSuite:
 
     @in_loop
     async def test_what_a_component_needs_is_waited_for_and_missed(self) -> None:
-        """Cases: deployed here or with the component; late, lost without a message, and back again."""
+        """Cases: a required component is local or remote, is deployed late, is lost without a message, and returns."""
         transport, robot, clock = self.transport(), SuiteRobot(), LoopClock()
         robot.mode = "scanning"
         host = Host(robot, transport, clock)
@@ -441,7 +441,7 @@ class TransportSuite:
 
     @in_loop
     async def test_an_event_comes_once_for_each_time_it_happens(self) -> None:
-        """Events come in order, until the deactivation."""
+        """Events arrive in order, until the deactivation."""
         async with self._robot() as (robot, remote, _):
             heard: list[Any] = []
             call = SkillCall("a6.0", LoopClock(), lambda outcome: heard.append(outcome.attributes["level"]))
@@ -455,7 +455,7 @@ class TransportSuite:
 
     @in_loop
     async def test_a_hosted_component_is_active_while_it_is_needed(self) -> None:
-        """It takes its resources, and frees them."""
+        """The component acquires its resources, and releases them."""
         transport, told = self.transport(), []
 
         class Camera(Component):
@@ -476,7 +476,10 @@ class TransportSuite:
 
     @in_loop
     async def test_components_are_active_while_somebody_active_needs_them(self) -> None:
-        """Activation goes from the root down, in any order of arrival, and ends with the need or the activator."""
+        """Activation proceeds from the root downwards, in any order of arrival.
+
+        It ends with the need or the activator.
+        """
         transport = self.transport()
         active: set[str] = set()
         needs = {"root": ["arm"], "arm": ["motor"], "motor": [], "camera": []}
