@@ -150,7 +150,7 @@ class InputError(Exception):
         return nearest(self.found, self.valid) if self.found is not None else None
 
     def located(self, place: Place) -> InputError:
-        """Return this error; if it has no place, set the place, which its reader of the file knows."""
+        """Set `place` if this error has no place yet; return this error."""
         if self.place is None:
             self.place = place
         return self

@@ -1,8 +1,8 @@
-"""Worlds, changes and schemas as JSON, for stores and other programs; lossless, in order.
+"""Worlds, changes and schemas as JSON, for stores and other programs; without loss, and in order.
 
-A fact is `["on", "cup1", "table"]`, a value `["weight", "cup1", 0.2]`, in which a geometry is a list. JSON
-distinguishes `1`, `1.0` and `true`, so values keep their Python types. Functions that read forms trust their input: a
-wrong form raises one of `FORM_ERRORS`; `read_json` checks it.
+A fact is `["on", "cup1", "table"]`, a value `["weight", "cup1", 0.2]`; a geometry is a list. JSON distinguishes `1`,
+`1.0` and `true`, so that values keep their Python types. Functions that read a form do not check it: a wrong form
+raises one of `FORM_ERRORS`. `read_json` checks the form.
 """
 
 from __future__ import annotations
@@ -27,20 +27,23 @@ from knowledge_base.world.state import WorldState
 
 Form = dict[str, Any]
 FORM_ERRORS = (AttributeError, IndexError, KeyError, TypeError, ValueError, RecursionError)
-"""Errors from reading a wrong form, JSON's errors included."""
+"""Errors from reading a wrong form, including errors of the JSON parser."""
 FORMAT = "dsc-knowledge/2"
 MAX_WORLD_BYTES = 64 * 1024 * 1024
-"""Bytes of a world in JSON: a million facts. Reading takes about ten bytes of memory for each byte."""
+"""Maximum size of a world in JSON, in bytes: about a million facts.
+
+The read requires about ten bytes of memory for each byte.
+"""
 _PARTS = ("format", "version", "schema_hash", "schema", "nodes", "facts", "values")
 
 
 def compact(form: Form) -> str:
-    """JSON text without spaces, in ASCII: the shortest that every reader agrees about."""
+    """Return JSON text without spaces, in ASCII: a short form that every program reads."""
     return json.dumps(form, separators=(",", ":"), allow_nan=False)
 
 
 def delta_form(delta: Delta) -> Form:
-    """A change, without its empty parts."""
+    """Return the form of a change, without its empty parts."""
     form: Form = {
         "nodes": dict(delta.nodes),
         "removed_nodes": list(delta.removed_nodes),
@@ -53,7 +56,7 @@ def delta_form(delta: Delta) -> Form:
 
 
 def delta_of(form: Form) -> Delta:
-    """The inverse of `delta_form`."""
+    """Return the change of a form; the inverse of `delta_form`."""
     return Delta(
         nodes=form.get("nodes", {}),
         removed=tuple(_facts(form.get("removed", ()))),
@@ -65,17 +68,20 @@ def delta_of(form: Form) -> Delta:
 
 
 def world_form(state: WorldState) -> Form:
-    """All objects (constants too), facts and values."""
+    """Return the form of a world: all objects (constants too), facts and values."""
     return {"nodes": dict(state.nodes), "facts": _fact_forms(state.facts), "values": _value_forms(state.values)}
 
 
 def world_of(form: Form, schema: Schema) -> WorldState:
-    """The inverse of `world_form`; `schema` is the schema of the form, or an extension."""
+    """Return the world of a form; the inverse of `world_form`.
+
+    `schema` must be the schema of the form, or an extension.
+    """
     return WorldState.of(schema, form["nodes"], _facts(form["facts"]), _values(form["values"]))
 
 
 def schema_form(schema: Schema) -> Form:
-    """All declarations, without their places."""
+    """Return the form of a schema: all declarations, without their places."""
     return {
         "types": dict(schema.types),
         "constants": dict(schema.constants),
@@ -86,7 +92,7 @@ def schema_form(schema: Schema) -> Form:
 
 
 def schema_of(form: Form) -> Schema:
-    """The inverse of `schema_form`.
+    """Return the schema of a form; the inverse of `schema_form`.
 
     Raises:
         SchemaError: the declarations contradict each other.
@@ -101,7 +107,7 @@ def schema_of(form: Form) -> Schema:
 
 
 def schema_hash(schema: Schema) -> str:
-    """SHA-256 of the declarations; their order does not count."""
+    """Return the SHA-256 hash of the declarations as hexadecimal text; their order has no influence."""
     text = json.dumps(schema_form(schema), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -123,7 +129,7 @@ def _values(forms: Iterable[list[Any]]) -> dict[Fact, Content]:
 
 
 def _content(form: Any) -> Content:
-    """JSON has no tuples: a geometry is a list there."""
+    """Return the value of a form; a geometry is a list in JSON, which has no tuples."""
     return tuple(form) if isinstance(form, list) else form
 
 
@@ -136,7 +142,7 @@ def _signature(name: str, parameters: list[list[Any]], result: str | None = None
 
 
 def to_json(state: WorldState, version: int) -> str:
-    """The world as JSON text; the module describes facts and values."""
+    """Return the world as JSON text; the docstring of the module describes facts and values."""
     said = {
         "format": FORMAT,
         "version": version,
@@ -145,25 +151,26 @@ def to_json(state: WorldState, version: int) -> str:
         **world_form(state),
     }
     text = StringIO()
-    json.dump(said, text, indent=1, allow_nan=False)  # `dumps` keeps millions of pieces until the end
+    json.dump(said, text, indent=1, allow_nan=False)  # `dumps` stores millions of pieces until the end
     return text.getvalue()
 
 
 def read_json(
     text_or_path: str | Path, schema: Schema | None = None, source: str | None = None
 ) -> tuple[WorldState, int]:
-    """The world and its version, from JSON text or a file (a `Path`).
+    """Return the world and its version, from JSON text or a file (a `Path`).
 
     Args:
-        text_or_path: text of the form that `to_json` writes.
-        schema: an extension of the text's schema; by default that itself.
-        source: the name of the text in messages.
+        text_or_path: text in the form of `to_json`, or the path of its file.
+        schema: an extension of the schema in the text; by default the schema in the text.
+        source: name of the text in messages.
 
     Raises:
-        InputError: the file cannot be read, has more than `MAX_WORLD_BYTES`, or it holds a number that is not finite.
-        ParseError: it does not have this form.
-        SchemaMismatchError: `schema` does not extend the text's schema.
-        SchemaError: the facts contradict the schema, or it itself.
+        InputError: the file cannot be read, has more than `MAX_WORLD_BYTES` bytes, or contains a number that is not
+            finite.
+        ParseError: the text does not have the form of `to_json`.
+        SchemaMismatchError: `schema` does not extend the schema in the text.
+        SchemaError: the facts contradict the schema, or declarations contradict each other.
         UnknownNameError: an undeclared name, or an unknown object.
     """
     if isinstance(text_or_path, Path):
@@ -237,7 +244,7 @@ def _is_item(item: Any, least: int, *, content: bool) -> bool:
 
 
 def _require_admissible(state: WorldState) -> None:
-    """Check the world like a change from an empty one."""
+    """Check the whole world as a change from an empty world."""
     check_delta(Delta(state.nodes, (), tuple(state.facts), state.values), WorldState.of(state.schema, {}, (), {}))
 
 

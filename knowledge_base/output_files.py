@@ -1,10 +1,10 @@
-"""Files that commands write: checked before a command begins, written as a whole or not at all.
+"""Files that commands write: checked before a command begins, and written as a whole or not at all.
 
-An output never replaces a store, a file that belongs to one, or another file of the same command. The operating system
-decides whether two names are one file (links, `./x`, case). A regular file is replaced: a temporary file in the same
-folder gets the complete text and the old mode, then the name. A symlink leads to its target; other hard links keep the
-old text. Pipes, terminals and open descriptors (`-`, `/dev/stdout`, `/dev/fd/3`, a FIFO) are written in place, since
-no reader would open a new file.
+An output never replaces a store, a file that belongs to a store, or another file of the same command. The operating
+system determines whether two names denote one file (links, `./x`, case). A regular file is replaced: a temporary file
+in the same folder receives the complete text and the old mode, and is then renamed. A symbolic link leads to its
+target; other hard links keep the old text. Pipes, terminals and open descriptors (`-`, `/dev/stdout`, `/dev/fd/3`, a
+FIFO) are written in place, since their readers would not open a new file.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from knowledge_base.journal.sidecar_files import is_database, store_owning
 
 STANDARD_OUTPUT = Path("-")
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
-"""Errors of a medium, which another name would not avoid."""
+"""Errors of a storage medium, which another file name would not avoid."""
 PATIENCE_S = 5.0
-"""Seconds in which a reader has to open a FIFO."""
+"""Maximum time in seconds until a reader must open a FIFO."""
 
 _LOOK_AGAIN_S = 0.02
 _DESCRIPTORS = re.compile(r"/proc/(?P<process>\d+)(/task/\d+)?/fd")
@@ -41,10 +41,10 @@ class Output:
     """A file that a command writes.
 
     Args:
-        path: its path; `-` is standard output.
-        option: the word of the command that names it, for messages.
-        others: the other files of the command; the output is different from these and from their sidecar files.
-        over: first characters of a file that a stream may empty; another file stays.
+        path: path of the file; `-` is standard output.
+        option: the option or argument of the command that contains the path, for messages.
+        others: the other files of the command; the output must differ from these files and from their sidecar files.
+        over: first characters of a file that `stream` may empty; a file with other content is refused.
 
     Raises:
         InputError: the file cannot or must not be written; nothing was changed.
@@ -58,23 +58,26 @@ class Output:
         self._check()
 
     def keep(self, *others: Path) -> None:
-        """Raise `InputError` if it is one of these files, or belongs to one; the command needs them too."""
+        """Raise `InputError` if the output is one of these files or of their sidecar files.
+
+        The command needs these files too.
+        """
         self._others += others
         self._check()
 
     def write(self, text: str) -> None:
-        """Replace the content by a text; errors as for `write_all`."""
+        """Replace the content of the file by a text; errors as for `write_all`."""
         write_all({self: text})
 
     @contextmanager
     def stream(self) -> Iterator[TextIO]:
-        """Open the file for a block; each line is written immediately.
+        """Open the file for a block and yield it as a text stream; each line is written immediately.
 
         A regular file is emptied, but not replaced: a present reader continues with the same file.
 
         Raises:
-            InputError: as for an output, or another program streams to this file.
-            OSError: there is no room.
+            InputError: as for the class, or another program streams to this file.
+            OSError: the medium is full or fails.
         """
         self._check()
         if self.path == STANDARD_OUTPUT:
@@ -86,7 +89,7 @@ class Output:
             yield stream
 
     def refused(self, why: str) -> InputError:
-        """Return the error with the reason why it cannot be written."""
+        """Return the error with the reason why the file cannot be written."""
         return InputError(f"{self._option}: cannot write '{self.path}': {why}")
 
     def _check(self) -> None:
@@ -125,12 +128,12 @@ class Output:
                 raise self.refused(f"the command needs '{other}' for something else")
 
     def _is_special(self) -> bool:
-        """Whether it is written in place: it is not a regular file, or it is open already."""
+        """Return whether the file is written in place: it is not a regular file, or it is open already."""
         found = _status(self.path)
         return _descriptor(self.path) is not None or (found is not None and not stat.S_ISREG(found.st_mode))
 
     def _special(self) -> int:
-        """Return a descriptor of a file that cannot be replaced."""
+        """Return a file descriptor of a file that cannot be replaced."""
         number = _descriptor(self.path)
         if number is not None:
             for stream in (sys.stdout, sys.stderr):
@@ -149,7 +152,7 @@ class Output:
                 return opened
 
     def _emptied(self) -> int:
-        """Return a descriptor of the regular file, empty, which no other stream has."""
+        """Return a file descriptor of the emptied regular file, which no other stream uses."""
         opened = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:
             self._take(opened)
@@ -164,17 +167,20 @@ class Output:
         except BlockingIOError:
             raise self.refused("another program is writing it") from None
         except OSError:
-            pass  # no locks there
+            pass  # the file system has no locks
         begin = (self._over or "").encode()
         there = os.read(opened, len(begin))
-        if there and there != begin:  # it has come since the check
+        if there and there != begin:  # the file was created after the check
             raise self.refused("it exists already and is not a file of that kind")
         os.ftruncate(opened, 0)
         os.lseek(opened, 0, os.SEEK_SET)
 
     @contextmanager
     def _reported(self) -> Iterator[None]:
-        """Turn errors about names and rights into `InputError`s; those of a medium get the name of the file."""
+        """Convert errors about names and permissions into `InputError`.
+
+        Errors of a medium are raised with the name of the file.
+        """
         try:
             yield
         except (BrokenPipeError, InputError):
@@ -190,17 +196,19 @@ class Output:
 
 
 def write_all(texts: Mapping[Output, str]) -> None:
-    """Replace the contents by the texts, all of them or, with an error before the last is complete, none.
+    """Replace the contents of all outputs by the texts.
+
+    If an error occurs before all texts are complete, no content is changed.
 
     Raises:
         InputError: a text cannot be encoded as UTF-8, or a file cannot be written.
-        OSError: there is no room.
+        OSError: the medium is full or fails.
     """
     complete = {output: _encoded(output, text) for output, text in texts.items()}
     beside: dict[Output, Path] = {}
     try:
         for output, data in complete.items():
-            output._check()  # noqa: SLF001  another program may have made it since
+            output._check()  # noqa: SLF001  another program may have created the file after the first check
             if output.path != STANDARD_OUTPUT and not output._is_special():  # noqa: SLF001
                 _stage(output, data, beside)
         for output, data in complete.items():
@@ -228,7 +236,7 @@ def _encoded(output: Output, text: str) -> bytes:
 
 
 def _stage(output: Output, data: bytes, beside: dict[Output, Path]) -> None:
-    """Write a file in the same folder, under a new name."""
+    """Write the text to a temporary file in the folder of the output."""
     target = _target(output.path)
     file = target.with_name(f".dsc-{os.urandom(8).hex()}.tmp")
     with output._reported():  # noqa: SLF001
@@ -236,7 +244,7 @@ def _stage(output: Output, data: bytes, beside: dict[Output, Path]) -> None:
         beside[output] = file
         with os.fdopen(opened, "wb") as stream:
             if (old := _status(target)) is not None:
-                with suppress(OSError):  # only root gives files away
+                with suppress(OSError):  # only root may change the owner of a file
                     os.fchown(opened, old.st_uid, old.st_gid)
                 os.fchmod(opened, stat.S_IMODE(old.st_mode))
             stream.write(data)
@@ -245,7 +253,7 @@ def _stage(output: Output, data: bytes, beside: dict[Output, Path]) -> None:
 
 
 def _status(path: Path) -> os.stat_result | None:
-    """Return the status of the file that the name leads to; `None` if there is none."""
+    """Return the status of the file that the name leads to; `None` if the file is missing."""
     try:
         return path.stat()
     except FileNotFoundError:
@@ -253,12 +261,15 @@ def _status(path: Path) -> os.stat_result | None:
 
 
 def _target(path: Path) -> Path:
-    """Return the file that the name leads to, through all links."""
+    """Return the path of the file that the name leads to, through all links."""
     return Path(os.path.realpath(path))
 
 
 def _identity(path: Path) -> _Identity:
-    """Return equal values for two names of one file; a missing file is its name in its folder."""
+    """Return equal values for two names of one file.
+
+    A missing file is identified by its folder and its name.
+    """
     try:
         found = _status(path)
         if found is not None:
@@ -283,7 +294,10 @@ def _descriptor(path: Path) -> int | None:
 
 
 def _lost(path: Path) -> Path | None:
-    """Return the store with an empty or missing file, if the path is its own or its log's, which may hold all of it."""
+    """Return the store whose own file is empty or missing, if `path` is this file or the log of the store.
+
+    The log may contain all data of the store.
+    """
     for end, begins in _LOGS.items():
         log = path if path.name.endswith(end) else path.with_name(path.name + end)
         if any(_begins(log, begin) for begin in begins):
@@ -292,10 +306,13 @@ def _lost(path: Path) -> Path | None:
 
 
 def _begins(path: Path, begin: bytes | str) -> bool:
-    """Whether it is a regular file that begins so. Not for stores: closing one removes SQLite's locks on it."""
+    """Return whether the path is a regular file that begins with `begin`.
+
+    Must not be used for stores: closing a store's file releases SQLite's locks on it.
+    """
     wanted = begin.encode() if isinstance(begin, str) else begin
     try:
-        if not stat.S_ISREG(path.stat().st_mode):  # others could keep us waiting
+        if not stat.S_ISREG(path.stat().st_mode):  # to read other files could block
             return False
         with path.open("rb") as file:
             return file.read(len(wanted)) == wanted

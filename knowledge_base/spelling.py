@@ -1,33 +1,33 @@
-"""Spelling of values in the language: names without quotes, and values as text that a reader gives back unchanged."""
+"""Spelling of values in the language: names without quotes, and text that is read as an equal value."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 
-# Names without quotes, which a reader folds to lower case. A `-` in front separates a name from its type in lists.
+# Names without quotes, which a reader converts to lower case. In lists, a `-` separates names from their type.
 _PLAIN_NAME = re.compile(r"[^\s()\";?:-][^\s()\";?]*")
 _NOT_IN_NAMES = re.compile(r"[\s()\";?]+")
 LONGEST_NAME = 255
-"""Characters of the name of a thing."""
+"""Maximum number of characters in the name of an object."""
 A_NAME_IS = (
     f"a name has 1 to {LONGEST_NAME} printable characters in lower case without blanks, parentheses, quotes, ';' and"
     " '?'; it begins with neither '-' nor ':' and is not a number, true, false or #t"
 )
 _TIME_PASSED = "#t"
-"""The passed time in PDDL+."""
+"""The elapsed time in PDDL+."""
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?")
 TRUTH_VALUES: Mapping[str, bool] = {"true": True, "false": False}
 """The two words that are read as truth values, not as names."""
 
 
 def is_number(text: str) -> bool:
-    """Whether `text` is written as a number: `3`, `-0.5`, `1e-3`."""
+    """Return whether `text` is written as a number: `3`, `-0.5`, `1e-3`."""
     return _NUMBER.fullmatch(text) is not None
 
 
 def is_plain_name(text: str) -> bool:
-    """Whether `text` is a name that needs no quotes: lower case, no blanks, no number, no truth value."""
+    """Return whether `text` is a name without quotes: lower case, no blanks, not a number or truth value."""
     return (
         _PLAIN_NAME.fullmatch(text) is not None
         and text == text.lower()
@@ -38,19 +38,19 @@ def is_plain_name(text: str) -> bool:
 
 
 def is_name(text: str) -> bool:
-    """Whether a thing can be called that, in PDDL files too; see `A_NAME_IS`."""
+    """Return whether `text` is a valid name of an object, also in PDDL files; see `A_NAME_IS`."""
     return len(text) <= LONGEST_NAME and is_plain_name(text) and text != _TIME_PASSED
 
 
 def nearest_name(text: str) -> str | None:
-    """The text made a name: `red-cup` for `Red Cup`; `None` if nothing of it can be in one."""
+    """Return the text converted to a name, e.g. `red-cup` for `Red Cup`; `None` if no valid name remains."""
     plain = "".join(c for c in _NOT_IN_NAMES.sub("-", text[:LONGEST_NAME].lower()) if c.isprintable())
     name = plain.strip("-").lstrip(":-")
     return name if is_name(name) else None
 
 
 def value_text(value: str | float | tuple[float, ...], *, quoted: bool = False) -> str:
-    """A value as the language writes it: `cup1`, `0.5`, `true`, `"red cup"`, `(geometry 0.4 0.1)`."""
+    """Return a value in the notation of the language: `cup1`, `0.5`, `true`, `"red cup"`, `(geometry 0.4 0.1)`."""
     if isinstance(value, tuple):
         return "(" + " ".join(["geometry", *map(value_text, value)]) + ")"
     if isinstance(value, bool):

@@ -1,6 +1,6 @@
-"""The vocabulary of SVG drawings: document, colours, numbers, texts and arrowheads.
+"""Elements of SVG drawings: document, colours, numbers, texts and arrowheads.
 
-The colours suit readers with red-green colour blindness (Okabe and Ito 2008).
+Readers with red-green colour blindness can distinguish the colours (Okabe and Ito 2008).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ BLUE, ORANGE, GREEN, PINK, VIOLET, GREY = (
     ("#f3effc", "#5b3fa0"),
     ("#f6f8fb", "#475569"),
 )
-"""Fill and border of boxes."""
+"""Fill and border colour of boxes."""
 _ARROW = (9.0, 3.6)
-"""Length and half width of an arrowhead."""
+"""Length and half width of an arrowhead, in pixels."""
 FONTS = "font-family:Inter,'Segoe UI','Helvetica Neue',Arial,'DejaVu Sans',sans-serif"
 """CSS of all texts."""
 EDGES = f".edge{{fill:none;stroke:{SOFT};stroke-width:1.4}}"
-"""CSS of lines."""
+"""CSS of all lines."""
 _FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
@@ -42,7 +42,10 @@ def document(title: str, width: float, height: float, style: str, body: Iterable
 
 
 def arrowhead(before: Point, end: Point) -> tuple[Point, str]:
-    """Return the end of an arrow's line and the path of its head; the arrow comes from `before` and points at `end`."""
+    """Return the end of an arrow's line, and the path of its head.
+
+    The arrow leads from `before` to `end`.
+    """
     length = hypot(end[0] - before[0], end[1] - before[1]) or 1.0
     ux, uy = (end[0] - before[0]) / length, (end[1] - before[1]) / length
     long, half = _ARROW
@@ -52,17 +55,17 @@ def arrowhead(before: Point, end: Point) -> tuple[Point, str]:
 
 
 def area(x: float, y: float, width: float, height: float) -> str:
-    """Return the attributes for the place and size of an element."""
+    """Return the SVG attributes for the position and size of an element."""
     return f'x="{number(x)}" y="{number(y)}" width="{number(width)}" height="{number(height)}"'
 
 
 def ends(start: Point, end: Point) -> str:
-    """Return the attributes for the ends of a line."""
+    """Return the SVG attributes for the ends of a line."""
     return f'x1="{number(start[0])}" y1="{number(start[1])}" x2="{number(end[0])}" y2="{number(end[1])}"'
 
 
 def point(at: Point) -> str:
-    """Return a point of a path."""
+    """Return a point in the notation of an SVG path."""
     return f"{number(at[0])} {number(at[1])}"
 
 
@@ -72,5 +75,5 @@ def number(value: float) -> str:
 
 
 def escaped(text: str) -> str:
-    """Return text for XML, without the characters that XML 1.0 forbids."""
+    """Return the text escaped for XML, without the characters that XML 1.0 forbids."""
     return escape(_FORBIDDEN.sub("", text))

@@ -84,7 +84,7 @@ class Transaction:
         """Set the function: `tx.set("failures", "cup1", 2)`, `tx.set("pose", "cup1", "map", (0.4, 0.1))`.
 
         Raises:
-            UnknownNameError: an undeclared function, or an unknown thing.
+            UnknownNameError: an undeclared function, or an unknown object.
             SchemaError: a wrong number of arguments, or a wrong type of an argument or of the content.
             InputError: the content is missing, or a number in it is not finite.
         """

@@ -7,7 +7,7 @@ from knowledge_base.drawing.rendering import arranged, to_svg
 from knowledge_base.view import View
 
 MOST_DRAWN = 150
-"""Maximum number of objects in a picture; the picture states the number of omitted ones."""
+"""Maximum number of objects in a picture; the picture states the number of omitted objects."""
 
 
 def draw(world: View, thing: str | None = None, hops: int = 1) -> str:
@@ -15,10 +15,10 @@ def draw(world: View, thing: str | None = None, hops: int = 1) -> str:
 
     Args:
         world: a present or past world.
-        thing: the object in the middle; by default the whole world.
-        hops: maximum distance from it in facts, 0 or more.
+        thing: the object in the centre; by default the picture shows the whole world.
+        hops: maximum distance from `thing` in facts, 0 or more.
 
     Raises:
-        UnknownNameError: there is no such object.
+        UnknownNameError: the object is unknown.
     """
     return to_svg(arranged(picture_of(world, thing, hops, MOST_DRAWN)))

@@ -20,11 +20,11 @@ class Card:
     """An object, or a fact about several objects.
 
     Attributes:
-        key: its name in arrows.
+        key: the identity of the card in arrows.
         title: the object's name, or the fact's predicate.
         kind: the object's type; empty for a fact.
         lines: facts and values about this object alone.
-        middle: whether the picture is centred on it.
+        middle: whether the card is the centre of the picture.
     """
 
     key: str
@@ -45,7 +45,7 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """Cards and arrows; `left_out` counts the omitted objects."""
+    """Cards and arrows; `left_out` is the number of omitted objects."""
 
     cards: tuple[Card, ...]
     links: tuple[Arrow, ...]
@@ -54,7 +54,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class _Said:
-    """A fact or fluent: the objects in it, in order, and its text without them."""
+    """A fact or fluent: its objects in order, and its text without them."""
 
     things: tuple[str, ...]
     predicate: str
@@ -62,10 +62,12 @@ class _Said:
 
 
 def picture_of(world: View, thing: str | None, hops: int, most: int) -> Picture:
-    """Return the picture of a world, or of an object's neighbourhood; at most `most` objects, the nearest first.
+    """Return the picture of a world, or of an object's neighbourhood.
+
+    The picture contains at most `most` objects, the nearest first.
 
     Raises:
-        UnknownNameError: there is no such object.
+        UnknownNameError: the object is unknown.
     """
     types = world.nodes()
     said = [_said(fact, types) for fact in world.facts()]
@@ -95,7 +97,7 @@ def _content(content: Content) -> str:
 
 
 def _around(thing: str, said: Iterable[_Said], hops: int) -> Iterator[str]:
-    """Yield the objects at most `hops` facts away, the nearest first."""
+    """Yield the objects that are at most `hops` facts away, the nearest first."""
     beside: dict[str, dict[str, None]] = {}
     for one in said:
         for name in one.things:

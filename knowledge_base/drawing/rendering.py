@@ -1,6 +1,6 @@
-"""Positions of a picture's cards, and the picture as SVG.
+"""Positions of the cards of a picture, and the picture as SVG.
 
-networkx places the cards by distance in the graph, then overlaps are removed.
+networkx places the cards by their distance in the graph; then overlaps are removed.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from knowledge_base import svg
 from knowledge_base.drawing.picture import Arrow, Card, Picture
 
 LINE = 16.0
-"""Pixels between two lines of text; other lengths are in pixels too."""
+"""Distance between two lines of text in pixels; all lengths are in pixels."""
 CHARACTER = 7.0
 PADDING = 10.0
 GAP = 46.0
-"""Space between two cards, for arrows and their labels."""
+"""Space between two cards for arrows and their labels."""
 HOP = 170.0
-"""Average distance of neighbours' centres, before cards are pushed apart."""
+"""Average distance of the centres of neighbours, before cards are moved apart."""
 ROW = 1400.0
-"""Width of a picture after which further connected parts go into another row."""
+"""Width of a picture after which further connected parts are placed in another row."""
 FINE = 60
-"""Maximum number of cards for the layout by Kamada and Kawai (1989), which is finer and slower than springs."""
+"""Maximum number of cards for the layout by Kamada and Kawai (1989), which is better and slower than springs."""
 
 
 @dataclass(slots=True)
@@ -51,7 +51,7 @@ class Arranged:
 
 
 def arranged(scene: Picture) -> Arranged:
-    """Return positions for all cards; the same picture always gets the same ones."""
+    """Return positions for all cards; equal pictures have equal positions."""
     graph: nx.Graph[str] = nx.Graph()
     graph.add_nodes_from(card.key for card in scene.cards)
     graph.add_edges_from((link.source, link.target) for link in scene.links)
@@ -66,7 +66,7 @@ def arranged(scene: Picture) -> Arranged:
 
 
 def _part(graph: nx.Graph[str], cards: list[Card]) -> list[Placed]:
-    """Return the cards of one connected part, its upper left corner at (0, 0)."""
+    """Return the cards of one connected part, with its upper left corner at (0, 0)."""
     own: nx.Graph[str] = nx.Graph()  # positions depend on the order of the cards
     own.add_nodes_from(card.key for card in cards)
     own.add_edges_from(sorted(graph.subgraph([card.key for card in cards]).edges))
@@ -97,7 +97,7 @@ def _placed(card: Card, at: Sequence[float], scale: float) -> Placed:
 
 
 def _push_apart(placed: list[Placed], rounds: int = 300) -> None:
-    """Move cards that are too close along the axis with the smaller overlap, until none are."""
+    """Move cards that are too close to each other along the axis with the smaller overlap, until no cards are."""
     for _ in range(rounds):
         moved = False
         for i, one in enumerate(placed):
@@ -123,7 +123,7 @@ def _part_two(one: Placed, other: Placed) -> bool:
 
 
 def _in_rows(parts: Iterable[list[Placed]]) -> svg.Point:
-    """Place the parts in rows; return the size of the whole."""
+    """Place the parts in rows; return the width and height of the whole picture."""
     x = y = row_height = width = 0.0
     for part in parts:
         own_width = max(one.x + one.width / 2 for one in part)
@@ -139,7 +139,7 @@ def _in_rows(parts: Iterable[list[Placed]]) -> svg.Point:
 
 MARGIN = 16.0
 _COLOURS = (svg.BLUE, svg.ORANGE, svg.GREEN, svg.PINK, svg.VIOLET, svg.GREY)
-"""A pair for each type; further types share the last one."""
+"""Fill and border colour for each type; further types share the last pair."""
 _RELATION = ("#ffffff", svg.SOFT)
 _STYLE = (
     f"text{{{svg.FONTS};font-size:12px}}"
@@ -195,13 +195,13 @@ def _arrow(link: Arrow, picture: Arranged) -> Iterator[str]:
 
 def _label(link: Arrow, picture: Arranged) -> Iterator[str]:
     (x1, y1), (x2, y2) = _ends(link, picture)
-    along = 0.3 if _is_both_ways(link, picture) else 0.5  # the labels of an opposite pair must not meet
+    along = 0.3 if _is_both_ways(link, picture) else 0.5  # the labels of two opposite arrows must not overlap
     x, y = x1 + (x2 - x1) * along, y1 + (y2 - y1) * along
     yield f'<text class="label" x="{svg.number(x)}" y="{svg.number(y + 4)}">{svg.escaped(link.label)}</text>'
 
 
 def _ends(link: Arrow, picture: Arranged) -> tuple[svg.Point, svg.Point]:
-    """Return both ends of an arrow at the cards' borders; opposite arrows are shifted apart."""
+    """Return both ends of an arrow at the borders of its cards; opposite arrows are moved apart."""
     source, target = picture.cards[link.source], picture.cards[link.target]
     dx, dy = target.x - source.x, target.y - source.y
     length = hypot(dx, dy) or 1.0
@@ -216,7 +216,7 @@ def _is_both_ways(link: Arrow, picture: Arranged) -> bool:
 
 
 def _border(one: Placed, dx: float, dy: float) -> svg.Point:
-    """Return the point where a line from the card's centre in that direction crosses its border."""
+    """Return the point at which a line from the centre of the card in that direction crosses its border."""
     share = min(
         one.width / 2 / abs(dx) if dx else float("inf"),
         one.height / 2 / abs(dy) if dy else float("inf"),

@@ -1,4 +1,4 @@
-"""The readers' side of a store file: each query opens the file, so that readers never block the writer."""
+"""The readers' side of a store file: each query opens the file separately, so that readers never block the writer."""
 
 from __future__ import annotations
 
@@ -59,14 +59,14 @@ _SNAPSHOTS = "SELECT version, time, world, head, digest FROM snapshots"
 
 
 class Archive:
-    """A read-only `History`; a writer may commit at the same time, in this process or another.
+    """A read-only `History` of a store; a writer may commit at the same time, in this process or another.
 
     Args:
-        path: the store.
-        schema: an extension of the store's own schema; `None` takes the store's.
+        path: path of the store.
+        schema: an extension of the store's own schema; `None` uses the store's schema.
 
     Raises:
-        StoreError: the file is missing, not a store, damaged, or unreadable.
+        StoreError: the file is missing, damaged, unreadable, or is not a store.
         SchemaMismatchError: `schema` does not extend the schema in the store.
     """
 
@@ -93,7 +93,7 @@ class Archive:
 
     @property
     def digest(self) -> bytes:
-        """Digest of the newest version, which covers all versions before it."""
+        """Digest of the newest version; the digest covers all versions before it."""
         with self._reading() as connection:
             return self._digest_at(connection, self._last(connection))
 
@@ -106,12 +106,12 @@ class Archive:
         raise self._only_read()
 
     def first(self, key: str) -> Change | None:
-        """Return the change that was kept under that key."""
+        """Return the change that was committed under that key, or `None`."""
         with self._reading() as connection:
             return self._by_key(connection, key)
 
     def changes(self, since: int, until: int) -> list[Change]:
-        """Return the changes after version `since` up to version `until`."""
+        """Return the changes after version `since` up to and including version `until`."""
         with self._reading() as connection:
             return self._since(connection, since, until)
 
@@ -141,7 +141,7 @@ class Archive:
             oldest, last = _oldest(connection), self._last(connection)
             reached = oldest if found is None else int(found[0])
             for _ in self._changes(connection, max(oldest, reached - 1), min(last, reached + 1)):
-                pass  # reading checks the digests of this change and the next, times included
+                pass  # the iteration checks the digests of this change and the next, including their times
             if found is None and time < self._snapshot(connection, oldest)[1]:
                 raise too_early(time, oldest, self._place)
             return reached
@@ -151,16 +151,16 @@ class Archive:
         raise self._only_read()
 
     def close(self) -> None:
-        """Do nothing: no file stays open."""
+        """Do nothing: no file stays open between queries."""
 
     def require_whole(self, connection: sqlite3.Connection) -> None:
-        """Check that the store has its tables, and that its chains end where `ends` records it.
+        """Check that the store has its tables, and that its chains end at the tips in the table `ends`.
 
-        Rows are checked when they are read. A store that was not closed is checked page by page. It may be a copy made
-        during a write, or the result of a crash.
+        Rows are checked when they are read. If the store has no record of a close, every page is checked. Such a file
+        may be a copy made during a write, or the result of a crash.
 
         Raises:
-            DamagedStoreError: the content differs from the written one.
+            DamagedStoreError: the content differs from the written content.
         """
         require_tables(connection, self._path, TABLES)
         ends = Ends(connection, self._path)
@@ -181,13 +181,13 @@ class Archive:
                 ends.require(chain, tip)
 
     def require_all(self) -> int:
-        """Read every row, and let SQLite check every page; the time is proportional to the file's size.
+        """Read every row, and let SQLite check every page; the time is proportional to the size of the file.
 
         Returns:
-            The last version.
+            The newest version.
 
         Raises:
-            DamagedStoreError: some content differs from the written one.
+            DamagedStoreError: the content differs from the written content.
         """
         with self._reading() as connection:
             require_sound(connection, self._path)
@@ -255,7 +255,7 @@ class Archive:
         return text, time
 
     def _tips(self, connection: sqlite3.Connection) -> Iterator[tuple[str, Tip]]:
-        """Yield the tips of the knowledge chains; other chains belong to other writers."""
+        """Yield the tips of the chains of the knowledge base; other chains belong to other writers."""
         last = self._last(connection)
         yield "changes", Tip(last, self._digest_at(connection, last))
         for chain, question in _TIPS.items():
@@ -303,7 +303,7 @@ class Archive:
         return self._key(row) if row is not None else None
 
     def _key(self, row: Any) -> Change:
-        """Return the change of a key."""
+        """Return the change that was committed under a key."""
         number, key, version, time, author, delta, context, digest, before = row
         name = f"key {number} ('{key}')"
         change = link(context, version, time, author, delta) if isinstance(context, bytes) else None
@@ -332,6 +332,6 @@ def _schemas(connection: sqlite3.Connection) -> list[tuple[int, bytes]]:
 
 
 def schema_at(connection: sqlite3.Connection, version: int) -> bytes:
-    """Return the digest of the schema with which that version was committed."""
+    """Return the digest of the schema under which that version was committed."""
     first, *later = _schemas(connection)
     return next((digest for since, digest in reversed(later) if since <= version), first[1])

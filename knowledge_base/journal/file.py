@@ -1,7 +1,8 @@
-"""The SQLite file of a store: connections, headers, and errors with their meaning.
+"""The SQLite file of a store: connections, headers, and the meaning of SQLite's errors.
 
-A process that cannot write a store, or create SQLite's sidecar files, reads it in place without locks if its log is
-empty. It reads any other store from a private copy with its log, so that the last commits are included.
+Some processes cannot write a store, or cannot create SQLite's sidecar files. If the log of the store is empty, such a
+process reads the store in place without locks. Otherwise it reads a private copy of the store with its log, so that the
+last commits are included.
 """
 
 from __future__ import annotations
@@ -23,33 +24,34 @@ from knowledge_base.journal.sidecar_files import INDEX, LOG, OLD_LOG, place, reg
 from knowledge_base.pddl.files import files_beside
 
 Durability = Literal["memory", "process", "power"]
-"""The events that a commit survives: none; the death of the process; a power cut (if the disk reports writes
-correctly).
+"""The failures that a commit survives.
+
+"memory": none. "process": the end of the process. "power": also a power cut, if the disk reports writes correctly.
 """
 APPLICATION_ID = 0x6473636B  # "dsck", the file kind in SQLite's application_id
 FORMAT = 3
 PATIENCE_S = 1.0
-"""Seconds to wait for another process that locks the file; normally there is none."""
+"""Time in seconds to wait for another process that locks the file; normally no process does."""
 _LONGEST_PATH = 500
-"""Bytes; SQLite opens no file with a path of more than 511."""
+"""Maximum length of a store's path in bytes; SQLite opens no file with a path of more than 511 bytes."""
 _PAGE_SIZE = 4096
 _WAL = b"\2\2"
-"""Bytes 18 and 19 of SQLite's header for a database in WAL mode, for writing and reading."""
+"""Bytes 18 and 19 of SQLite's header for a database in WAL mode: one for writing and one for reading."""
 _TRIES = 5
 """Number of attempts to copy a file during writes."""
 Seen = tuple[tuple[int, int, bool] | None, ...]
-"""Device, inode, and whether there is content: of a store and of SQLite's sidecar files."""
+"""Device, inode, and whether the file has content, for a store and SQLite's sidecar files; `None` if missing."""
 Stamp = tuple[tuple[int, int, int] | None, ...]
-"""Inode, length and time of the store's file and of its log; equal until either is written."""
+"""Inode, length and modification time of the store's file and of its log; every write changes the stamp."""
 
 
 class Kind(NamedTuple):
-    """A kind of SQLite file, by its header.
+    """A kind of SQLite file, identified by its header.
 
     Attributes:
-        name: its name in messages.
+        name: name of the kind in messages.
         application_id: SQLite's `application_id`.
-        form: number of its format.
+        form: number of the file format.
     """
 
     name: str
@@ -80,18 +82,18 @@ def _means_damage(error: sqlite3.Error) -> bool:
 
 @contextmanager
 def reading(path: Path) -> Iterator[sqlite3.Connection]:
-    """Yield a connection that sees one version of the file, independent of later commits.
+    """Yield a connection that reads one version of the file, independent of later commits.
 
     Args:
-        path: as from `located`.
+        path: a path from `located`.
 
     Raises:
-        StoreError: the file is missing, not a store, or unreadable.
+        StoreError: the file is missing, unreadable, or is not a store.
     """
     seen = _seen(str(path))
     with reported(path, "read"):
         _require_readable(path, seen)
-        if not all(seen[:3]) and is_still(path):  # SQLite creates missing ones
+        if not all(seen[:3]) and is_still(path):  # SQLite would create missing sidecar files
             with _reading_still(path) as connection:
                 yield connection
             return
@@ -116,7 +118,7 @@ def _identity(name: str) -> tuple[int, int, bool] | None:
     return found.st_dev, found.st_ino, found.st_size > 0
 
 
-@lru_cache(maxsize=256)  # queries of the past and followers open the same files repeatedly
+@lru_cache(maxsize=256)  # queries of past versions and followers open the same files repeatedly
 def _require_readable(path: Path, seen: Seen) -> None:  # noqa: ARG001  other files, another answer
     if not is_there(path):
         beside = files_beside(path)
@@ -144,7 +146,7 @@ def located(path: str | Path) -> Path:
     """Return the resolved path of a store.
 
     Raises:
-        StoreError: the path does not name a file, is too long, or is a broken link.
+        StoreError: the path does not denote a file, is too long, or is a broken link.
     """
     text = str(path)
     if text == ":memory:" or text.startswith("file:"):
@@ -155,7 +157,7 @@ def located(path: str | Path) -> Path:
         found = Path(path).resolve()
         if Path(path).is_symlink() and not found.exists():
             raise StoreError(f"'{text}' is a link to '{found}', which is missing")
-    except (OSError, RuntimeError, ValueError) as error:  # e.g. circular links
+    except (OSError, RuntimeError, ValueError) as error:  # e.g. links in a cycle
         raise StoreError(f"cannot open the store: {error}", place=Place(text)) from None
     if len(os.fsencode(found)) > _LONGEST_PATH:
         raise StoreError(f"the path of the store has more than {_LONGEST_PATH} bytes", place=Place(str(found)))
@@ -163,10 +165,11 @@ def located(path: str | Path) -> Path:
 
 
 def is_there(path: Path) -> bool:
-    """Return whether a store may exist at the path; if not, one can be made.
+    """Return whether a store may exist at the path; if not, a new store can be created.
 
     Raises:
-        StoreError: another kind of file, an empty file, or a foreign sidecar file is there, or the folder is missing.
+        StoreError: the path has another kind of file or an empty file, a foreign sidecar file exists, or the folder is
+            missing.
     """
     found = regular(path)
     if found is None and not path.parent.is_dir():
@@ -179,7 +182,7 @@ def is_there(path: Path) -> bool:
 
 
 def require_one_name(path: Path) -> None:
-    """Raise `StoreError` for a file with several names (hard links), for each would have a separate log and lock."""
+    """Raise `StoreError` for a file with several names (hard links): each name would have a separate log and lock."""
     found = regular(path)
     if found is not None and found.st_nlink > 1:
         said = f"the file has {found.st_nlink} names (hard links); only a store with one name is written"
@@ -189,8 +192,8 @@ def require_one_name(path: Path) -> None:
 def require_own(path: Path, kind: Kind = STORE) -> None:
     """Raise `StoreError` unless the file is of that kind; SQLite's sidecar files stay unchanged.
 
-    Normal opening of a foreign database may already run a checkpoint of its log. SQLite calls a file malformed during a
-    checkpoint, or after the process died in one; its log has the missing pages.
+    A normal connection to a foreign database might already run a checkpoint of its log. SQLite reports a file as
+    malformed during a checkpoint, or after a crash in a checkpoint; the log then contains the missing pages.
     """
     try:
         with closing(unlocked(path)) as connection:
@@ -201,7 +204,7 @@ def require_own(path: Path, kind: Kind = STORE) -> None:
 
 
 def require_store(connection: sqlite3.Connection, path: Path, kind: Kind = STORE) -> None:
-    """Raise `StoreError` unless the file has the kind's identity and format."""
+    """Raise `StoreError` unless the header of the file has the identity and format of the kind."""
     if _number(connection, "PRAGMA application_id") != kind.application_id:
         raise StoreError(f"this is a database, but no {kind.name}", place=Place(str(path)))
     form = _number(connection, "PRAGMA user_version")
@@ -222,17 +225,17 @@ def connect(path: Path, mode: str) -> sqlite3.Connection:
 
 @contextmanager
 def new_database(path: Path, application_id: int, form: int, *, lasting: bool) -> Iterator[sqlite3.Connection]:
-    """Yield a connection to a database in memory, in a transaction; the end of the block makes it a file at `path`.
+    """Yield a connection to a database in memory, in a transaction; the end of the block writes it to `path`.
 
     Args:
         path: the path of the new file.
         application_id: identifies the kind of file in SQLite's header.
-        form: the number of its format, SQLite's `user_version`.
-        lasting: whether its name survives a power cut, as its content does.
+        form: number of the file format, SQLite's `user_version`.
+        lasting: whether the name of the file survives a power cut; its content always does.
 
     Raises:
-        OSError: a file exists at `path`, or none can be made; nothing has changed.
-        sqlite3.Error: likewise.
+        OSError: a file exists at `path`, or the file cannot be created; nothing has changed.
+        sqlite3.Error: the database cannot be created; nothing has changed.
     """
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as connection:
         connection.execute(f"PRAGMA page_size = {_PAGE_SIZE}")
@@ -243,7 +246,7 @@ def new_database(path: Path, application_id: int, form: int, *, lasting: bool) -
         yield connection
         connection.execute("COMMIT")
         content = bytearray(connection.serialize())
-    content[18:20] = _WAL  # so that SQLite never keeps a rollback journal
+    content[18:20] = _WAL  # with this header SQLite never uses a rollback journal
     os.close(place(path, bytes(content), lasting=lasting, synced=True))
 
 
@@ -256,20 +259,20 @@ class _Copy(NamedTuple):
 
 _lock = Lock()
 _copies: list[_Copy] = []
-"""The last copy, since a store is mostly read more than once."""
+"""The latest copy; the list has at most one item. A store is usually read more than once."""
 
 
 def is_still(path: Path) -> bool:
-    """Return whether SQLite would need to create a sidecar file that this process must not create."""
+    """Return whether SQLite would need to create a sidecar file that this process cannot create."""
     if all(regular(path.with_name(path.name + ending)) for ending in (LOG, INDEX)):
         return False
     return not (os.access(path, os.W_OK) and os.access(path.parent, os.W_OK))
 
 
 def open_still(path: Path) -> tuple[sqlite3.Connection, Stamp | None]:
-    """Return a connection in a transaction, with the stamp that the store must still have after reading.
+    """Return a connection in a transaction, and the stamp that the store must still have after the read.
 
-    A copy has no stamp.
+    The stamp is `None` for a private copy.
 
     Raises:
         StoreError: the store cannot be copied.
@@ -325,7 +328,7 @@ def changed(path: Path) -> StoreError:
 
 
 def _forget() -> None:
-    """Delete the copy; after a fork it belongs to the parent."""
+    """Delete the copy; after a fork, only the parent process deletes it."""
     while _copies:
         copy = _copies.pop()
         if copy.process == os.getpid():

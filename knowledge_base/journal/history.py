@@ -1,4 +1,4 @@
-"""The interface of a knowledge base to its past, in a file or in memory; and the past of a world in memory."""
+"""The interface of a knowledge base to its past versions, and the implementation in memory."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from knowledge_base.facts import Change, Content, Delta, Fact
 from knowledge_base.world.state import WorldState
 
 MOST_KEPT = 10_000
-"""Maximum number of objects, facts and numbers in the kept changes."""
+"""Maximum number of objects, facts and values in the kept changes."""
 MOST_KEYS = 10_000
 """Maximum number of idempotency keys."""
 Writer = Callable[[sqlite3.Connection], object]
-"""Writes more rows in the transaction of a commit; it neither commits nor rolls back."""
+"""A function that writes more rows in the transaction of a commit; it must neither commit nor roll back."""
 
 
 class Version(NamedTuple):
-    """A world with its version and the time of the change that made it."""
+    """A world with its version and the time of the change that led to it."""
 
     state: WorldState
     version: int
@@ -31,7 +31,7 @@ class Version(NamedTuple):
 
 
 class History(Protocol):
-    """A sequence of changes. Any thread may call the reading methods; one thread at a time calls `append`."""
+    """A sequence of changes. Any thread may call the reading methods; only one thread at a time may call `append`."""
 
     @property
     def digest(self) -> bytes:
@@ -41,36 +41,36 @@ class History(Protocol):
         """Return the newest world, which the caller may change."""
 
     def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:
-        """Keep a change before it is applied to `before`; the change is acknowledged when this returns.
+        """Store a change before it is applied to `before`; the change is committed when this method returns.
 
         Args:
-            change: the change; an empty one is kept only for its `key`.
-            key: an idempotency key, under which `first` finds the change.
-            before: the world without the change.
+            change: the change; an empty change is stored only for its `key`.
+            key: an idempotency key; `first` finds the change by this key.
+            before: the world before the change.
             along: writes further rows in the same transaction.
 
         Raises:
-            StoreError: the change could not be written; nothing is kept.
+            StoreError: the change could not be written; nothing is stored.
             ConflictError: the history is read-only.
         """
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
-        """Return a block whose appended changes and own rows are kept together or not at all.
+        """Return a context manager for a block whose changes and own rows are stored together or not at all.
 
         Raises:
-            StoreError: the block could not be written, or there is no file. Later appends fail too, since the world in
+            StoreError: the block could not be written, or no file exists. Later appends fail too, since the world in
                 memory is ahead of the file.
             ConflictError: the history is read-only.
         """
 
     def first(self, key: str) -> Change | None:
-        """Return the change that was kept under that key."""
+        """Return the change that was stored under that key, or `None`."""
 
     def changes(self, since: int, until: int) -> list[Change]:
-        """Return the changes after version `since` up to version `until`.
+        """Return the changes after version `since` up to and including version `until`.
 
         Raises:
-            HistoryError: some of them are no longer kept.
+            HistoryError: some of these changes are no longer kept.
         """
 
     def oldest(self) -> int:
@@ -81,29 +81,31 @@ class History(Protocol):
 
         Raises:
             ConflictError: this history is the only writer.
-            HistoryError: some of them are no longer kept.
+            HistoryError: some of these changes are no longer kept.
             StoreError: the schema has changed since the store was opened, or the file cannot be read.
         """
 
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:
-        """Return a copy of the world of that version; `newest` returns the present one, from which changes are undone.
+        """Return a copy of the world of that version.
+
+        `newest` returns the present world; a history may undo the later changes on it.
 
         Raises:
             HistoryError: the version is no longer kept.
         """
 
     def version_at(self, time: float) -> int:
-        """Return the version that the world had at that time.
+        """Return the version of the world at that time.
 
         Raises:
             HistoryError: the time is before the oldest kept version.
         """
 
     def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:
-        """Remove the content that only versions before `keep_since` need; keys are kept.
+        """Remove the content that only versions before `keep_since` need; keys stay.
 
         Raises:
-            StoreError: the change could not be written; nothing has changed.
+            StoreError: the removal could not be written; nothing has changed.
         """
 
     def close(self) -> None:
@@ -124,10 +126,10 @@ class _Taken(NamedTuple):
     """The content that a change removed without listing it."""
 
     values: Sequence[Content | None] = ()
-    """The previous values of its functions, in its order; `None` is undefined."""
+    """The previous values of the functions in the change, in its order; `None` is an unset value."""
     types: Mapping[str, str] = {}
     departed: Mapping[Fact, Content] = {}
-    """All values about the objects that it removed."""
+    """All values of the objects that the change removed."""
 
 
 class _Kept(NamedTuple):
@@ -140,9 +142,9 @@ _NOTHING = _Taken()
 
 
 class MemoryHistory:
-    """A `History` that costs almost nothing: undoing changes restores older worlds.
+    """A `History` in memory with little overhead: undoing changes restores past worlds.
 
-    Restored facts come last, so the order of facts may differ from the original.
+    Restored facts follow all other facts, so that the order of facts may differ from the original order.
     """
 
     def __init__(self, start: Version) -> None:
@@ -155,18 +157,18 @@ class MemoryHistory:
 
     @property
     def digest(self) -> bytes:
-        """Empty: memory is not checked for damage."""
+        """Empty: a history in memory is not checked for damage."""
         return b""
 
     def newest(self) -> Version:
-        """Return the world it was made with."""
+        """Return the world that the history started with."""
         return self._start
 
     def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:
-        """Keep a change and drop the oldest beyond `MOST_KEPT`.
+        """Store a change, and discard the oldest changes beyond `MOST_KEPT`.
 
         Raises:
-            StoreError: `along` is given, but there is no file.
+            StoreError: `along` is given, but a history in memory has no file.
         """
         if along is not None:
             raise StoreError("a knowledge base in memory has no file to write along into")
@@ -183,15 +185,15 @@ class MemoryHistory:
                 self._forget_oldest()
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
-        """Raise `StoreError`: there is no file."""
+        """Raise `StoreError`: a history in memory has no file."""
         raise StoreError("a knowledge base in memory has no file to write into")
 
     def first(self, key: str) -> Change | None:
-        """Return the change that was kept under that key, if it is one of the last `MOST_KEYS`."""
+        """Return the change that was stored under that key, if the key is one of the latest `MOST_KEYS`."""
         return self._keys.get(key)
 
     def changes(self, since: int, until: int) -> list[Change]:
-        """Return the changes after version `since` up to version `until`."""
+        """Return the changes after version `since` up to and including version `until`."""
         with self._lock:
             self._require(since)
             return [k.change for k in self._kept if since < k.change.version <= until]
@@ -202,11 +204,11 @@ class MemoryHistory:
             return self._oldest[0]
 
     def later(self, version: int) -> list[Change]:
-        """Raise `ConflictError`: there is no other writer."""
+        """Raise `ConflictError`: a history in memory has no other writer."""
         raise ConflictError(f"version {version} is the newest; in memory there is no other writer to follow")
 
     def state(self, version: int, newest: Callable[[], Version]) -> WorldState:
-        """Return the world of that version: the newest with all later changes undone."""
+        """Return the world of that version: the newest world with all later changes undone."""
         present = newest()
         with self._lock:
             self._require(version)
@@ -214,7 +216,7 @@ class MemoryHistory:
         return _undone(present.state, later)
 
     def version_at(self, time: float) -> int:
-        """Return the version that the world had at that time."""
+        """Return the version of the world at that time."""
         with self._lock:
             oldest, begin = self._oldest
             if time < begin:
@@ -222,13 +224,13 @@ class MemoryHistory:
             return oldest + bisect_right(self._kept, time, key=lambda k: k.change.time)
 
     def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  there is no file
-        """Drop the changes up to version `keep_since`."""
+        """Discard the changes up to version `keep_since`."""
         with self._lock:
             while self._kept and self._oldest[0] < keep_since:
                 self._forget_oldest()
 
     def close(self) -> None:
-        """Do nothing: there is no file."""
+        """Do nothing: a history in memory has no file."""
 
     def _require(self, version: int) -> None:
         if version < self._oldest[0]:

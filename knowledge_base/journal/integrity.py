@@ -1,10 +1,10 @@
 """Integrity of a store: chained digests prove that its rows are complete and unchanged.
 
-Each row of a journal carries a digest of its content and of the row before it. An edited, missing, inserted or moved
-row breaks the chain. The table `ends` records the tip of each chain when a store is closed. The last rows of an open
-store (a crash, or a running writer) may therefore be lost unnoticed, where SQLite's log ends.
+Each row of a journal contains a digest of its content and of the row before it. An edited, missing, inserted or moved
+row breaks the chain. The table `ends` records the tip of each chain when a store is closed. In an open store (after a
+crash, or with a running writer), the loss of the last rows is therefore not detected.
 
-The digests detect damage. They need no secret, and so they do not prove the author.
+The digests detect damage. They contain no secret, and therefore do not prove who wrote the rows.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from typing import Any, Final, NamedTuple
 from knowledge_base.errors import DamagedStoreError, Place
 
 SIZE: Final = 16
-"""Bytes of a digest."""
+"""Length of a digest in bytes."""
 NOTHING: Final = b""
 """The digest before the first row of a chain."""
 ENDS = "CREATE TABLE ends (chain TEXT PRIMARY KEY, count INTEGER, digest BLOB) WITHOUT ROWID"
 STORE: Final = "store"
-"""The row of `ends` with the random identity of the store, the first digest of its chains."""
+"""The row of `ends` with the random identity of the store, which is the first digest of its chains."""
 _OPEN = "open"
 _PUT_END = "INSERT OR REPLACE INTO ends VALUES (?, ?, ?)"
 _SHOWN = 3
-"""Number of problems of SQLite's own check in a message."""
+"""Maximum number of problems from SQLite's own check in a message."""
 
 
 class Tip(NamedTuple):
-    """The end of a chain: its number of rows, and the digest of the last."""
+    """The end of a chain: its number of rows, and the digest of its last row."""
 
     rows: int
     digest: bytes
@@ -43,20 +43,20 @@ def link(before: bytes, *values: Any) -> bytes:
     """Return the digest of a row.
 
     Args:
-        before: the digest of the row before it, and of other content that the row depends on.
-        values: its columns as SQLite returns them; a REAL is a float.
+        before: the digest of the previous row, and digests of other content that the row depends on.
+        values: the columns of the row as SQLite returns them; a REAL is a float.
     """
     return blake2b(before + (_joined(len(values)) % values).encode(), digest_size=SIZE).digest()
 
 
 @cache
 def _joined(columns: int) -> str:
-    """Return the pattern of a row's text; formatting takes half the time of `join`."""
+    """Return the format string of a row's text; formatting takes half the time of `join`."""
     return "\0".join(["%s"] * columns)
 
 
 def damaged(path: Path, what: str) -> DamagedStoreError:
-    """Return the error for a store whose content differs from the written one."""
+    """Return the error for a store whose content differs from the written content."""
     return DamagedStoreError(f"the store is damaged: {what}", place=Place(str(path)))
 
 
@@ -71,7 +71,7 @@ def require_link(path: Path, row: str, digest: object, before: tuple[Any, ...], 
         values: the row's columns.
 
     Raises:
-        DamagedStoreError: the digest does not match the row's content after the row before it.
+        DamagedStoreError: the digest does not match the content of the row and the row before it.
     """
     try:
         expected = link(b"".join(before), *values)
@@ -83,7 +83,7 @@ def require_link(path: Path, row: str, digest: object, before: tuple[Any, ...], 
 
 
 def require_tables(connection: sqlite3.Connection, path: Path, tables: Mapping[str, str]) -> None:
-    """Raise `DamagedStoreError` unless each table exists and was made with exactly that statement."""
+    """Raise `DamagedStoreError` unless each table exists and was created with exactly the given statement."""
     there = dict(connection.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'").fetchall())
     for name, statement in tables.items():
         if name not in there:
@@ -104,7 +104,7 @@ def require_own_log(path: Path, identity: bytes) -> None:
     log = path.with_name(path.name + "-wal")
     if not log.exists() or not log.stat().st_size:
         return
-    with suppress(sqlite3.Error):  # a crash may leave the file half written, and the log completes it
+    with suppress(sqlite3.Error):  # a crash may leave the file incomplete; the log then completes it
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as alone:
             (own,) = alone.execute("SELECT digest FROM ends WHERE chain = ?", (STORE,)).fetchone() or (identity,)
         if own != identity:
@@ -115,7 +115,7 @@ class Ends:
     """The recorded ends of the chains of a file.
 
     Attributes:
-        closed: whether the last writer has closed the store, so that the ends are valid.
+        closed: whether the last writer has closed the store, so that the recorded ends are valid.
         tips: the recorded tips by chain.
     """
 
@@ -134,7 +134,7 @@ class Ends:
         return self.tips[STORE].digest
 
     def require(self, chain: str, found: Tip) -> None:
-        """Raise `DamagedStoreError` if the chain's tip differs from the recorded one."""
+        """Raise `DamagedStoreError` if the tip of the chain differs from the recorded tip."""
         said = self.tips.get(chain)
         if said is None:
             raise damaged(self._path, f"the table 'ends' does not say where '{chain}' ends")
@@ -146,15 +146,18 @@ class Ends:
 
 
 def put_ends(connection: sqlite3.Connection, tips: Iterable[tuple[str, Tip | None]]) -> None:
-    """Record the tips of chains; `None` is unknown, while a writer has the store open."""
+    """Record the tips of chains; `None` is an unknown tip, while a writer has the store open."""
     connection.executemany(_PUT_END, [(chain, *(tip or (None, None))) for chain, tip in tips])
 
 
 def mark_open(connection: sqlite3.Connection, token: bytes) -> None:
-    """Record that a writer has the store open, so that the ends are invalid from its commit on."""
+    """Record that a writer has the store open; from its commit on, the recorded ends are invalid."""
     connection.execute(_PUT_END, (_OPEN, None, token))
 
 
 def mark_closed(connection: sqlite3.Connection, token: bytes) -> bool:
-    """Record that the ends are valid again; return `False` and do nothing if another writer has the store open."""
+    """Record that the ends are valid again.
+
+    Return `False` and do nothing if another writer has the store open.
+    """
     return connection.execute("DELETE FROM ends WHERE chain = ? AND digest = ?", (_OPEN, token)).rowcount == 1

@@ -1,4 +1,4 @@
-"""The writer's side of a store file: each change is one SQLite transaction, acknowledged when written."""
+"""The writer's side of a store file: each change is one SQLite transaction, committed when it is written."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ from knowledge_base.world.state import WorldState
 SNAPSHOT_AFTER = 2_000_000
 """Minimum number of characters of changes between two snapshots.
 
-Reading these takes a fraction of a second. A longer world waits for as many characters of changes as it has itself.
-Snapshots therefore at most double the file and the work.
+The read of this number of characters requires a fraction of a second. A snapshot of a longer world waits until the
+changes have as many characters as that world. Snapshots therefore at most double the size of the file and the work.
 """
 
 _INSERT_CHANGE = "INSERT INTO changes VALUES (?, ?, ?, ?, ?)"
@@ -61,19 +61,19 @@ _FORGET = (
 
 
 class Journal(Archive):
-    """A `History` with one writing process, and one writing thread at a time.
+    """A `History` in a file, with one writing process, and one writing thread at a time.
 
     Args:
-        path: the store; created if missing.
-        schema: the schema of a new store, or an extension of the store's own; `None` takes the store's.
-        durability: the events that a commit survives.
-        clock: returns the time in seconds for changes at opening.
+        path: path of the store, which is created if it is missing.
+        schema: the schema of a new store, or an extension of the store's own schema; `None` uses the store's schema.
+        durability: the failures that a commit survives.
+        clock: returns the time in seconds, for a change at the opening.
         new: whether the store must not exist yet.
 
     Raises:
-        StoreError: another writer has it open, or it is not a store, or it cannot be read or written.
+        StoreError: another writer has the store open, or the file is not a store, or cannot be read or written.
         SchemaMismatchError: `schema` does not extend the schema in the store.
-        InputError: there is no store and no schema for a new one.
+        InputError: neither a store nor a schema for a new store exists.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class Journal(Archive):
             raise _no_schema(path)
         self._place = Place(str(path))
         self._head = self._schema_digest = self._identity = NOTHING
-        self._tail = self._snapshot_size = 0  # characters of changes since the last snapshot, and of that snapshot
+        self._tail = self._snapshot_size = 0  # characters of the changes since the last snapshot, and of that snapshot
         self._durability = durability
         self._writers = WriterLock(path)
         try:
@@ -111,7 +111,7 @@ class Journal(Archive):
             raise
 
     def append(self, change: Change, key: str | None, before: WorldState, along: Writer | None) -> None:
-        """Write a change, after a snapshot if many characters were written since the last one."""
+        """Write a change, after a snapshot if many characters of changes were written since the last snapshot."""
         if not change.delta and key is None and along is None:
             return
         _require_text(change.author, key or "")
@@ -123,7 +123,7 @@ class Journal(Archive):
         snapshot = None if self._tail < max(SNAPSHOT_AFTER, self._snapshot_size) else compact(world_form(before))
         with self._part() as connection:
             if snapshot is not None:
-                self._put_snapshot(snapshot, change.version - bool(change.delta))  # of the world before the change
+                self._put_snapshot(snapshot, change.version - bool(change.delta))  # the world before the change
             if change.delta:
                 connection.execute(_INSERT_CHANGE, (change.version, time, change.author, delta, digest))
             if key is not None:
@@ -141,11 +141,11 @@ class Journal(Archive):
             self._head = digest
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
-        """Return a block whose appended changes and own rows are one transaction."""
+        """Return a context manager for a block whose changes and own rows are one transaction."""
         return self._group
 
     def first(self, key: str) -> Change | None:
-        """Return the change that was kept under that key; only the writer may ask."""
+        """Return the change that was committed under that key, or `None`; only the writer may call this method."""
         _require_text(key)
         with reported(self._path, "read"):
             return self._by_key(self._connection, key)
@@ -156,13 +156,13 @@ class Journal(Archive):
 
     @property
     def digest(self) -> bytes:
-        """Digest of the newest version, which covers all versions before it."""
+        """Digest of the newest version; the digest covers all versions before it."""
         return self._head
 
     def compact(self, keep_since: int, newest: Callable[[], Version]) -> None:  # noqa: ARG002  the file has it
-        """Make version `keep_since` the oldest: its snapshot replaces all earlier rows."""
+        """Make version `keep_since` the oldest version: its snapshot replaces all earlier rows."""
         with self._reading() as connection:
-            require_sound(connection, self._path)  # vacuum moves pages
+            require_sound(connection, self._path)  # the vacuum moves pages
             world = compact(world_form(self._world(connection, keep_since).state))
         with self._transaction as connection:
             self._put_snapshot(world, keep_since)
@@ -170,7 +170,7 @@ class Journal(Archive):
                 connection.execute(statement, {"oldest": keep_since})
         CHECKPOINTS.leave(self._path)
         with reported(self._path, "shrink"):
-            self._connection.executescript("PRAGMA incremental_vacuum")  # `execute` would free a single page
+            self._connection.executescript("PRAGMA incremental_vacuum")  # `execute` would release only one page
             self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
             self._measure()
         self._lay_out_log()
@@ -181,7 +181,7 @@ class Journal(Archive):
         self._end()
         moved = not self._transaction.is_in_place()
         if moved:  # SQLite runs the last checkpoint only on a file at its own path
-            with suppress(sqlite3.Error):  # already closed
+            with suppress(sqlite3.Error):  # closed already
                 self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
         self._connection.close()
         if moved:
@@ -189,7 +189,7 @@ class Journal(Archive):
         self._writers.release()
 
     def _end(self) -> None:
-        """Record the tips of the chains; if that fails, the store is as after a crash."""
+        """Record the tips of the chains; if the record fails, the store is in the state after a crash."""
         if self._transaction.marked and self._group.behind is None:
             with suppress(StoreError), self._transaction as connection:
                 if mark_closed(connection, self._token):
@@ -214,7 +214,7 @@ class Journal(Archive):
             self._measure()
 
     def _extend(self, written: Schema, clock: Callable[[], float]) -> None:
-        """Extend the schema; a separate change adds new constants to the world."""
+        """Extend the schema; a separate change adds the new constants to the world."""
         require_extension(written, self._schema, self._place)
         last = self.newest()
         require_functional(last.state, self._place)
@@ -229,7 +229,7 @@ class Journal(Archive):
         self._schema_digest, self._head = schema, head
 
     def _put_snapshot(self, world: str, version: int) -> None:
-        """Keep the world of a version in the journal; ignore a version with a snapshot."""
+        """Insert the world of a version as a snapshot; do nothing if the version has one."""
         found = self._connection.execute("SELECT time, digest FROM changes WHERE version = ?", (version,)).fetchone()
         if found is not None:
             time, head = found
@@ -241,7 +241,10 @@ class Journal(Archive):
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
-        """Yield committed content; inside `together` also the block's own appended changes, for its only caller."""
+        """Yield a connection to committed content.
+
+        Inside a block of `together`, the connection also reads the changes of the block.
+        """
         if self._group.open:
             with reported(self._path, "read"):
                 yield self._connection
@@ -251,7 +254,7 @@ class Journal(Archive):
 
     @contextmanager
     def _part(self) -> Iterator[sqlite3.Connection]:
-        """Yield a transaction for one change, or the open one of the group."""
+        """Yield a transaction for one change, or the open transaction of the group."""
         self._group.require_abreast()
         if not self._group.open:
             with self._transaction as connection:
@@ -268,7 +271,7 @@ class Journal(Archive):
 
 @contextmanager
 def _guarded(connection: sqlite3.Connection) -> Iterator[None]:
-    """Forbid the end of the transaction in the block, which would keep its first part without the rest."""
+    """Forbid the block to begin or end a transaction, which would commit the first part without the rest."""
     refused = False
 
     def judge(action: int, *_: str | None) -> int:
@@ -294,11 +297,11 @@ def _no_schema(path: Path) -> InputError:
 
 
 def _make(path: Path, schema: Schema | None, durability: Durability, time: float) -> None:
-    """Make an empty store; the caller holds its writer lock.
+    """Create an empty store; the caller holds the writer lock of the store.
 
     Raises:
-        StoreError: the store cannot be made; the path stays free.
-        InputError: there is no schema.
+        StoreError: the store cannot be created; no file exists at the path.
+        InputError: the schema is missing.
     """
     if schema is None:  # another process has just removed the store
         raise _no_schema(path)
@@ -311,7 +314,7 @@ def _make(path: Path, schema: Schema | None, durability: Durability, time: float
         with reported(path, "make"), new_database(path, APPLICATION_ID, FORMAT, lasting=lasting) as connection:
             for statement in TABLES.values():
                 connection.execute(statement)
-            identity = os.urandom(SIZE)  # no row of another store matches it
+            identity = os.urandom(SIZE)  # no row of another store matches this identity
             first = _put_schema(connection, schema, 0, identity)
             _put_world(connection, 0, float(time), compact(world_form(WorldState(schema))), identity, first)
             tips = {"changes": Tip(0, identity), "schemas": Tip(1, first), "keys": Tip(0, NOTHING)}
@@ -324,7 +327,7 @@ def _make(path: Path, schema: Schema | None, durability: Durability, time: float
 
 
 def _put_schema(connection: sqlite3.Connection, schema: Schema, version: int, before: bytes) -> bytes:
-    """Insert a schema after the one with the digest `before`; return its digest."""
+    """Insert a schema after the schema with the digest `before`; return its digest."""
     row = (version, schema_hash(schema), compact(schema_form(schema)))
     digest = link(before, *row)
     connection.execute("INSERT INTO schemas VALUES (?, ?, ?, ?)", (*row, digest))

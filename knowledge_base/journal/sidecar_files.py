@@ -1,4 +1,4 @@
-"""Sidecar files of a store: names, checks that they belong to it, atomic creation, and the writer's lock."""
+"""Sidecar files of a store: names, checks that they belong to the store, atomic creation, and the writer lock."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from knowledge_base.errors import Place, StoreError
 
 LOG, INDEX, OLD_LOG, LOCK, WORLD = "-wal", "-shm", "-journal", "-lock", "-world"
 ENDINGS = (LOG, INDEX, OLD_LOG, LOCK, WORLD)
-"""Endings of the sidecar files: SQLite's log, its index and its rollback journal, the writer lock, and the simulated
-world of a run.
+"""Endings of the sidecar files.
+
+They are SQLite's log, its index and its rollback journal, the writer lock, and the simulated world of a run.
 """
 MODE = 0o644
 _KINDS = {
@@ -29,19 +30,24 @@ _KINDS = {
     stat.S_IFBLK: "a device",
 }
 _LOG_HEADS = (bytes.fromhex("377f0682002de21800001000"), bytes.fromhex("377f0683002de21800001000"), bytes(12))
-"""The first bytes of a log with pages of 4 KiB; zeros in a log without a commit."""
+"""The first bytes of a log with pages of 4 KiB; a log without a commit begins with zeros."""
 _INDEX_HEADS = ((3007000).to_bytes(4, "little"), (3007000).to_bytes(4, "big"), bytes(4), bytes(3), b"")
 _MAGIC = b"SQLite format 3\0"
 _SHORTEST = 512
-"""Bytes of the smallest database; SQLite treats a shorter file as empty."""
+"""Length of the smallest database in bytes; SQLite treats a shorter file as empty."""
 _INDEX_PART = 32768
-"""An index has a multiple of this number of bytes; 3, briefly, when SQLite creates it."""
+"""The length of an index is a multiple of this number of bytes.
+
+While SQLite creates an index, its length is briefly 3 bytes.
+"""
 _LOCK_MARK = re.compile(rb"dsc writer +(\d+)\n")
-"""The content of a lock file, always of the same length; a lock file is never empty."""
+"""The content of a lock file, always with the same length; a lock file is never empty."""
 
 
 def store_owning(path: Path, in_use: Iterable[Path] = ()) -> Path | None:
-    """Return the store that the file is, or is a sidecar of; `None` if other programs may write the path.
+    """Return the store that the file is or belongs to as a sidecar file.
+
+    Return `None` if other programs may write the path.
 
     Every SQLite file counts as a store. The file itself may be missing. Links are followed.
 
@@ -54,13 +60,13 @@ def store_owning(path: Path, in_use: Iterable[Path] = ()) -> Path | None:
         owner: Path | None = path.resolve()
         while owner is not None and owner not in stores and not is_database(owner):
             owner = _beside(owner)
-    except (OSError, RuntimeError, ValueError):  # an invalid name: too long, a null character, circular links
+    except (OSError, RuntimeError, ValueError):  # an invalid name: too long, a null character, links in a cycle
         return None
     return owner
 
 
 def is_database(path: Path) -> bool:
-    """Return whether the file is an SQLite database of any kind; creates, changes and locks nothing."""
+    """Return whether the file is an SQLite database of any kind, without creating, changing or locking a file."""
     try:
         found = path.stat()
         if not stat.S_ISREG(found.st_mode):
@@ -78,17 +84,17 @@ def is_database(path: Path) -> bool:
 
 
 def unlocked(path: Path) -> sqlite3.Connection:
-    """Return a connection that takes no locks, creates no files and ignores the log.
+    """Return a connection that acquires no locks, creates no files and ignores the log.
 
-    Even headers are read in this way. Closing a file in Python drops all locks of this process on it; SQLite avoids
-    that for its own locks.
+    Even headers are read through such a connection. In Python, closing a file releases all locks of this process on
+    that file; SQLite avoids this for its own locks.
     """
     uri = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
     return sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False)
 
 
 def regular(path: Path) -> os.stat_result | None:
-    """Return the status of a regular file; `None` if it is missing. The path must not be a link.
+    """Return the status of a regular file; `None` if the file is missing. The path must not be a link.
 
     Raises:
         StoreError: the path has another kind of file, or its status cannot be read.
@@ -106,13 +112,13 @@ def regular(path: Path) -> os.stat_result | None:
 
 
 def open_own(path: Path, store: Path) -> int:
-    """Return a descriptor of a regular sidecar file, to read and write, without following a link.
+    """Return a file descriptor for reading and writing a regular sidecar file, without following a link.
 
     Raises:
         FileNotFoundError: the file is missing.
         StoreError: the path has another kind of file, or cannot be opened.
     """
-    regular(path)  # opening a device may have side effects
+    regular(path)  # to open a device may have side effects
     try:
         file = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError:
@@ -126,22 +132,22 @@ def open_own(path: Path, store: Path) -> int:
 
 
 def foreign(path: Path, store: Path, reason: str) -> StoreError:
-    """Return the error for a file at a sidecar's path that does not belong to the store."""
+    """Return the error for a file with the name of a sidecar file that does not belong to the store."""
     said = f"'{path.name}' next to the store {reason}; move it away, or take another name for the store"
     return StoreError(said, place=Place(str(store)))
 
 
 def require_no_strangers(store: Path, *, there: bool) -> None:
-    """Raise `StoreError` for files that SQLite would take for the store's own, but which are not.
+    """Raise `StoreError` for foreign files that SQLite would use as sidecar files of the store.
 
     Args:
-        store: its resolved path.
-        there: whether it exists; SQLite's files without it are the rest of another store.
+        store: the resolved path of the store.
+        there: whether the store exists; without it, SQLite's sidecar files are the rest of another store.
     """
     old_log, index, log = (store.with_name(store.name + ending) for ending in (OLD_LOG, INDEX, LOG))
     if regular(old_log) is not None:
         raise foreign(old_log, store, "is not one of its files: a store has no log of that kind")
-    size = _size(index)  # read first: SQLite begins with the log, and deletes it last
+    size = _size(index)  # read first: SQLite creates the log first, and deletes it last
     if there and _size(log) is not None:
         _require(log, store, _head(log, 12) in (*_LOG_HEADS, b"", None), "is not a log of SQLite")
         _require(index, store, size is None or size % _INDEX_PART in (0, 3), "is not an index of SQLite")
@@ -158,7 +164,7 @@ def _size(path: Path) -> int | None:
 
 
 def _head(path: Path, length: int) -> bytes | None:
-    """Return the first bytes of a file without SQLite's locks; `None` if it is missing."""
+    """Return the first bytes of a file without SQLite's locks; `None` if the file is missing."""
     try:
         file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError:
@@ -177,13 +183,16 @@ def _require(path: Path, store: Path, holds: object, reason: str) -> None:
 
 
 def _begins_as_database(path: Path) -> bool:
-    """Return whether the file has SQLite's magic; only for files that SQLite cannot open, since closing drops locks."""
+    """Return whether the file begins with SQLite's magic number.
+
+    To be used only for files that SQLite cannot open, since closing a file releases locks.
+    """
     with path.open("rb") as file:
         return file.read(len(_MAGIC)) == _MAGIC
 
 
 def _beside(path: Path) -> Path | None:
-    """Return the file whose sidecar has that name, or `None`."""
+    """Return the path of the file whose sidecar file has the name of `path`, or `None`."""
     for ending in ENDINGS:
         name = path.name.removesuffix(ending)
         if name not in ("", path.name):
@@ -192,27 +201,27 @@ def _beside(path: Path) -> Path | None:
 
 
 def place(path: Path, content: bytes, *, locked: bool = False, synced: bool = False, lasting: bool = False) -> int:
-    """Make a file; return its descriptor, open to read and write.
+    """Create a file; return its file descriptor for reading and writing.
 
-    The file has no name until it is complete. On a file system without nameless files it has a random name until then,
-    which remains if the process is killed.
+    The file has no name until it is complete. On a file system without nameless files, it has a random name until then;
+    the file remains under this name if the process is killed.
 
     Args:
         path: the path of the new file.
-        content: its whole content.
-        locked: whether this process holds a lock on it (`flock`) from the beginning.
-        synced: whether its content survives a power cut.
-        lasting: whether its name survives a power cut.
+        content: the whole content of the file.
+        locked: whether this process has locked the file (`flock`) from the beginning.
+        synced: whether the content survives a power cut.
+        lasting: whether the name survives a power cut.
 
     Raises:
         FileExistsError: `path` exists.
-        OSError: the file cannot be made.
+        OSError: the file cannot be created.
     """
     folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         file, name = _nameless(path.parent, folder)
         try:
-            with os.fdopen(file, "wb", closefd=False) as whole:  # a full disk may take a part without an error
+            with os.fdopen(file, "wb", closefd=False) as whole:  # a full disk may store only a part without an error
                 whole.write(content)
             if synced:
                 os.fsync(file)
@@ -233,7 +242,7 @@ def place(path: Path, content: bytes, *, locked: bool = False, synced: bool = Fa
 
 
 def _nameless(parent: Path, folder: int) -> tuple[int, Path]:
-    """Return the descriptor of a new file, and the name by which it can be linked."""
+    """Return the file descriptor of a new file, and the path from which the file can be linked."""
     with suppress(OSError, AttributeError):  # some systems and file systems lack nameless files
         Path("/proc/self/fd").lstat()
         file = os.open(".", os.O_TMPFILE | os.O_RDWR | os.O_CLOEXEC, MODE, dir_fd=folder)
@@ -243,13 +252,14 @@ def _nameless(parent: Path, folder: int) -> tuple[int, Path]:
 
 
 class WriterLock:
-    """The right to write a store, from now until `release`.
+    """The right to write a store, from the creation of this object until `release`.
 
-    A sidecar file holds the lock and names the process; `release` deletes it. The store file cannot hold it, since
-    closing it in any thread would drop SQLite's own locks. A file of that name that is not a lock stays unchanged.
+    The lock is on a sidecar file, which contains the number of the process; `release` deletes the file. The store file
+    itself is not locked: closing it in any thread would release SQLite's own locks. A file of that name that is not a
+    lock file stays unchanged.
 
     Raises:
-        StoreError: another writer has the store open, in this process or another, or the lock file cannot be made.
+        StoreError: another writer has the store open, in this process or another; or the lock file cannot be created.
     """
 
     def __init__(self, store: Path) -> None:
@@ -263,7 +273,7 @@ class WriterLock:
         os.pwrite(self._file, _lock_content(), 0)
 
     def release(self) -> None:
-        """Release the lock and delete its file; further calls do nothing."""
+        """Release the lock and delete its file; further calls have no effect."""
         if not self._released:
             self._released = True
             if self._is_there():
@@ -271,7 +281,7 @@ class WriterLock:
             os.close(self._file)
 
     def _is_there(self) -> bool:
-        """Return whether the locked file is still the one at the path."""
+        """Return whether the locked file is still the file at the path."""
         try:
             return os.path.samestat(os.fstat(self._file), self._path.lstat())
         except FileNotFoundError:
@@ -282,7 +292,7 @@ class WriterLock:
             try:
                 return self._found()
             except FileNotFoundError:
-                pass  # there was no writer, or it has just left
+                pass  # no writer, or a writer that has just closed the store
             try:
                 return place(self._path, _lock_content(), locked=True)
             except FileExistsError:
@@ -292,10 +302,10 @@ class WriterLock:
                 raise StoreError(said, place=Place(str(self._store))) from None
 
     def _found(self) -> int:
-        """Return the locked descriptor of the existing file.
+        """Return the file descriptor of the existing lock file, after locking it.
 
         Raises:
-            FileNotFoundError: there is no lock file.
+            FileNotFoundError: the lock file is missing.
             StoreError: as for the class.
         """
         file = open_own(self._path, self._store)
@@ -311,7 +321,7 @@ class WriterLock:
         return file
 
     def _process(self, file: int) -> str:
-        """Return the process number in the file."""
+        """Return the process number in the lock file."""
         found = _LOCK_MARK.fullmatch(os.pread(file, 2 * len(_lock_content()), 0))
         if found is None:
             raise foreign(self._path, self._store, "is not the lock of a store")

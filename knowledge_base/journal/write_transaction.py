@@ -1,16 +1,16 @@
 """Transactions of a store's writer: a block is written completely or not at all.
 
-They are classes instead of generators, since every change and every macrostep of a kept run passes here.
+The context managers here are classes instead of generators, to be fast: every change and every macrostep of a kept run
+uses them.
 
 A thread moves committed pages from SQLite's log into the store file (SQLite's `checkpoint`). A checkpoint waits for the
 disk twice, which would delay commits. One thread serves all stores of the process in turn, with pauses, so that the
 disk has time for commits.
 
-SQLite from 3.7.0 to 3.51.2 (except 3.44.6 and 3.50.7) may lose commits; see
-https://www.sqlite.org/wal.html#walresetbug for the details. It needs a checkpoint that completes, another one soon
-after, and a commit that restarts the log at that moment. A later checkpoint may then skip committed pages. The
-thread therefore takes a request only together with a commit that left pages in the log. A caller calls `leave` before
-its own checkpoint.
+SQLite from 3.7.0 to 3.51.2 (except 3.44.6 and 3.50.7) may lose commits; see https://www.sqlite.org/wal.html#walresetbug
+for the details. The error requires a checkpoint that completes, another checkpoint soon after it, and a commit that
+restarts the log during the second one. A later checkpoint may then skip committed pages. The thread therefore accepts a
+request only together with a commit that left pages in the log. A caller must call `leave` before its own checkpoint.
 """
 
 from __future__ import annotations
@@ -30,21 +30,27 @@ from knowledge_base.journal.integrity import mark_open
 from knowledge_base.journal.sidecar_files import INDEX, LOG
 
 TIDY_UP_AFTER = 500
-"""Commits between checkpoints; SQLite's default is a thousand pages, and a commit takes one or two."""
+"""Number of commits between checkpoints.
+
+SQLite's default is a thousand pages, and a commit writes one or two pages.
+"""
 MOST_IN_LOG = 4000
-"""Pages in the log after which the writer runs the checkpoint itself: its commits leave the thread no gap."""
+"""Number of pages in the log after which the writer runs the checkpoint itself.
+
+The commits then leave the thread no time for checkpoints.
+"""
 MOST_ASKED = 8
 """Number of requests after which the writer runs the checkpoint itself."""
 PAUSE = 1.0
-"""Pause of the thread, as a multiple of its last working time."""
+"""Duration of the thread's pause, as a multiple of its last working time."""
 _PAGES_IN_LOG = {"process": 0, "power": 1000}
-"""Pages of 4 KiB in SQLite's log after which a commit runs a checkpoint; 0: a thread runs it."""
-_LOG_LENGTH = (_PAGES_IN_LOG["power"] + 24) * (4096 + 24)  # a frame is a page and its head; commits are not cut
-_SYNCHRONOUS = {"process": "NORMAL", "power": "FULL"}  # in WAL mode only FULL waits for the disk in each commit
+"""Number of pages (4 KiB) in SQLite's log after which a commit runs a checkpoint; with 0, a thread runs it."""
+_LOG_LENGTH = (_PAGES_IN_LOG["power"] + 24) * (4096 + 24)  # a frame is a page and its header; commits are not cut
+_SYNCHRONOUS = {"process": "NORMAL", "power": "FULL"}  # in WAL mode, only FULL waits for the disk in each commit
 
 
 def writing(path: Path, durability: Durability) -> sqlite3.Connection:
-    """Return a connection to write with.
+    """Return a connection for writing.
 
     Raises:
         StoreError: the file cannot be opened, or is not a store.
@@ -65,19 +71,19 @@ def writing(path: Path, durability: Durability) -> sqlite3.Connection:
 
 
 class WriteTransaction:
-    """A reusable context manager, one transaction at a time.
+    """A reusable context manager for one transaction at a time.
 
     Args:
         connection: the writer's connection.
         path: the store.
-        durability: the events that a commit survives.
-        token: identifies the writer; its first commit marks the store as open with it.
+        durability: the failures that a commit survives.
+        token: identifies the writer; the first commit marks the store as open with this token.
 
     Attributes:
         marked: whether the store is marked as open.
 
     Raises:
-        StoreError: on entry or exit, the store cannot be written; nothing of the block is.
+        StoreError: on entry or exit, the store cannot be written; nothing of the block is written.
     """
 
     def __init__(self, connection: sqlite3.Connection, path: Path, durability: Durability, token: bytes) -> None:
@@ -89,9 +95,9 @@ class WriteTransaction:
         self._name = str(path)  # faster than a `Path`
         found = os.stat(self._name)  # noqa: PTH116
         self._file = found.st_dev, found.st_ino
-        self._cursor = connection.cursor()  # `Connection.execute` makes a new one each time
+        self._cursor = connection.cursor()  # `Connection.execute` creates a new cursor each time
         self._commits = 0
-        self._rows = 0  # rows written so far, at its beginning
+        self._rows = 0  # number of rows written before the transaction
 
     def __enter__(self) -> sqlite3.Connection:
         self._rows = self._connection.total_changes
@@ -124,7 +130,7 @@ class WriteTransaction:
 
     def _roll_back(self, error: BaseException) -> None:
         with reported(self._path, "write"):
-            if self._connection.in_transaction:  # SQLite ends it itself when the disk is full
+            if self._connection.in_transaction:  # SQLite ends the transaction itself when the disk is full
                 self._connection.execute("ROLLBACK")
             if isinstance(error, sqlite3.Error):
                 raise error
@@ -143,22 +149,22 @@ class WriteTransaction:
         else:
             self._cursor.execute("COMMIT")
             CHECKPOINTS.leave(self._path)
-            with suppress(sqlite3.Error):  # committed; a failed checkpoint runs later
+            with suppress(sqlite3.Error):  # the commit is complete; a failed checkpoint runs later
                 connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         self.marked = self.marked or changed
 
 
 class TransactionGroup:
-    """Several changes of the world in memory, written as one transaction; a reusable context manager.
+    """A reusable context manager that writes several changes of the world in memory as one transaction.
 
     Args:
         transaction: the writer's transaction.
-        place: the store, for errors.
+        place: the place of the store, for errors.
 
     Attributes:
         open: whether a group is active.
-        appended: whether a change is part of it.
-        behind: the reason if the file lacks changes of the world in memory.
+        appended: whether the group contains a change.
+        behind: the error that left the file without changes of the world in memory, or `None`.
 
     Raises:
         StoreError: on entry, the file lacks changes; on exit, the group cannot be written.
@@ -205,7 +211,7 @@ class TransactionGroup:
 
 
 class Checkpoints:
-    """Stores that wait for a checkpoint; the thread exists only while there are any."""
+    """Queue of the stores that wait for a checkpoint; its thread exists only while a store waits."""
 
     def __init__(self) -> None:
         self._begin()
@@ -214,14 +220,14 @@ class Checkpoints:
     def _begin(self) -> None:
         self._changed = Condition()
         self._waiting: dict[Path, int] = {}  # number of requests
-        self._pages: dict[Path, int] = {}  # in the log at its last checkpoint
+        self._pages: dict[Path, int] = {}  # number of pages in the log at its last checkpoint
         self._at_work: Path | None = None
         self._thread: Thread | None = None
 
     @contextmanager
     def asking(self, path: Path) -> Iterator[None]:
-        """Request a checkpoint of the store if the commit in the block succeeds; the store is open for writing."""
-        with self._changed:  # no checkpoint begins meanwhile
+        """Request a checkpoint of the store if the commit in the block succeeds; the store must be open for writing."""
+        with self._changed:  # no checkpoint begins during the block
             yield
             if self._at_work == path:
                 return
@@ -235,7 +241,7 @@ class Checkpoints:
             return self._waiting.get(path, 0) >= MOST_ASKED or self._pages.get(path, 0) > MOST_IN_LOG
 
     def leave(self, path: Path) -> None:
-        """Cancel requests for the store, and wait until no checkpoint of it runs."""
+        """Cancel the requests for the store, and wait until no checkpoint of the store runs."""
         with self._changed:
             self._waiting.pop(path, None)
             self._changed.wait_for(lambda: self._at_work != path)
@@ -269,7 +275,10 @@ class Checkpoints:
 
 
 def _started(work: Callable[[], None]) -> Thread | None:
-    """Return the thread, or `None` if the system has none; the writer then runs checkpoints after a while."""
+    """Return the started thread, or `None` if the system cannot start one.
+
+    The writer then runs checkpoints itself after some requests.
+    """
     thread = Thread(target=work, name="checkpoints", daemon=True)
     with suppress(RuntimeError):
         thread.start()
@@ -278,7 +287,10 @@ def _started(work: Callable[[], None]) -> Thread | None:
 
 
 def _tidy_up(path: Path) -> int:
-    """Run a checkpoint; return the pages in the log. Blocked pages stay in the log, where SQLite reads them."""
+    """Run a checkpoint; return the number of pages in the log.
+
+    Blocked pages stay in the log, where SQLite reads them.
+    """
     with suppress(sqlite3.Error), closing(to_tidy_up(path)) as connection:
         _, pages, _ = connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
         return int(pages)
@@ -292,7 +304,7 @@ def to_tidy_up(path: Path) -> sqlite3.Connection:
         sqlite3.Error: the connection cannot be opened.
     """
     connection = connect(path, "rw")
-    connection.execute("PRAGMA synchronous = NORMAL")  # otherwise the log could be reset before the file is on the disk
+    connection.execute("PRAGMA synchronous = NORMAL")  # else the log could be reset before the file is on the disk
     return connection
 
 
@@ -301,10 +313,10 @@ CHECKPOINTS = Checkpoints()
 
 
 def lay_out_log(path: Path) -> None:
-    """Extend SQLite's log to its final length; the writer's connection is open.
+    """Extend SQLite's log to its final length; the connection of the writer must be open.
 
-    A growing file makes each wait for the disk longer and dependent on other writers, since its length must be stored
-    too. SQLite ignores content after the last commit; zeros are never a commit.
+    If the file grows, each wait for the disk is longer and depends on other writers, since the new length must be
+    stored too. SQLite ignores content after the last commit; zeros are never a commit.
 
     Raises:
         StoreError: the disk is full.
@@ -320,7 +332,10 @@ def lay_out_log(path: Path) -> None:
 
 
 def delete_empty_log(path: Path) -> None:
-    """Delete the sidecar files that SQLite leaves at a moved store's old path; the writer still holds its lock."""
+    """Delete the sidecar files that SQLite leaves at the old path of a moved store.
+
+    The caller must hold the writer lock.
+    """
     log = path.with_name(path.name + LOG)
     if not path.exists() and log.exists() and not log.stat().st_size:
         log.unlink()

@@ -1,4 +1,4 @@
-"""The `:action` and `:durative-action` sections of a domain file as read, names not resolved yet."""
+"""The `:action` and `:durative-action` sections of a domain file as read; names are not resolved yet."""
 
 from __future__ import annotations
 
@@ -49,11 +49,13 @@ _T = TypeVar("_T")
 
 
 def read_duration(node: Node) -> Duration:
-    """`(= ?duration 5)`, bounds such as `(and (>= ?duration 4) (<= ?duration 6))`, or `()` for any duration.
+    """Return the duration of an action; `()` is any duration.
+
+    The forms are `(= ?duration 5)` and bounds such as `(and (>= ?duration 4) (<= ?duration 6))`.
 
     Raises:
-        ParseError: it is none of these.
-        UnsupportedConstructError: it is settled at the end of the action.
+        ParseError: the form is wrong.
+        UnsupportedConstructError: the duration is determined at the end of the action.
     """
     least: Term = Constant(0)
     most: Term = Constant(math.inf)
@@ -65,11 +67,11 @@ def read_duration(node: Node) -> Duration:
 
 
 def read_timed(condition: Node | None, effect: Node | None, duration: Duration) -> DurativeParts:
-    """A durative action's condition and effect, by time.
+    """Return the condition and the effect of a durative action, by time.
 
     Raises:
-        ParseError: the form is wrong, or a part does not say when.
-        UnsupportedConstructError: an effect depends on a condition at another time, or on a chosen duration.
+        ParseError: the form is wrong, or a part has no time.
+        UnsupportedConstructError: an effect depends on a condition at another time, or on a duration that is not fixed.
     """
     needed = [] if condition is None else list(_conditions(condition))
     done = [] if effect is None else [(when, _with_duration(e, duration)) for when, e in _effects(effect)]
@@ -106,7 +108,7 @@ def _bound(group: Group) -> tuple[str, Term]:
 
 
 def _conditions(node: Node) -> Iterator[tuple[str, Expression]]:
-    """The parts of a durative condition, each with its time."""
+    """Yield the parts of a durative condition, each with its time."""
     group = _group(node, "a condition is written in parentheses")
     match group.head(), len(group.items):
         case None, 0:
@@ -129,7 +131,7 @@ def _conditions(node: Node) -> Iterator[tuple[str, Expression]]:
 
 
 def _effects(node: Node) -> Iterator[tuple[str, Effect]]:
-    """The parts of a durative effect, each with its time."""
+    """Yield the parts of a durative effect, each with its time."""
     group = _group(node, "an effect is written in parentheses")
     match group.head(), len(group.items):
         case None, 0:
@@ -168,13 +170,13 @@ def _group(node: Node, wanted: str) -> Group:
 
 
 def _at(when: str, parts: Iterable[tuple[str, _T]], join: Callable[[tuple[_T, ...]], _T]) -> _T:
-    """The parts of that time, joined unless there is just one."""
+    """Return the parts with the time `when`, joined unless only one part has this time."""
     found = tuple(part for time, part in parts if time == when)
     return found[0] if len(found) == 1 else join(found)
 
 
 def _with_duration(effect: Effect, duration: Duration) -> Effect:
-    """The effect with the duration in place of `?duration`, which only a fixed one can take."""
+    """Return the effect with `?duration` replaced by the duration, which must be fixed."""
     match effect:
         case AllOf(parts):
             return replace(effect, parts=tuple(_with_duration(part, duration) for part in parts))
@@ -192,8 +194,8 @@ def _with_duration(effect: Effect, duration: Duration) -> Effect:
 class ActionText:
     """A planning action as written; omitted parts are `()`, true, or no effect.
 
-    A durative action has a `duration` and `timed` parts; its precondition and effect equal these if nothing else
-    happens during the action (see `DurativeParts`).
+    A durative action has a `duration` and `timed` parts. Its precondition and effect equal these parts if no other
+    action runs during the action (see `DurativeParts`).
     """
 
     name: str
@@ -206,21 +208,21 @@ class ActionText:
 
 
 def read_actions(sections: Iterable[tuple[str, Group]]) -> tuple[ActionText, ...]:
-    """The actions among a domain's sections, in order.
+    """Return the actions among the sections of a domain, in order.
 
     Raises:
-        ParseError: the form of one is wrong.
-        UnsupportedConstructError: one uses a construct that nothing here can plan with.
+        ParseError: the form of an action is wrong.
+        UnsupportedConstructError: an action uses a construct that no planner here supports.
         SchemaError: two different actions have one name.
     """
     return united(_action(keyword, group) for keyword, group in sections if keyword in _PARTS)
 
 
 def united(actions: Iterable[ActionText]) -> tuple[ActionText, ...]:
-    """The actions, each once.
+    """Return the actions without repetitions.
 
     Raises:
-        SchemaError: two actions of one name differ; it has both places and says in what.
+        SchemaError: two actions of one name differ. The message contains both places and the difference.
     """
     found: dict[str, ActionText] = {}
     for action in actions:
@@ -235,7 +237,7 @@ def united(actions: Iterable[ActionText]) -> tuple[ActionText, ...]:
 
 
 def _difference(first: ActionText, second: ActionText) -> str:
-    """The first part in which two actions differ, in both versions."""
+    """Return the first part in which two actions differ, in both versions."""
     for part, before, here in zip(("parameters", *_COMPARED), _written(first), _written(second), strict=True):
         if before != here:
             return f"the {part} {before} instead of {here}"

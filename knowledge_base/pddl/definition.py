@@ -1,6 +1,7 @@
 """The outer form of PDDL domain and problem files, and the constructs that are refused.
 
-A file is `(define (domain NAME) (:section ...) ...)`. A refusal names engines that support the construct.
+A file has the form `(define (domain NAME) (:section ...) ...)`. The error for a refused construct suggests planners
+that support it.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ REQUIREMENTS = frozenset({
     ":preferences", ":constraints", ":action-costs", ":time", ":domain-axioms", ":goal-utilities", ":hierarchy",
     ":method-preconditions", ":contingent", ":multi-agent",
 })  # fmt: skip
-"""Requirements of PDDL 1.2 to 3.1 and its relatives; only constructs in use are checked."""
+"""Requirements of PDDL 1.2 to 3.1 and of related languages; only constructs in use are checked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +32,10 @@ class Definition:
     sections: tuple[tuple[str, Group], ...]
 
     def single(self, keyword: str) -> Group | None:
-        """The only section with that keyword, or `None` if it is missing.
+        """Return the only section with that keyword, or `None` if the section is missing.
 
         Raises:
-            ParseError: there are two.
+            ParseError: two sections have that keyword.
         """
         found = [group for name, group in self.sections if name == keyword]
         if len(found) > 1:
@@ -42,16 +43,16 @@ class Definition:
         return found[0] if found else None
 
     def nodes(self, keyword: str) -> Sequence[Node]:
-        """The content of that section after its keyword; empty if it is missing."""
+        """Return the content of that section after its keyword; empty if the section is missing."""
         group = self.single(keyword)
         return group.items[1:] if group else ()
 
     def requirements(self) -> tuple[str, ...]:
-        """The `:requirements` in lower case, known or not."""
+        """Return the `:requirements` in lower case, including unknown ones."""
         return tuple(word(node, "a requirement").folded() for node in self.nodes(":requirements"))
 
     def notes(self) -> Iterator[str]:
-        """Remarks that change nothing: unknown requirements, each with its place."""
+        """Yield remarks without influence on the result: unknown requirements, each with its place."""
         for node in self.nodes(":requirements"):
             found = word(node, "a requirement")
             if found.folded() not in REQUIREMENTS:
@@ -61,17 +62,17 @@ class Definition:
 
 
 def read_definition(text: str, source: str | None, kind: str, known: Collection[str]) -> Definition:
-    """Read a whole file of one definition.
+    """Return the definition in the text of a file, which must contain only one definition.
 
     Args:
-        text: the file's text.
-        source: its name for messages.
+        text: the text of the file.
+        source: name of the file for messages.
         kind: `domain` or `problem`.
-        known: the sections it may have.
+        known: the keywords of the sections that the file may contain.
 
     Raises:
-        ParseError: it is no such definition, or a section is unknown.
-        UnsupportedConstructError: a section is one of those that nothing here can plan with.
+        ParseError: the text is not a definition of that kind, or a section is unknown.
+        UnsupportedConstructError: no planner here supports a section of the file.
     """
     define = _define(read(text, source), source)
     if len(define.items) < 2 or not isinstance(define.items[1], Group):
@@ -82,10 +83,10 @@ def read_definition(text: str, source: str | None, kind: str, known: Collection[
 
 
 def word(node: Node, what: str) -> Word:
-    """`node` as a word.
+    """Return `node`, which must be a word.
 
     Raises:
-        ParseError: it is a group; `what` says what was expected.
+        ParseError: `node` is a group; `what` is the expected word in the message.
     """
     if isinstance(node, Group):
         raise ParseError(f"{what} is expected here, not '('", place=node.place)
@@ -141,7 +142,7 @@ _OBJECTS = "planners with object fluents, such as Tamer"
 
 @dataclass(frozen=True, slots=True)
 class _Construct:
-    """Its meaning in a few words, and the engines that support it."""
+    """The meaning of a construct in a few words, and the planners that support it."""
 
     meaning: str
     engines: str
@@ -155,7 +156,7 @@ SECTIONS: Mapping[str, _Construct] = {
     ":htn": _Construct("tasks to be broken down by methods", _HIERARCHICAL),
     ":constraints": _Construct("conditions on whole plans", _WHOLE_PLANS),
 }
-"""Sections of domains and problems."""
+"""Refused sections of domains and problems, by keyword."""
 
 ACTION_PARTS: Mapping[str, _Construct] = {
     ":observe": _Construct("observations during the execution of the plan", _CONTINGENT),
@@ -181,14 +182,14 @@ CHOSEN_DURATION = _Construct("an effect that depends on a chosen duration", _TEM
 
 
 def refused(construct: _Construct, called: str, place: Place | None) -> UnsupportedConstructError:
-    """The error for a construct that was found, called as it was written."""
+    """Return the error for a construct that was found; `called` is its name as written."""
     return UnsupportedConstructError(called, construct.meaning, construct.engines, place=place)
 
 
 def refuse_forms(node: Node) -> None:
     """Raise `UnsupportedConstructError` for the first form in a condition or effect that is not evaluated.
 
-    A predicate may have the name of such a form; the arguments of a form are groups.
+    A predicate may have the name of such a form; only a form has groups as arguments.
     """
     if isinstance(node, Word):
         if node.folded() == "#t" and not node.quoted:

@@ -1,4 +1,4 @@
-"""A PDDL domain file as read: declarations and actions in their written form, nothing resolved yet."""
+"""A PDDL domain file as read: declarations and actions as written; names are not resolved yet."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SECTIONS = (
 )
 
 MOST_IMPLIED = 50
-"""Number of undeclared parents that count as types; each is compared with every declared type."""
+"""Maximum number of undeclared parents that count as types; each is compared with every declared type."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class DeclarationText:
 
 @dataclass(frozen=True, slots=True)
 class AxiomText:
-    """One `:derived` section: `head` holds if the condition holds (PDDL 2.2)."""
+    """One `:derived` section: `head` is true if the condition is true (PDDL 2.2)."""
 
     head: DeclarationText
     condition: Expression
@@ -51,9 +51,10 @@ class AxiomText:
 
 @dataclass(frozen=True, slots=True)
 class DomainText:
-    """All of a domain file, in the order of the file; names are in lower case.
+    """The content of a domain file, in the order of the file; names are in lower case.
 
-    `notes` are remarks that change nothing, each with its place; `source` is the file's name for messages.
+    `notes` are remarks without influence on the result, each with its place; `source` is the name of the file for
+    messages.
     """
 
     name: str
@@ -68,9 +69,10 @@ class DomainText:
     source: str | None = field(default=None, compare=False)
 
     def implied_types(self) -> tuple[TypedName, ...]:
-        """Types that are named only as parents of others.
+        """Return the undeclared types that occur only as parents of other types.
 
-        A name close to a declared type is a typing error and is not among them. More than `MOST_IMPLIED` give none.
+        A name close to a declared type is a typing error and is omitted. The result is empty if more than
+        `MOST_IMPLIED` parents are undeclared.
         """
         declared = {"object", *(name for name, _, _ in self.types)}
         used: dict[str, Place] = {}
@@ -82,7 +84,7 @@ class DomainText:
         return tuple(TypedName(name, (), place) for name, place in used.items() if not _misspelt(name, declared))
 
     def remarks(self) -> Iterator[str]:
-        """The notes of the files, and notes about their declarations together."""
+        """Yield the notes of the file, and remarks about its declarations as a whole."""
         yield from self.notes
         for name, _, place in self.implied_types():
             yield f"{place}: the type '{name}' is not declared and taken to be one of its own"
@@ -96,27 +98,27 @@ class DomainText:
 
 
 def read_domain(text_or_path: str | Path, source: str | None = None) -> DomainText:
-    """Read a PDDL domain: a `Path` or a file's name, or the text itself.
+    """Read a PDDL domain from a file (a `Path` or a file name), or from its text.
 
     Args:
         text_or_path: a file, or text that begins with `(` or a comment.
-        source: the name of the text in messages.
+        source: name of the text in messages.
 
     Raises:
         InputError: the file cannot be read.
         ParseError: the form is wrong.
-        UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
+        UnsupportedConstructError: the file uses a construct that no planner here supports.
         SchemaError: two different actions have one name.
     """
     return parse_domain(*text_and_source(text_or_path, source))
 
 
 def parse_domain(text: str, source: str | None = None) -> DomainText:
-    """Read a PDDL domain from its text; `source` names it in messages.
+    """Read a PDDL domain from its text; `source` is the name of the text in messages.
 
     Raises:
         ParseError: the form is wrong.
-        UnsupportedConstructError: a part of PDDL is used that nothing here can plan with.
+        UnsupportedConstructError: the text uses a construct that no planner here supports.
         SchemaError: two different actions have one name.
     """
     definition = read_definition(text, source, "domain", _SECTIONS)
@@ -135,7 +137,7 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
 
 
 def _misspelt(name: str, valid: Collection[str]) -> bool:
-    """Whether a name is close to a valid one, and neither is the beginning of the other (kiln, kiln8)."""
+    """Return whether a name is close to a valid name, and neither is the beginning of the other (kiln, kiln8)."""
     close = difflib.get_close_matches(name, valid, cutoff=0.8)
     return any(not other.startswith(name) and not name.startswith(other) for other in close)
 
@@ -144,7 +146,7 @@ def parse_declaration(text: str, source: str | None = None) -> DeclarationText:
     """Read one declaration from its text, e.g. `(near ?a ?b - thing)`.
 
     Raises:
-        ParseError: it has another form.
+        ParseError: the text is not one declaration.
     """
     nodes = read(text, source)
     if len(nodes) != 1 or isinstance(nodes[0], Word):
@@ -153,12 +155,15 @@ def parse_declaration(text: str, source: str | None = None) -> DeclarationText:
 
 
 def _declarations(nodes: Sequence[Node]) -> list[DeclarationText]:
-    declared = [_declaration(node, distinct=False) for node in nodes]  # only the types count there
-    return [d for d in declared if d.name != "="]  # declared by old files, though the language has it
+    declared = [_declaration(node, distinct=False) for node in nodes]  # only the types of the parameters matter here
+    return [d for d in declared if d.name != "="]  # some old files declare `=`, which is built in
 
 
 def _functions(nodes: Sequence[Node]) -> list[DeclarationText]:
-    """Declarations of functions; `- TYPE` after them is the type of their values, else numeric as in PDDL 2.1."""
+    """Return the declarations of functions.
+
+    `- TYPE` after functions is the type of their values; without it, they are numeric as in PDDL 2.1.
+    """
     found: list[DeclarationText] = []
     untyped: list[DeclarationText] = []
     position = 0

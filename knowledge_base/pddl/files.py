@@ -1,7 +1,7 @@
-"""Files that people name: read up to a bound, or refused with a message that helps.
+"""Input files: read up to a maximum size, or refused with a helpful message.
 
-All readers of texts come here. A device or pipe is read like a file, up to the same bound. A silent pipe is refused, so
-that no reader waits forever.
+All readers of texts use this module. A device or pipe is read like a file, up to the same size. A silent pipe is
+refused, so that no reader waits without end.
 """
 
 from __future__ import annotations
@@ -16,38 +16,41 @@ from pathlib import Path
 from knowledge_base.errors import InputError, ParseError, Place
 
 MAX_BYTES = 16 * 1024 * 1024
-"""Of a PDDL file: a million facts. Reading takes about 90 µs for each, and 100 bytes of memory for each byte."""
+"""Maximum size of a PDDL file in bytes: about a million facts.
+
+The read requires about 90 µs for each fact, and 100 bytes of memory for each byte.
+"""
 WRITER_S = 3.0
-"""Seconds to wait for a writer of a pipe."""
+"""Time in seconds to wait until a process writes into a pipe."""
 SILENCE_S = 30.0
-"""Seconds of silence that a pipe or terminal with a writer may have."""
+"""Maximum time in seconds without data from a pipe or terminal with a writer."""
 _PIECE = 1 << 20
 _LOOK_S = 0.02
 
 
 def read_text(path: Path, errors: str = "strict", most: int | None = None) -> str:
-    """The text of a UTF-8 file, without a byte order mark; `errors` handles other bytes, as for `open`.
+    """Return the text of a UTF-8 file, without a byte order mark.
 
     Args:
         path: a file, device or pipe.
-        errors: as for `open`.
-        most: bytes that are read at most; `MAX_BYTES` by default.
+        errors: the handling of bytes that are not UTF-8, as for `open`.
+        most: maximum number of bytes; the default is `MAX_BYTES`.
 
     Raises:
-        InputError: the file is missing (the nearest name in the folder is suggested), unreadable or too long, or a
-            silent pipe.
-        ParseError: it is not UTF-8.
+        InputError: the file is missing (the message suggests the nearest name in the folder), is unreadable or too
+            long, or is a silent pipe.
+        ParseError: the file is not UTF-8.
     """
     return decoded(read_bytes(path, MAX_BYTES if most is None else most), path, errors)
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """The bytes of a file, device or pipe, `most` at most; errors as for `read_text`."""
+    """Return the bytes of a file, device or pipe, at most `most` bytes; errors as for `read_text`."""
     return b"".join(_pieces(path, most))
 
 
 def decoded(data: bytes, path: Path, errors: str = "strict") -> str:
-    """The text of a file's bytes; raises `ParseError` as `read_text`."""
+    """Return the text of a file's bytes; raise `ParseError` as for `read_text`."""
     try:
         return data.decode("utf-8-sig", errors)
     except UnicodeDecodeError as error:
@@ -55,22 +58,22 @@ def decoded(data: bytes, path: Path, errors: str = "strict") -> str:
 
 
 def require_size(size: int, most: int, source: str | None) -> None:
-    """Raise `InputError` for a text of more than `most` bytes."""
+    """Raise `InputError` if a text has more than `most` bytes."""
     if size > most:
         raise InputError(f"the text has {size} bytes; at most {most} are read", place=Place(source))
 
 
 def read_lines(path: Path, most: int, longest: int, errors: str = "strict") -> Iterator[str]:
-    """The lines of a UTF-8 file without their ends, one by one; an empty file has one, which is empty.
+    """Yield the lines of a UTF-8 file without their line endings; an empty file has one empty line.
 
     Args:
         path: a file, device or pipe.
-        most: bytes that are read at most.
-        longest: bytes of a line at most.
-        errors: handles other bytes, as for `open`.
+        most: maximum number of bytes of the file.
+        longest: maximum number of bytes of a line.
+        errors: the handling of bytes that are not UTF-8, as for `open`.
 
     Raises:
-        InputError: as `read_text`, and for a line that is too long.
+        InputError: as for `read_text`, or a line is too long.
         ParseError: a line is not UTF-8.
     """
     number, held, size = 0, list[bytes](), 0
@@ -82,16 +85,16 @@ def read_lines(path: Path, most: int, longest: int, errors: str = "strict") -> I
             number += 1
             yield _line(b"".join(held), path, number, longest, errors)
             held, size = [following], len(following)
-        if size > longest:  # it only grows
+        if size > longest:  # further pieces only increase the size
             break
     if size or not number:
         yield _line(b"".join(held), path, number + 1, longest, errors)
 
 
 def _pieces(path: Path, most: int) -> Iterator[bytes]:
-    """The bytes of a file, device or pipe, piece by piece; errors as for `read_text`."""
+    """Yield the bytes of a file, device or pipe in pieces; errors as for `read_text`."""
     try:
-        # Not blocking: to open a pipe would wait for its writer.
+        # A blocking `open` of a pipe would wait for its writer.
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
         try:
             about, total = os.fstat(handle), 0
@@ -111,7 +114,7 @@ def _pieces(path: Path, most: int) -> Iterator[bytes]:
 
 
 def _not_utf8(error: UnicodeDecodeError, path: Path, line: int = 1) -> ParseError:
-    """The error for bytes that are not UTF-8; `line` is the line of the first byte."""
+    """Return the error for bytes that are not UTF-8; `line` is the line of the first byte."""
     before = error.object[: error.start]
     place = Place(str(path), line + before.count(b"\n"), error.start - before.rfind(b"\n"))
     message = f"the file is not UTF-8: it cannot have the byte 0x{error.object[error.start]:02x} here"
@@ -119,11 +122,11 @@ def _not_utf8(error: UnicodeDecodeError, path: Path, line: int = 1) -> ParseErro
 
 
 def text_and_source(text_or_path: str | Path, source: str | None) -> tuple[str, str | None]:
-    """The text of a reader's argument, and its name for messages.
+    """Return the text of a reader's argument, and the name of the text for messages.
 
-    A `Path` is a file. A string is PDDL text if it begins with `(` or `;` or has several lines, else a file's name.
-    Bytes of a file that are not UTF-8 become half characters, which are refused outside of comments: old files have
-    authors' names there.
+    A `Path` is a file. A string is PDDL text if it begins with `(` or `;` or has several lines, else the name of a
+    file. Bytes of a file that are not UTF-8 become surrogates. The parser refuses surrogates outside of comments: old
+    files contain authors' names in comments.
     """
     if isinstance(text_or_path, str) and ("\n" in text_or_path or text_or_path.lstrip()[:1] in ("", "(", ";")):
         return text_or_path, source
@@ -132,7 +135,7 @@ def text_and_source(text_or_path: str | Path, source: str | None) -> tuple[str, 
 
 
 def files_beside(path: Path) -> list[str]:
-    """The names of the files with the same ending in the same folder, to suggest."""
+    """Return the names of the files with the same ending in the same folder, as suggestions."""
     try:
         return [p.name for p in path.parent.iterdir() if p.suffix == path.suffix]
     except (OSError, ValueError):
@@ -140,9 +143,9 @@ def files_beside(path: Path) -> list[str]:
 
 
 def _piece(handle: int, path: Path, size: int, *, begun: bool) -> bytes:
-    """The next bytes, at most `size`; none at the end.
+    """Return the next bytes, at most `size`; empty at the end.
 
-    A pipe without a writer looks like one at its end, until it has begun.
+    Before its first bytes, a pipe without a writer is not at its end: a writer may still open it.
     """
     patience = time.monotonic() + WRITER_S
     while True:

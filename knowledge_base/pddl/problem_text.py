@@ -1,4 +1,4 @@
-"""A PDDL problem file: objects, first state and goal, checked against a vocabulary."""
+"""A PDDL problem file: objects, initial state and goal, checked against a vocabulary."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from knowledge_base.spelling import is_number
 
 _SECTIONS = (":domain", ":requirements", ":objects", ":init", ":goal", ":metric", ":length")
 TOTAL_TIME = Call("total-time")
-"""The duration of the whole plan, in a metric. No domain declares it."""
+"""The duration of the whole plan, in a metric; no domain declares this function."""
 _DIRECTIONS = ("minimize", "maximize")
 
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """The measure of plans: the value of `term` at the end of the plan; `TOTAL_TIME` may occur in it."""
+    """The measure of plans: the value of `term` at the end of the plan. `term` may contain `TOTAL_TIME`."""
 
     direction: Literal["minimize", "maximize"]
     term: Term
@@ -47,15 +47,15 @@ class ProblemText:
     """A problem as read; names are in lower case.
 
     Attributes:
-        name: the problem's name.
-        domain: the name of its domain, as the file says.
+        name: name of the problem.
+        domain: name of the domain that the file declares.
         objects: the objects in the order of the file, with their types.
-        init: the facts of the first state; all others are false.
-        values: values of functions in the first state.
-        goal: the condition wanted; true when the file has none.
+        init: the facts of the initial state; all other facts are false.
+        values: values of functions in the initial state.
+        goal: the condition to reach; true when the file has no goal.
         has_goal: whether the file has a goal.
         metric: the measure of plans, if the file has one.
-        notes: remarks that change nothing, each with its place.
+        notes: remarks without influence on the result, each with its place.
     """
 
     name: str
@@ -69,30 +69,31 @@ class ProblemText:
     notes: tuple[str, ...] = ()
 
     def delta(self) -> Delta:
-        """The change from an empty world to the problem's first state."""
+        """Return the change from an empty world to the initial state of the problem."""
         return Delta(nodes=self.objects, added=self.init, values=self.values)
 
 
 def read_problem(
     text_or_path: str | Path, schema: Vocabulary, source: str | None = None, domain: str | None = None
 ) -> ProblemText:
-    """Read a PDDL problem: a `Path` or a file's name, or the text itself.
+    """Read a PDDL problem from a file (a `Path` or a file name), or from its text.
 
-    Negative facts in `:init` and `:length` are accepted and ignored.
+    Negative facts in `:init`, and the section `:length`, are accepted and ignored.
 
     Args:
         text_or_path: a file, or text that begins with `(` or a comment.
-        schema: the schema of its domain.
-        source: the name of the text in messages.
-        domain: the name of that domain. A problem for another domain is read too if it fits, with a
-            note: files in the wild are renamed.
+        schema: the schema of the problem's domain.
+        source: name of the text in messages.
+        domain: name of the problem's domain. A problem for another domain is read too, with a note, if it matches the
+            schema: domains of public files are often renamed.
 
     Raises:
         InputError: the file cannot be read.
         ParseError: the form is wrong.
-        UnsupportedConstructError: the file uses a part of PDDL that this project does not plan with.
-        UnknownNameError: an undeclared type, predicate, function or object; it is for another domain.
-        SchemaError: a wrong number of arguments, a wrong type, an object declared in two ways.
+        UnsupportedConstructError: the file uses a construct that no planner here supports.
+        UnknownNameError: an undeclared type, predicate, function or object; or the problem is for another domain and
+            does not match the schema.
+        SchemaError: a wrong number of arguments, a wrong type, or an object declared with two types.
     """
     text, source = text_and_source(text_or_path, source)
     return parse_problem(text, schema, source, domain)
@@ -178,13 +179,13 @@ def _metric(definition: Definition, schema: Vocabulary, objects: Mapping[str, st
     if len(nodes) != 2:
         raise ParseError("a metric is written (:metric minimize NUMBER)", place=direction.place)
     term = parse_term(nodes[1])
-    without_total_time = _with_total_time(term, Constant(0))  # which no domain declares
+    without_total_time = _with_total_time(term, Constant(0))  # no domain declares `total-time`
     check(Comparison("<=", without_total_time, Constant(0), place=definition.place), schema, objects=objects)
     return Metric("minimize" if direction.folded() == "minimize" else "maximize", _with_total_time(term, TOTAL_TIME))
 
 
 def _with_total_time(term: Term, value: Call | Constant) -> Term:
-    """The term with `value` for `total-time`, which may have parentheses."""
+    """Return the term with `total-time`, with or without parentheses, replaced by `value`."""
     match term:
         case Constant(TOTAL_TIME.function) | Call(TOTAL_TIME.function, ()):
             return replace(value, place=term.place)
@@ -195,7 +196,7 @@ def _with_total_time(term: Term, value: Call | Constant) -> Term:
 
 
 class _Init:
-    """Collects the first state, one element of `:init` after the other."""
+    """Reader of the initial state, for one element of `:init` after the other."""
 
     def __init__(self, schema: Vocabulary, objects: Mapping[str, str]) -> None:
         self.schema = schema
@@ -218,7 +219,7 @@ class _Init:
             case Atom(predicate, args):
                 self.facts[Fact(predicate, _values(args))] = None
             case Not(Atom()):
-                pass  # facts that are missing are false
+                pass  # facts that are not listed are false
             case Comparison("=", Call(function, args), said) if (content := _content(said)) is not None:
                 fluent = Fact(function, _values(args))
                 require_content(content, self.schema.result(function), fluent, said.place)
@@ -227,13 +228,13 @@ class _Init:
                 raise ParseError("':init' has facts and (= (FUNCTION ...) NUMBER)", place=e.place)
 
     def confirm(self, type_name: str, thing: Value, place: Place | None) -> None:
-        """`(truck t1)` repeats the type of t1, and cannot change it."""
+        """Check `(truck t1)` in `:init`, which may repeat the type of t1 but cannot change it."""
         if not self.schema.is_a(self.objects.get(str(thing), ""), type_name):
             raise SchemaError(f"'{type_name}' is a type; say it in :objects", place=place)
 
 
 def _refuse_timed(node: Node) -> None:
-    """`(at 5 (open door))`: no fact has a number first and a group second."""
+    """Refuse `(at 5 (open door))`; a fact never has a number as first and a group as second argument."""
     if not isinstance(node, Group) or node.head() != "at" or len(node.items) != 3:
         return
     time, fact = node.items[1:]
@@ -242,7 +243,7 @@ def _refuse_timed(node: Node) -> None:
 
 
 def _content(said: Term) -> Content | None:
-    """A value as written, `(geometry 0.4 0.1)` too; `None` for a term that needs a world."""
+    """Return a value as written, including `(geometry 0.4 0.1)`; `None` for a term that needs a world."""
     match said:
         case Constant(value):
             return value

@@ -1,6 +1,6 @@
-"""Domains and worlds as PDDL files, which `parse_domain` and `read_problem` read back.
+"""Writer of domains and worlds as PDDL files, which `parse_domain` and `read_problem` can read.
 
-A file has no places, notes or version.
+A file contains no places, notes or version.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ class WrittenWorld(Protocol):
 
     @property
     def schema(self) -> Vocabulary:
-        """Its declarations."""
+        """The declarations of the world."""
 
     @property
     def nodes(self) -> Mapping[str, str]:
-        """Its objects with their types, constants too."""
+        """The objects of the world with their types, including constants."""
 
     @property
     def facts(self) -> Iterable[Fact]:
-        """Its facts."""
+        """The facts of the world."""
 
     @property
     def values(self) -> Mapping[Fact, Content]:
-        """The values of its functions."""
+        """The values of functions in the world."""
 
 
 def domain_to_text(domain: DomainText) -> str:
-    """The domain as text; parents come before their subtypes, since some readers need that order.
+    """Return the domain as text; parents come before their subtypes, since some readers require this order.
 
     Raises:
-        InputError: a name that PDDL cannot spell, such as one with blanks or capitals.
+        InputError: PDDL cannot spell a name, such as one with blanks or capitals.
     """
     declared = (domain.types, domain.constants, domain.predicates, domain.functions, domain.actions)
     for name in (domain.name, *(one.name for named in declared for one in named)):
@@ -70,7 +70,7 @@ def domain_to_text(domain: DomainText) -> str:
 
 
 def action_to_text(action: ActionText) -> str:
-    """One action as text of a file."""
+    """Return one action as the text of a section."""
     parameters = f":parameters ({' '.join(map(_parameter, action.parameters))})"
     duration, timed = action.duration, action.timed
     if duration is None or timed is None:
@@ -83,25 +83,24 @@ def action_to_text(action: ActionText) -> str:
 
 
 def axiom_to_text(axiom: AxiomText) -> str:
-    """One rule for a derived predicate as text of a file."""
+    """Return one rule for a derived predicate as the text of a section."""
     return _section(f":derived {_declaration(axiom.head)}", [to_text(axiom.condition)])
 
 
 def problem_to_text(
     state: WrittenWorld, name: str, domain: str, goal: Expression = TRUE, metric: Metric | None = None
 ) -> str:
-    """The world as the start of a problem.
+    """Return the world as the initial state of a problem.
 
     Args:
         state: the world; the domain lists the constants of its schema.
-        name: of the problem.
-        domain: the name of its domain.
-        goal: of the problem.
-        metric: the measure of plans.
+        name: name of the problem.
+        domain: name of the domain.
+        goal: goal of the problem.
+        metric: the measure of plans, if any.
 
     Raises:
-        InputError: a name that PDDL cannot spell, such as one with blanks or capitals, or a number that is
-            too long for a file.
+        InputError: PDDL cannot spell a name, such as one with blanks or capitals, or a number is too long for a file.
     """
     schema = state.schema
     heads = {fact.predicate for fact in (*state.facts, *state.values)}
@@ -129,7 +128,7 @@ def _section(keyword: str, lines: Sequence[str]) -> str:
 
 
 def _from_the_top(types: Iterable[TypedName]) -> Iterator[TypedName]:
-    """Parents before their subtypes."""
+    """Yield parents before their subtypes."""
     named = {one.name: one for one in types}
     order = TopologicalSorter({name: one.types for name, one in named.items()}).static_order()
     return (named[name] for name in order if name in named)
@@ -157,14 +156,17 @@ def _duration(duration: Duration) -> str:
 
 
 def _by_time(parts: Mapping[str, Expression | Effect]) -> str:
-    """The parts of a durative condition or effect, each with its time; true and the empty effect have no parts."""
+    """Return the parts of a durative condition or effect, each with its time.
+
+    True and the empty effect have no parts.
+    """
     timed = [(when, one) for when, e in parts.items() for one in (e.parts if isinstance(e, And | AllOf) else (e,))]
     return f"(and {' '.join(f'({when} {to_text(one)})' for when, one in timed)})"
 
 
 def _fact(fact: Fact, signature: Signature) -> str:
     typed = zip(fact.args, signature.parameters, strict=True)
-    # Text without quotes would be read as the name of a thing; a name in quotes is still one.
+    # Text without quotes would be read as the name of an object; a name in quotes denotes the same object.
     return "(" + " ".join([fact.predicate, *(_written(arg, quoted="text" in p.types) for arg, p in typed)]) + ")"
 
 

@@ -19,7 +19,7 @@ from typing import Protocol
 from knowledge_base.errors import ConflictError
 
 PATIENCE_S = 0.0005
-"""Time in seconds for which the first waiting thread lets other threads take the lock first.
+"""Time in seconds for which the first waiting thread lets other threads acquire the lock first.
 
 This time is long enough for several changes and several handovers of the lock.
 """
