@@ -1,4 +1,4 @@
-"""Plan steps in a generated plot: conditions, effects, used components, and the state that executes each step."""
+"""Plan steps of a generated plot: conditions, effects, used components, and the state that executes each step."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ from planning.problem.expressions import changed, names_of
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """The components that plots may use in any run.
+    """The components that a set of plots may use in any run.
 
     Attributes:
-        components: names of the components that they start, configure or switch.
-        anything: they may use others too: they plan, or bind a plot that is a value.
-        seconds: the sum of the time limits of their skills.
+        components: the names of the components that the plots call, configure or switch.
+        anything: whether the plots may use other components too, because they plan or use a plot given as a value.
+        seconds: the sum of the time limits of all skill calls, in seconds.
     """
 
     components: frozenset[str] = frozenset()
@@ -49,15 +49,15 @@ class Usage:
     seconds: float = 0.0
 
     def clashes(self, other: Usage, shared: Iterable[str] = ()) -> bool:
-        """Return whether both may need the same component at the same time, except `shared` ones."""
+        """Return whether both usages may need one component at one time; components in `shared` do not count."""
         return self.anything or other.anything or bool((self.components & other.components).difference(shared))
 
 
 def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] = ()) -> Usage:
-    """Return the usage of the plots and of the plots that matching rules start.
+    """Return the usage of the plots, and of the plots and commands of rules that may apply to them.
 
     Raises:
-        UnknownNameError: a plot uses a missing one.
+        UnknownNameError: a plot uses a missing plot.
     """
     found: dict[str, ActionPlot] = {}
     waiting = list(plots)
@@ -76,7 +76,7 @@ def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] =
 
 
 def _applied(rules: Iterable[Rule], plots: Sequence[ActionPlot]) -> list[Rule]:
-    """Return the rules that may apply to a step with these plots."""
+    """Return the rules that may apply to a step with these plots as candidates."""
     emitted = FAILURES.union(*(plot.emits for plot in plots))
     actions = {plot.implements for plot in plots}
     named = [rule for rule in rules if not rule.steps or actions.intersection(rule.steps)]
@@ -84,7 +84,7 @@ def _applied(rules: Iterable[Rule], plots: Sequence[ActionPlot]) -> list[Rule]:
 
 
 def fitting(plots: Iterable[ActionPlot], bindings: Mapping[str, Value]) -> tuple[ActionPlot, ...]:
-    """Return the plots whose conditions these arguments can satisfy in some world; all plots if there are none."""
+    """Return the plots whose conditions may be true for these arguments; all plots if there is no such plot."""
     plots = tuple(plots)
     return tuple(plot for plot in plots if plot.when is None or not _is_false(plot.when, bindings)) or plots
 
@@ -114,27 +114,27 @@ def _is_open(plot: ActionPlot) -> bool:
 
 
 PATIENCE = 2
-"""Factor on a step's own duration, or on the total time limit of its skills, after which the step is interrupted."""
-_MOST_CARRIED = 1024  # steps; a plan for 50 items has about 130
+"""The factor on a step's duration, or on the sum of its skills' time limits, after which a step is interrupted."""
+_MOST_CARRIED = 1024  # steps; a plan for 50 items has about 130 steps
 _CONFIRM = ActionPlot.model_fields["confirm"].default
 
 
 @dataclass(frozen=True, slots=True)
 class CarriedStep:
-    """A step of a plan, ready to become states.
+    """A step of a plan, with everything that its states need.
 
     Attributes:
         text: the step in PDDL.
-        needed: ground conditions that must hold when it begins.
-        over_all: conditions that must hold throughout, except those that it changes itself.
-        effect: its effect.
-        expected: conditions to observe when it is done; empty if its effects are assumed.
-        assumed: whether its effects are asserted when it is done.
-        confirm: seconds within which the expected conditions must be observed.
-        seconds: its time limit; `None` if unknown.
-        content: the content of its state: the candidates, or the plot it uses.
-        outcomes: its outcome events besides `done`.
-        usage: the components it uses.
+        needed: the ground conditions that must hold when the step begins.
+        over_all: the conditions that must hold during the step, except conditions that the step itself changes.
+        effect: the effect of the step.
+        expected: the conditions to observe after the step; empty if effects are assumed.
+        assumed: whether the effects are asserted after the step, instead of observed.
+        confirm: the time limit, in seconds, for the observation of the expected conditions.
+        seconds: the time limit of the step, in seconds; `None` if unknown.
+        content: the content of the step's state: the candidates, or the plot that it uses.
+        outcomes: the outcome events of the step other than `done`.
+        usage: the components that the step uses.
     """
 
     text: str
@@ -151,12 +151,12 @@ class CarriedStep:
 
 
 class Carrier:
-    """Maps steps to the plots that execute them, and to the components that these use.
+    """Constructor of carried steps: finds the plots that execute each step, and the components that these plots use.
 
     Args:
-        domain: has the steps' actions.
-        library: has the plots that implement them.
-        rules: contingency rules, which may use more plots for outcomes.
+        domain: the planning domain.
+        library: the plots that implement planning actions.
+        rules: the contingency rules, which may use further plots and components.
     """
 
     def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule] = ()) -> None:
@@ -168,17 +168,17 @@ class Carrier:
 
     @staticmethod
     def of(domain: PlanningDomain, library: Library, rules: Sequence[Rule]) -> Carrier:
-        """Return the cached carrier of the last plan if the rules are equal: most of its steps come again."""
+        """Return the carrier of the last plan if the rules are equal, since successive plans share most steps."""
         known = _carriers.find(domain, library)
         if known is None or known.rules != tuple(rules):
             known = _carriers.keep(domain, library, Carrier(domain, library, rules))
         return known
 
     def carried(self, step: PlanStep) -> CarriedStep:
-        """Return the step as a dynamic state over the plots that implement it and whose conditions its arguments allow.
+        """Return the step as a dynamic state whose candidates implement its action and fit its arguments.
 
         Raises:
-            UnknownNameError: no plot implements its action, or a plot uses a missing one.
+            UnknownNameError: no plot implements the action, or a plot uses a missing plot.
         """
         plots = implementing(step, self._library)  # a library may grow, but its plots never change
         key = step, tuple([plot.name for plot in plots])
@@ -210,12 +210,12 @@ _carriers: IdentityCache[PlanningDomain, Carrier] = IdentityCache(size=8)
 
 
 def sketched(step: PlanStep, domain: PlanningDomain) -> CarriedStep:
-    """Return the step as a state with a plot named like its action, to be written by the author."""
+    """Return the step as a state with a plot of the action's name, which an author must write."""
     return _step(step, domain, {"use": step.action, "with": domain.bindings(step)}, None)
 
 
 def implementing(step: PlanStep, library: Library) -> tuple[ActionPlot, ...]:
-    """Return the plots that implement a step's action.
+    """Return the plots that implement the action of a step.
 
     Raises:
         UnknownNameError: no plot implements the action.
@@ -230,7 +230,7 @@ def implementing(step: PlanStep, library: Library) -> tuple[ActionPlot, ...]:
 
 
 def expectation(effect: Effect, bindings: Mapping[str, Value]) -> Expression:
-    """Return the condition that holds after an effect in every world."""
+    """Return the condition that is true after an effect in every world."""
     ground = [(substitute(part.atom, bindings), isinstance(part, Add)) for part in _literals(effect)]
     added = [atom for atom, adds in ground if adds]
     return And((*added, *(Not(atom) for atom, adds in ground if not adds and atom not in added)))
@@ -255,7 +255,7 @@ def _step(
 
 
 def _decided(e: Expression) -> bool:
-    """Return whether the condition holds in every world, as the replacement of a recursive predicate may."""
+    """Return whether the condition is true in every world, e.g. the expansion of a recursive predicate."""
     match e:
         case Comparison("=", Constant(one), Constant(other)):
             return one == other
@@ -268,7 +268,7 @@ def _decided(e: Expression) -> bool:
 
 
 def _limit(action: PlanningAction, bindings: Mapping[str, Value]) -> Term | None:
-    """Return the time limit from the action's own duration, or `None`."""
+    """Return the time limit that follows from the action's duration; `None` without an upper bound."""
     if action.duration is None or action.duration.most == Constant(float("inf")):
         return None
     match substitute(action.duration.most, bindings):
@@ -279,7 +279,7 @@ def _limit(action: PlanningAction, bindings: Mapping[str, Value]) -> Term | None
 
 
 def _watched(action: PlanningAction) -> Iterator[Expression]:
-    """Yield the conditions over all without those that the action changes itself, whose timing is its own concern."""
+    """Yield the conditions over all, except conditions that the action itself changes."""
     if action.timed is not None:
         effects = (action.timed.start_effect, action.timed.end_effect)
         own = {name for effect in effects for name in changed(effect)}

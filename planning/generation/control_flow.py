@@ -28,16 +28,16 @@ from planning.ordering.partial_order import PartialOrder
 
 FINISHED = "finished"
 HELD = "held"
-"""A variable of the plot: no more steps begin, since another plan replaces them."""
+"""The variable of the plot that prevents further steps, since another plan replaces them."""
 MOST_WATCHED = 86400
-"""Time limit in seconds for the watch of a plan, as long as any plan may take; every wait has a limit."""
+"""The time limit, in seconds, for the call of `planner.hold`, since every call needs a limit."""
 _HELD = Comparison("=", Variable(HELD), Constant(value=True))
 _DONE, _BEGUN = "done", "begun"
 
 
 @dataclass(frozen=True, slots=True)
 class ControlFlow:
-    """A chain of steps; `mark` is the suffix of its end states, whose names are unique in the plot."""
+    """A chain of steps; `mark` is the suffix of its end states, so that their names are unique in the plot."""
 
     numbers: tuple[int, ...]
     mark: str = ""
@@ -45,20 +45,20 @@ class ControlFlow:
 
     @property
     def finished(self) -> str:
-        """The name of the state at its end."""
+        """The name of the end state of the chain."""
         return FINISHED + self.mark
 
 
 class Writer:
-    """Writes the states of the lanes of one plot.
+    """Writer of the states of all chains of one plot.
 
     Args:
-        steps: all steps.
+        steps: all steps of the plan.
         order: the partial order of the steps.
         lanes: the chains of steps.
-        plan: the name under which the planner's component gets the number of each step; `None` for a plot without it.
-        left_out: the steps that rules may skip.
-        leading: outcomes with which rules leave the plan for another state, with the names of the data passed to it.
+        plan: the name of the plan, with which states report the begin of steps; `None` without the planning component.
+        left_out: the numbers of the steps that rules may skip.
+        leading: outcomes with which rules leave the plan for another state; for each, the names of the passed data.
     """
 
     def __init__(
@@ -85,12 +85,12 @@ class Writer:
 
     @property
     def variables(self) -> Mapping[str, Any]:
-        """The variables that lanes set for each other, and `held`."""
+        """The variables by which chains wait for each other, and `held`."""
         names = (*self._flags, *([] if self._plan is None else [HELD]))
         return {flag: {"type": "boolean", "initial": False} for flag in names}
 
     def states(self, lane: ControlFlow) -> dict[str, Any]:
-        """Return the states of one lane, without the one at its end."""
+        """Return the states of one chain, without its state `finished`."""
         first = lane.numbers[0] if lane.numbers else None
         states: dict[str, Any] = {"before" if first is None else f"before_{first}": self._before(first, lane)}
         for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=False):
@@ -147,9 +147,9 @@ class Writer:
         self, number: int | None, lane: ControlFlow, first: Iterable[Expression], told: Mapping[str, Any] | None = None,
         after: CarriedStep | None = None,
     ) -> list[dict[str, Any]]:  # fmt: skip
-        """Return transitions to a step if it is applicable, else to planning; both wait for the `first` conditions.
+        """Return transitions to a step if it is applicable, and otherwise to `replan`.
 
-        With `after`, these are its expected effects.
+        All transitions wait for the conditions in `first`, or for the expected effects of `after` if that is given.
         """
         first, assigned = tuple(first), dict((told or {}).get("assign", {}))
         begun = _joined(first) if after is None else _seen(after)
@@ -164,7 +164,7 @@ class Writer:
         return [*self._held(lane, first, after), _guarded(begin, both), *otherwise]
 
     def _held(self, lane: ControlFlow, first: Iterable[Expression], after: CarriedStep | None) -> list[dict[str, Any]]:
-        """Return the transition that prevents a step when another plan replaces it."""
+        """Return the transition to `replan` that prevents the step if another plan replaces it."""
         if self._plan is None:
             return []
         when = _joined((_HELD, *first)) if after is None else _held_after(after)
@@ -175,7 +175,7 @@ class Writer:
 
 
 def passed(name: str) -> str:
-    """Return the variable for data that a rule passes to a state outside the plan."""
+    """Return the name of the variable for data that a rule passes to a state outside the plan."""
     return f"passed_{name}"
 
 
@@ -184,30 +184,30 @@ def _guarded(transition: dict[str, Any], when: Expression | None) -> dict[str, A
 
 
 def _joined(conditions: Iterable[Expression]) -> Expression | None:
-    """Return the conjunction; `None` if it is empty."""
+    """Return the conjunction of the conditions; `None` without conditions."""
     all_ = tuple(dict.fromkeys(conditions))
     return None if not all_ else all_[0] if len(all_) == 1 else And(all_)
 
 
-# Other caches use a condition's identity as the key, and a new plan shares most pairs of steps with the last.
+# Equal pairs of steps must have identical conditions, because other caches use the identity of a condition as the key.
 _pairs: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
 _ends: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
 
 
 def _seen(step: CarriedStep) -> Expression | None:
-    """Return the expected effects of a step."""
+    """Return the conjunction of the expected effects of a step; cached."""
     (found,) = _pairs.find(step, None) or _pairs.keep(step, None, (_joined(step.expected),))
     return found
 
 
 def _held_after(step: CarriedStep) -> Expression | None:
-    """Return the condition under which no step begins after this one."""
+    """Return the condition under which no step may begin after this step; cached."""
     (found,) = _ends.find(step, None) or _ends.keep(step, None, (_joined((_HELD, *step.expected)),))
     return found
 
 
 def _between(step: CarriedStep, following: CarriedStep) -> Expression | None:
-    """Return the expected effects of a step with the conditions of the next."""
+    """Return the conjunction of the expected effects of a step and the conditions of the next step; cached."""
     both = (*step.expected, *following.needed)
     (found,) = _pairs.find(step, following) or _pairs.keep(step, following, (_joined(both),))
     return found

@@ -25,18 +25,18 @@ from planning.plan import Plan, PlanStep
 from planning.problem.derived import derivation
 
 WORK = "work"
-"""Name of the state with the regions."""
+"""The name of the state with the parallel regions."""
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The arrangement of a plan's steps in a plot.
+    """The arrangement of a plan's steps as states of a plot.
 
     Attributes:
-        steps: ready to become states.
-        order: the partial order, extended by steps that use the same component.
-        lanes: the chains of steps.
-        rules: the inherited rules that concern steps of the plan.
+        steps: the steps with everything that their states need.
+        order: the partial order, extended by pairs of steps that use one component.
+        lanes: the chains of steps; several chains become parallel regions.
+        rules: the inherited rules that can apply to steps of the plan.
     """
 
     steps: Sequence[CarriedStep]
@@ -46,7 +46,7 @@ class Layout:
 
     @property
     def before(self) -> frozenset[tuple[int, int]]:
-        """Pairs of steps of which the first is done, or skipped, when the second begins."""
+        """Pairs of steps; the first step of a pair is done, or skipped, when the second begins."""
         return self.order.before.union(*(pairwise(lane.numbers) for lane in self.lanes))
 
 
@@ -61,7 +61,7 @@ def laid_out(
     """Return the layout of a plan; for the arguments see `plot_from_plan`."""
     if order is None:
         order = scheduled(plan) if plan.schedule else in_sequence(plan)
-    domain = derivation(domain).domain  # the knowledge base has no derived predicates
+    domain = derivation(domain).domain  # the knowledge base does not evaluate derived predicates
     rules = [own for rule in rules if (own := _inherited(rule, plan)) is not None]
     writing = None if library is None else Carrier.of(domain, library, rules)
     steps = [sketched(step, domain) if writing is None else writing.carried(step) for step in plan.steps]
@@ -83,24 +83,26 @@ def plot_from_plan(
     """Return the action plot that executes a plan.
 
     Args:
-        plan: its steps; with a schedule they begin in its order, concurrently where the schedule overlaps them.
-        domain: gives each step's precondition and effects.
-        library: has the plots that implement the planning actions. Without one the result is a sketch to complete:
-            every step uses a plot with its action's name and arguments.
-        rules: the contingency rules it inherits.
-        name: the plot's name.
+        plan: the steps. If the plan has a schedule, steps begin in the order of the schedule and may overlap as in the
+            schedule.
+        domain: the planning domain.
+        library: the plots that implement the planning actions. Without a library the result is a sketch to complete, in
+            which every step uses a plot with the name and arguments of its action.
+        rules: the contingency rules that the plot inherits.
+        name: the name of the plot.
         order: the partial order of the steps, e.g. from `ordering.partial_order.deordered`; by default a sequence.
-        shared: components that can run several skills concurrently. Steps that share another component never overlap.
+        shared: components that can execute several skills concurrently. Steps that use another common component never
+            overlap.
 
     Raises:
-        UnknownNameError: no plot implements a step's action.
+        UnknownNameError: no plot implements the action of a step.
     """
     layout = laid_out(plan, domain, library, rules, order, shared)
     return plot_of(plan, layout, name, watched=library is not None)
 
 
 def plot_of(plan: Plan, layout: Layout, name: str, *, watched: bool) -> ActionPlot:
-    """Return the plot of a layout; with `watched`, its states report progress to the planner's component."""
+    """Return the plot of a layout; with `watched`, its states report the progress to the planning component."""
     steps, lanes, rules = layout.steps, layout.lanes, layout.rules
     left_out = [n for n, step in enumerate(plan.steps, start=1) if any(_leaves_out(rule, step) for rule in rules)]
     leading = {rule.outcome: dict.fromkeys(rule.do.passed, "symbol") for rule in rules if rule.leads_away}
@@ -129,7 +131,7 @@ def plot_of(plan: Plan, layout: Layout, name: str, *, watched: bool) -> ActionPl
 
 
 def _inherited(rule: Rule, plan: Plan) -> Rule | None:
-    """Return the rule restricted to steps of this plan, or `None`."""
+    """Return the rule restricted to the steps of this plan; `None` if it applies to none of them."""
     if not rule.steps:
         return rule
     done = {step.action for step in plan.steps}
@@ -143,7 +145,7 @@ def _leaves_out(rule: Rule, step: PlanStep) -> bool:
 
 
 def _clashes(used: Sequence[Usage], order: PartialOrder, shared: Collection[str]) -> Iterable[tuple[int, int]]:
-    """Yield unordered pairs of steps that use the same component."""
+    """Yield unordered pairs of steps that use one component."""
     for second, earlier in order.earlier.items():
         for first in range(1, second):
             if first not in earlier and used[first - 1].clashes(used[second - 1], shared):

@@ -1,18 +1,18 @@
-"""Causal tracing: record for each condition of a plan the step that establishes it, and de-order the steps (S1.5).
+"""Causal tracing: the step that establishes each condition of a plan, and the de-ordering of the steps (S1.5).
 
-*De-ordering* keeps only the ordered pairs of the plan with a reason (Bäckström 1998, *Computational aspects of
-reordering plans*). The reasons:
+*De-ordering* keeps only those ordered pairs of the plan for which there is a reason (Bäckström 1998, *Computational
+aspects of reordering plans*). The reasons are:
 
 - Link: a step needs a condition that an earlier step establishes.
 - Threat: a later step falsifies a condition that an earlier step needs.
-- Conflict: one step makes a fact true that the other makes false, or both change a number and do not commute.
+- Conflict: one step makes a fact true and the other makes it false, or both change a number and do not commute.
 
-Every linearization then takes the same steps to the same end. A fact that a step both deletes and adds counts as false
-in between, so that two such steps never overlap.
+Every linearization of the result therefore leads to the same final state. A fact that a step both deletes and adds is
+false for a short time during the step, so two such steps never overlap.
 
-Sets of steps are bits, and each fact has one record, so that the cost of a step depends on its own facts. The needs and
-changes of most steps are plain facts in every world, and are cached for each step. Other steps are evaluated in the
-simulated world.
+Sets of steps are integers with one bit per step, and each fact has one record. The cost of tracing a step therefore
+depends only on the facts of that step. The needs and changes of most steps are plain facts in every world, and are
+cached for each step. The needs and changes of other steps are evaluated in the simulated world.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ from planning.problem.derived import derivation
 
 
 def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> PartialOrder:
-    """Return the plan without ordered pairs that have no reason, with its causal links by user.
+    """Return the plan's steps in the order that has a reason for each pair, with causal links in the order of users.
 
-    Every linearization leads from `world` to the goal, as long as all links hold. The result is not always the least
+    Every linearization leads from `world` to the goal as long as all links hold. The result is not always the least
     such order, which is NP-hard to find.
 
     Raises:
-        InputError: the plan does not lead to the goal; `planning.validation.validate` returns the step and the reason.
+        InputError: the plan does not lead to the goal; `planning.validation.validate` returns the failing step.
     """
     derived = derivation(domain)
     tracing = CausalTrace(derived.world(world))
@@ -59,14 +59,14 @@ def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression
 
 
 class CausalTrace:
-    """The trace of a plan that leads from `world`, which it does not change, to its goal.
+    """The trace of a plan from `world` to its goal; `world` stays unchanged.
 
     Args:
-        world: the present, with derived facts.
+        world: the present world, with derived facts.
 
     Attributes:
         links: the causal links, in the order of the users.
-        earlier: for each step, the steps that must end before it, as bits.
+        earlier: the steps that must end before each step, as bits.
     """
 
     def __init__(self, world: World) -> None:
@@ -79,7 +79,7 @@ class CausalTrace:
         self._numbers: dict[Fact, _Number] = defaultdict(_Number)
 
     def take(self, number: int, step: PlanStep, domain: PlanningDomain) -> None:
-        """Add step number `number` to the trace.
+        """Add the step with number `number` to the trace.
 
         Raises:
             InputError: the step is not applicable.
@@ -120,11 +120,11 @@ class CausalTrace:
             if isinstance(now, int | float) and isinstance(before, int | float):
                 self._numbers[fluent].moves[number] = now - before
         world.apply(made)
-        for literal in doing.makes:  # the end may delete a fact that the start adds
+        for literal in doing.makes:  # the end of the step may delete a fact that its start adds
             self._facts[literal.fact].holds = world.holds(literal.fact.predicate, literal.fact.args)
 
     def reach(self, user: int, goal: Expression) -> None:
-        """Add the goal as the last user.
+        """Add the goal as the last user of conditions.
 
         Raises:
             InputError: the goal does not hold.
@@ -134,12 +134,12 @@ class CausalTrace:
         self._unite_links(before)
 
     def _unite_links(self, since: int) -> None:
-        """Remove equal links among the last ones: one condition may occur several times in a step or goal."""
+        """Remove repeated links from index `since`, because a condition may occur several times in a step or goal."""
         self.links[since:] = dict.fromkeys(self.links[since:])
 
     @property
     def _world(self) -> Overlay:
-        """The simulated world after the steps so far."""
+        """The simulated world after all steps added so far."""
         if self._pending:
             added = tuple([fact for fact, so in self._pending.items() if so])
             removed = tuple([fact for fact, so in self._pending.items() if not so])
@@ -154,7 +154,7 @@ class CausalTrace:
                 raise InputError(f"{step} is not possible: '{arg}' is no {' or '.join(parameter.types) or 'object'}")
 
     def _need(self, user: int, condition: Expression, literal: Literal, whose: PlanStep | None) -> None:
-        """Record that a step, or the goal, needs a literal."""
+        """Record that a step, or the goal, needs a literal; raise `InputError` if the literal is false."""
         wanted, record = literal.positive, self._facts[literal.fact]
         if record.holds is not wanted:
             raise _missing(condition, whose)
@@ -165,8 +165,8 @@ class CausalTrace:
             self.earlier[user] |= 1 << provider
 
     def _need_all(self, user: int, condition: Expression, whose: PlanStep | None) -> None:
-        """Record that a step, or the goal, needs all parts of a ground condition now."""
-        for part in ground_conjuncts(condition, self._base):  # reads only objects, which no step changes
+        """Record that a step, or the goal, needs all parts of a ground condition."""
+        for part in ground_conjuncts(condition, self._base):  # quantifiers range over objects, which no step changes
             literal = _literal(part, self._schema)
             if literal is None:
                 self._need_support(user, part, whose)
@@ -174,11 +174,11 @@ class CausalTrace:
                 self._need(user, part, literal, whose)
 
     def _need_support(self, user: int, condition: Expression, whose: PlanStep | None) -> None:
-        """Record that a step, or the goal, needs a ground condition of any form now."""
+        """Record that a step, or the goal, needs a ground condition of any form; raise `InputError` if it is false."""
         found = support(condition, self._world, self._latest)
         if found is None:
             raise _missing(condition, whose)
-        if not found:  # no step can change it
+        if not found:  # no step can change the condition
             return
         providers = {one for ground in found for one in self._providers(ground) if self._helps(one, ground, condition)}
         self.links += [CausalLink(one, condition, user) for one in sorted(providers - {PRESENT} or {PRESENT})]
@@ -195,7 +195,7 @@ class CausalTrace:
             self._numbers[ground].users |= 1 << user
 
     def _make(self, number: int, makes: Iterable[Literal]) -> None:
-        """Order the step after users and makers of the opposite; a fact both deleted and added is true at the end."""
+        """Order the step after users and makers of the opposite literals, and record that it makes the literals true."""
         records = [(self._facts[literal.fact], literal.positive) for literal in makes]
         own = 1 << number
         for record, positive in records:
@@ -204,7 +204,7 @@ class CausalTrace:
                 record.since[positive] = number
         for record, positive in records:
             record.makers[positive] |= own
-            if record.makers[not positive] & own:  # the step makes it both false and true
+            if record.makers[not positive] & own:  # the step makes the fact both false and true
                 record.since[:] = number, number
             record.holds = positive or bool(record.makers[True] & own)
         self.earlier[number] &= ~own
@@ -226,7 +226,7 @@ class CausalTrace:
         return tuple(_numbers(known.adders | known.assigners)) or (PRESENT,)
 
     def _helps(self, provider: int, ground: Ground, condition: Expression) -> bool:
-        """Return whether the provider contributes to the condition; consuming fuel does not provide the rest."""
+        """Return whether the provider contributes to the condition; consumption of fuel, e.g., does not."""
         if isinstance(ground, Literal) or provider == PRESENT or self._numbers[ground].assigners:
             return True
         good = favours(condition, ground, self._world)
@@ -237,13 +237,13 @@ class CausalTrace:
 
 
 class _Record:
-    """The history of a fact; index 0 of each list is about its falsehood, index 1 about its truth.
+    """The history of a fact; in each list, index 0 concerns its falsehood and index 1 its truth.
 
     Attributes:
-        holds: whether the fact holds now.
-        since: the step that made it so; `PRESENT` if it was so initially.
-        makers: the steps that make it so, as bits.
-        users: the steps that rely on it, as bits.
+        holds: whether the fact is true now.
+        since: the step that made the fact false or true; `PRESENT` if this is its initial state.
+        makers: the steps that make the fact false or true, as bits.
+        users: the steps that need the fact to be false or true, as bits.
     """
 
     __slots__ = ("holds", "makers", "since", "users")
@@ -256,7 +256,7 @@ class _Record:
 
 
 class _Records(dict[Fact, _Record]):
-    """The record of each fact, made on first access."""
+    """The record of each fact, constructed on first access."""
 
     def __init__(self, world: World) -> None:
         super().__init__()
@@ -272,7 +272,7 @@ class _Number:
     """The history of a number.
 
     Attributes:
-        users, adders, assigners: steps, as bits, that read it, that only add to it, and that change it in other ways.
+        users, adders, assigners: the steps that read the number, only add to it, or change it in other ways, as bits.
         moves: the increase by each step.
     """
 
@@ -284,13 +284,13 @@ class _Number:
 
 @dataclass(frozen=True, slots=True)
 class _Known:
-    """The needs and changes of a step that are the same in every world.
+    """The needs and changes of a step that do not depend on the world.
 
     Attributes:
-        needs: its conditions; with the literal if the condition is one.
-        makes: the literals that it makes true; `None` if they depend on the world.
-        changes: the truth values of their facts afterwards.
-        plain: whether all needs are literals, and no change depends on the world.
+        needs: the conditions; each with its literal if the condition is a literal.
+        makes: the literals that the step makes true; `None` if they depend on the world.
+        changes: the truth values of the changed facts after the step.
+        plain: whether all needs are literals and no change depends on the world.
     """
 
     needs: tuple[tuple[Expression, Literal | None], ...]
@@ -300,7 +300,7 @@ class _Known:
 
     @staticmethod
     def of(ground: GroundStep, step: PlanStep, action: PlanningAction, schema: Vocabulary) -> _Known:
-        """Return the cached needs and changes: a new plan shares most steps with the last."""
+        """Return the needs and changes; cached, since successive plans share most steps."""
         return _known.find(ground, schema) or _known.keep(ground, schema, _Known._of(ground, step, action, schema))
 
     @staticmethod
@@ -320,13 +320,13 @@ class _Known:
 
 @dataclass(frozen=True, slots=True)
 class _Pattern:
-    """The predicates, parameters and truth values that an action changes; `None` if they depend on the world."""
+    """The changes of an action as predicate, parameters and truth value; `None` if they depend on the world."""
 
     changes: tuple[tuple[str, tuple[str, ...], bool], ...] | None
 
     @staticmethod
     def of(action: PlanningAction, schema: Vocabulary) -> _Pattern:
-        """Return the changes of an action that only adds and deletes facts, unconditionally, with valid types."""
+        """Return the pattern; its changes are `None` unless the action only adds and deletes facts unconditionally."""
         types = {parameter.name: parameter.types for parameter in action.parameters}
         changes = []
         for part in effect_parts(action.effect) if action.timed is None else ():
@@ -352,7 +352,7 @@ def _doing(action: PlanningAction, step: PlanStep, effect: Effect, domain: Plann
 
 
 def _literal(e: Expression, schema: Vocabulary) -> Literal | None:
-    """Return the condition as a literal, or `None` if it is none."""
+    """Return the condition as a literal; `None` if the condition is not a literal."""
     atom = e.body if isinstance(e, Not) else e
     if not isinstance(atom, Atom) or atom.predicate not in schema.predicates:
         return None

@@ -1,9 +1,9 @@
-"""The partial order of a plan's steps, with its causal links; few control flows for it, and purposes of steps.
+"""The partial order of a plan's steps, with causal links, chains of steps, and the purpose of each step.
 
-A *causal link*: a step, or the present, establishes a condition that a later step, or the goal, needs (Tate 1977,
-*Generating project networks*).
+A *causal link* connects the provider of a condition with its user (Tate 1977, *Generating project networks*). The
+provider is a step or the present world; the user is a later step or the goal.
 
-Few control flows are a minimum chain cover (Dilworth 1950), found by matching (Fulkerson 1956).
+The steps are divided into the fewest chains (Dilworth 1950), found by matching (Fulkerson 1956).
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ from knowledge_base.language.syntax.text import to_text
 from planning.plan import Plan, PlanStep
 
 PRESENT = 0
-"""The provider of facts that hold initially."""
+"""The provider number of facts that hold initially."""
 
 
 @dataclass(frozen=True, slots=True)
 class CausalLink:
-    """Step `provider` (0: the present) establishes a condition of step `user` (one past the last: the goal).
+    """A condition that step `provider` establishes and step `user` needs.
 
-    `fact` is a ground literal if the condition can be split that far; a disjunction or comparison is one condition. If
-    several steps establish it together, each has a link, and the condition holds after the last of them.
+    `provider` 0 is the present world, and a `user` one past the last step is the goal. `fact` is a ground literal if
+    the condition can be divided into literals; a disjunction or comparison is one condition. If several steps together
+    establish a condition, each of them has a link, and the condition holds after the last of them.
     """
 
     provider: int
@@ -34,20 +35,21 @@ class CausalLink:
     user: int
 
     def __str__(self) -> str:
-        """Text such as `1 -(holding cup)-> 3`."""
+        """Return the link as text, e.g. `1 -(holding cup)-> 3`."""
         return f"{self.provider} -{to_text(self.fact)}-> {self.user}"
 
 
 @dataclass(frozen=True)
 class PartialOrder:
-    """A plan whose steps are ordered only where there is a reason.
+    """A plan in which two steps are ordered only for a reason.
 
     Attributes:
-        steps: in the order of the plan, which is one of the linearizations; numbered from 1.
+        steps: the steps, numbered from 1; their order in the plan is one of the linearizations.
         links: the causal links.
-        before: pairs of steps of which the first ends before the second begins, without pairs that follow from others
-            (the transitive reduction).
-        begin_before: pairs of steps of which the first begins before the second does; they may overlap.
+        before: pairs of steps; the first step of a pair must end before the second begins. Pairs that follow from other
+            pairs are omitted (the transitive reduction).
+        begin_before: pairs of steps; the first step of a pair must begin before the second begins, and both may
+            overlap.
     """
 
     steps: tuple[PlanStep, ...]
@@ -57,7 +59,7 @@ class PartialOrder:
 
     @cached_property
     def waits_for(self) -> Mapping[int, tuple[int, ...]]:
-        """Step -> the steps that it waits for directly, in order."""
+        """The steps for which each step waits directly, in order."""
         direct: dict[int, list[int]] = {number: [] for number in range(1, len(self.steps) + 1)}
         for first, second in sorted(self.before):
             direct[second].append(first)
@@ -65,24 +67,24 @@ class PartialOrder:
 
     @cached_property
     def earlier(self) -> Mapping[int, frozenset[int]]:
-        """Step -> all steps that end before it begins, in order (the transitive closure)."""
+        """All steps that end before each step begins (the transitive closure)."""
         found: dict[int, frozenset[int]] = {}
         for number, direct in self.waits_for.items():
             found[number] = frozenset(direct).union(*[found[one] for one in direct])
         return found
 
     def restricted(self, pairs: Iterable[tuple[int, int]]) -> PartialOrder:
-        """Return the order with more ordered pairs, the first step of each also first in the plan."""
+        """Return the order with additional pairs; the first step of each pair must also come first in the plan."""
         return replace(self, before=reduced({*self.before, *pairs}))
 
 
 def in_sequence(plan: Plan) -> PartialOrder:
-    """Return the total order of the steps."""
+    """Return the total order of the plan's steps."""
     return PartialOrder(plan.steps, before=frozenset((n, n + 1) for n in range(1, len(plan.steps))))
 
 
 def scheduled(plan: Plan) -> PartialOrder:
-    """Return the order of the plan's schedule: steps that end before others begin, and the order of the starts."""
+    """Return the order of a plan with a schedule: steps that end before others begin, and the order of the starts."""
     timed = list(enumerate(plan.schedule, start=1))
     ends = {(i, j) for j, later in timed for i, earlier in timed[: j - 1] if earlier.end <= later.start}
     order = PartialOrder(plan.steps, before=reduced(ends))
@@ -92,14 +94,14 @@ def scheduled(plan: Plan) -> PartialOrder:
 
 
 def standing(links: Iterable[CausalLink], done: Collection[int], begun: Collection[int]) -> tuple[CausalLink, ...]:
-    """Return the links whose facts must hold now: all their providers are done, and their users have not begun."""
+    """Return the links whose facts must hold now: all providers of a fact are done, and its user has not begun."""
     waiting = [link for link in links if link.user not in begun]
     coming = {(link.fact, link.user) for link in waiting if link.provider not in {PRESENT, *done}}
     return tuple(link for link in waiting if (link.fact, link.user) not in coming)
 
 
 def reduced(pairs: Iterable[tuple[int, int]]) -> frozenset[tuple[int, int]]:
-    """Return the pairs (the smaller number first) that do not follow from others."""
+    """Return the pairs that do not follow from other pairs; each pair must have the smaller number first."""
     direct: dict[int, int] = defaultdict(int)
     for first, second in pairs:
         direct[second] |= 1 << first
@@ -107,13 +109,13 @@ def reduced(pairs: Iterable[tuple[int, int]]) -> frozenset[tuple[int, int]]:
 
 
 def reduction(direct: Mapping[int, int]) -> frozenset[tuple[int, int]]:
-    """Return the transitive reduction; `direct` has for each step the steps before it, as bits."""
+    """Return the transitive reduction; `direct` contains, for each step, the steps before it as bits."""
     earlier: dict[int, int] = {}
     kept: list[tuple[int, int]] = []
     for number in sorted(direct):
         open_, covered = direct[number], 0
         while open_:
-            one = open_.bit_length() - 1  # its predecessors have smaller numbers
+            one = open_.bit_length() - 1  # the highest bit; predecessors of a step have smaller numbers
             kept.append((one, number))
             covered |= earlier.get(one, 0) | 1 << one
             open_ &= ~covered
@@ -126,10 +128,10 @@ class Purpose:
     """The purpose of a step in a plan.
 
     Attributes:
-        number: the step's number, counted from 1.
-        step: the step.
-        provides: the conditions that it establishes, each with the later step that needs it; `None` is the goal.
-        serves: the conditions of the goal that it contributes to, directly or through later steps.
+        number: the number of the step, counted from 1.
+        step: the plan step.
+        provides: the conditions that the step establishes, each with the later step that needs it; `None` is the goal.
+        serves: the conditions of the goal to which the step contributes, directly or through later steps.
     """
 
     number: int
@@ -138,7 +140,7 @@ class Purpose:
     serves: tuple[Expression, ...]
 
     def __str__(self) -> str:
-        """Text such as `3 (pick-up cup1 table): (holding cup1) for step 4; serves (tidy cup1)`."""
+        """Return text, e.g. `3 (pick-up cup1 table): (holding cup1) for step 4; serves (tidy cup1)`."""
         if not self.provides:
             return f"{self.number} {self.step}: nothing needs what it does"
         users: dict[str, list[str]] = {}
@@ -151,7 +153,7 @@ class Purpose:
 
 
 def why(order: PartialOrder, number: int) -> Purpose:
-    """Return the purpose of step `number`, from its causal links."""
+    """Return the purpose of the step with this number, computed from the causal links."""
     goal = len(order.steps) + 1
     own = [link for link in order.links if link.provider == number]
     provides = tuple((link.fact, None if link.user == goal else link.user) for link in own)
@@ -160,24 +162,24 @@ def why(order: PartialOrder, number: int) -> Purpose:
 
 def _served(links: tuple[CausalLink, ...], number: int, goal: int) -> tuple[Expression, ...]:
     reached, before = {number}, 0
-    while before != len(reached):  # along a time line, a later step may provide for an earlier one
+    while before != len(reached):  # in a schedule, a later step may provide for an earlier step
         before = len(reached)
         reached |= {link.user for link in links if link.provider in reached}
     return tuple(dict.fromkeys(link.fact for link in links if link.provider in reached and link.user == goal))
 
 
 Kin = Callable[[int, int], bool]
-"""Returns whether two steps should share a chain, e.g. because one robot takes both."""
+"""Returns whether two steps should be in one chain, e.g. because one robot executes both."""
 
 
 def chains(earlier: Mapping[int, frozenset[int]], kin: Kin) -> tuple[tuple[int, ...], ...]:
-    """Return the fewest chains that contain each step once, ordered by their first steps.
+    """Return the fewest chains that together contain each step exactly once, ordered by their first steps.
 
-    A chain is a sequence of steps each of which ends before the next begins. Among the covers with the fewest chains,
-    the result extends a maximum matching of kin.
+    In a chain, each step ends before the next step begins. Among the solutions with the fewest chains, the result
+    contains as many neighbours that satisfy `kin` as a maximum matching of such pairs.
 
     Args:
-        earlier: for each step in order, the steps that end before it begins.
+        earlier: for each step, in order, the steps that end before it begins.
         kin: see `Kin`.
     """
     matching = _Matching(earlier)
@@ -200,7 +202,7 @@ def _chain(first: int, following: Mapping[int, int]) -> tuple[int, ...]:
 
 
 class _Matching:
-    """A matching of steps with their direct predecessors; `follow` extends it along an augmenting path."""
+    """A matching of steps with their direct predecessors, extended along augmenting paths."""
 
     def __init__(self, earlier: Mapping[int, frozenset[int]]) -> None:
         self.before: dict[int, int] = {}
@@ -208,7 +210,7 @@ class _Matching:
         self._earlier = {number: sorted(those, reverse=True) for number, those in earlier.items()}
 
     def follow(self, second: int, kin: Kin) -> None:
-        """Give a step a direct predecessor if it has none and the matching allows one."""
+        """Match a step with a direct predecessor, if the step has none and the matching allows one."""
         if second not in self.before:
             self._augment(second, kin, set())
 

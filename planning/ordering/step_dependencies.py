@@ -1,7 +1,7 @@
-"""Dependencies of a step on its world: the conditions it needs, and the facts and numbers it changes.
+"""Dependencies of a step on its world: the conditions that it needs, and the facts and numbers that it changes.
 
-A condition is split into ground conditions that must all hold. Each is traced to its *support*: the literals and
-numeric fluents that decide its truth. For a disjunction, one part that holds is enough.
+A condition is divided into ground conditions that must all hold. The *support* of each ground condition consists of the
+literals and numeric fluents that decide its truth. One true part suffices as the support of a disjunction.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from knowledge_base.world.overlay import Overlay
 from planning.problem.conditions import Literal
 
 Ground = Literal | Fact
-"""A literal, or a numeric fluent (written as a `Fact`) whose value counts."""
+"""A literal, or a numeric fluent (written as a `Fact`) whose value matters."""
 Support = frozenset[Ground]
 """The literals and fluents that decide the truth of a condition."""
 Rank = Callable[[Support], int]
-"""The support with the lowest rank is chosen among several."""
+"""Returns the rank of a support; among several supports the one with the lowest rank is chosen."""
 
 _COMMUTING = frozenset({"increase", "decrease"})
 _DIRECTIONS = {">": 1, ">=": 1, "<": -1, "<=": -1}
@@ -34,13 +34,14 @@ _DIRECTIONS = {">": 1, ">=": 1, "<": -1, "<=": -1}
 
 @dataclass(slots=True)
 class Changes:
-    """The changes by an effect in a world, and the conditions and numbers that it reads there.
+    """The changes by an effect in a world, and the conditions and numbers that the effect reads there.
 
     Attributes:
-        conditions: conditions of its conditional effects, each in the form that holds.
-        makes: literals that are true at some time during the effect; both if it deletes and adds a fact.
-        numbers: the fluents it changes; true if only by additions, which commute.
-        reads: fluents whose values it uses.
+        conditions: the conditions of conditional effects; a false condition is negated.
+        makes: the literals that are true at some time during the effect; both literals of a fact that is deleted and
+            added.
+        numbers: the fluents that the effect changes; true if it only adds to the fluent, because additions commute.
+        reads: the fluents whose values the effect uses.
     """
 
     conditions: list[Expression] = field(default_factory=list)
@@ -49,7 +50,7 @@ class Changes:
     reads: set[Fact] = field(default_factory=set)
 
     def delta(self) -> Delta:
-        """Return the changed facts; a fact both deleted and added is true, as in PDDL."""
+        """Return the changed facts; a fact that is both deleted and added is true, as in PDDL."""
         added = tuple([one.fact for one in self.makes if one.positive])
         return Delta(added=added, removed=tuple([o.fact for o in self.makes if not o.positive and o.fact not in added]))
 
@@ -59,8 +60,8 @@ def changes(effect: Effect, world: World, after: Effect | None = None) -> Change
 
     Args:
         effect: the effect of an action.
-        world: the world before.
-        after: the start effect of a durative action, which comes first.
+        world: the world before the effect.
+        after: the start effect of a durative action, which precedes `effect`.
     """
     found = Changes()
     if after is not None:
@@ -94,7 +95,7 @@ def _collect(effect: Effect, world: World, found: Changes) -> None:
 
 
 def ground_conjuncts(e: Expression, world: World, *, wanted: bool = True) -> Iterator[Expression]:
-    """Yield ground conditions whose conjunction is `e` (its negation if not `wanted`)."""
+    """Yield ground conditions whose conjunction is equivalent to `e`; to its negation if `wanted` is false."""
     match e:
         case ex.Not(body):
             yield from ground_conjuncts(body, world, wanted=not wanted)
@@ -106,7 +107,7 @@ def ground_conjuncts(e: Expression, world: World, *, wanted: bool = True) -> Ite
 
 
 def support(e: Expression, world: World, rank: Rank, *, wanted: bool = True) -> Support | None:
-    """Return the support of a ground condition (of its negation if not `wanted`); `None` if it does not hold."""
+    """Return the support of a ground condition `e`, or of `not e` if `wanted` is false; `None` if that is false."""
     match e:
         case Atom(predicate) if predicate in world.schema.predicates:
             fact = ground(e, world)
@@ -123,9 +124,9 @@ def support(e: Expression, world: World, rank: Rank, *, wanted: bool = True) -> 
 
 
 def favours(e: Expression, fluent: Fact, world: World) -> float | None:
-    """Return the factor by which a greater number helps a comparison: positive, negative, or 0 without influence.
+    """Return the factor by which an increase of the number helps a comparison to be true.
 
-    `None` if the condition alone does not determine it.
+    The factor is positive, negative, or 0 without influence. It is `None` if it depends on more than the condition.
     """
     match e:
         case ex.Not(ex.Comparison(operator, left, right)) if operator in _DIRECTIONS:
@@ -157,13 +158,13 @@ def _slope(term: Term, fluent: Fact, world: World) -> float | None:
 
 
 def ground(form: Atom | ex.Call, world: World) -> Fact:
-    """Return the fact or fluent that a form without variables names."""
+    """Return the fact or numeric fluent of an expression without variables."""
     name = form.predicate if isinstance(form, Atom) else form.function
     return Fact(name, tuple(t.value if isinstance(t, ex.Constant) else evaluate_argument(t, world) for t in form.args))
 
 
 def _is_conjunction(e: Expression, *, wanted: bool) -> bool:
-    """Return whether all parts are needed; otherwise one is enough. De Morgan's laws swap them."""
+    """Return whether all parts are needed, since one part suffices otherwise; `wanted` applies De Morgan's laws."""
     return isinstance(e, ex.And | ex.Forall) is wanted
 
 

@@ -1,7 +1,7 @@
-"""Causal links of a plan with a schedule, along its time line.
+"""Causal links of a plan with a schedule, found by simulation on the time line.
 
-A step may need conditions at its start, over all and at its end, and may establish conditions at both ends. A step that
-begins later can therefore provide a condition that an earlier one needs at its end.
+A step may need conditions at its start, over all and at its end, and may establish conditions at its start and end. A
+step that begins later can therefore establish a condition that an earlier step needs at its end.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _NOTHING: Expression = And(())
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """One end of a step: its condition just before, its effect, and its condition from then on."""
+    """The start or end of a step: the condition before it, its effect, and the condition that must hold after it."""
 
     number: int
     step: PlanStep
@@ -41,7 +41,7 @@ class _End:
 
 
 def linked(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> PartialOrder:
-    """Return the order of the plan's schedule with its causal links.
+    """Return the order of the plan's schedule, with its causal links.
 
     Raises:
         InputError: the plan does not lead to the goal.
@@ -76,14 +76,14 @@ def _ends(number: int, step: PlanStep, timing: Timing, domain: PlanningDomain) -
 
 @dataclass(slots=True)
 class _Tracing:
-    """The simulation of a schedule, with the step that made each fact and number.
+    """The simulation of a schedule, with the steps that established each fact and number.
 
     Attributes:
-        world: the simulated world so far.
-        links: the causal links so far.
-        makers: the steps that made a literal true or changed a number; empty if it holds initially.
-        moves: the increase of a number by a step.
-        assigned: numbers that some step changed in another way than by adding.
+        world: the simulated world at the present time of the simulation.
+        links: the causal links found so far.
+        makers: the steps that made a literal true or changed a number; no entry if it holds initially.
+        moves: the increase of each number by each step.
+        assigned: the numbers that some step changed other than by addition.
     """
 
     world: Overlay
@@ -93,7 +93,7 @@ class _Tracing:
     assigned: set[Fact] = field(default_factory=set)
 
     def happen(self, ends: list[_End]) -> None:
-        """Execute the events of one moment; all of them see the world before."""
+        """Simulate simultaneous events; each of them is evaluated in the world before."""
         for end in ends:
             self.need(end.number, end.condition, str(end.step))
         made = [(end, changes(end.effect, self.world)) for end in ends]
@@ -109,7 +109,11 @@ class _Tracing:
             self.need(end.number, end.lasting, str(end.step))
 
     def need(self, user: int, condition: Expression, whose: str) -> None:
-        """Record that a step, or the goal, needs a condition now; its own effects are not links."""
+        """Record that a step, or the goal, needs a condition now; own effects of a step form no links.
+
+        Raises:
+            InputError: the condition is false.
+        """
         for part in dict.fromkeys(ground_conjuncts(condition, self.world)):
             found = support(part, self.world, self._latest)
             if found is None:
@@ -119,7 +123,7 @@ class _Tracing:
                 self.links += [CausalLink(one, part, user) for one in sorted(providers - {PRESENT} or {PRESENT})]
 
     def _providers(self, ground: Ground, condition: Expression) -> list[int]:
-        """Return the providers of the condition; an action that consumes fuel does not provide the rest."""
+        """Return the providers of the condition; a step that moves a number the wrong way, e.g. uses fuel, is none."""
         makers = self.makers.get(ground, [PRESENT])
         if isinstance(ground, Literal) or ground in self.assigned or makers == [PRESENT]:
             return makers
