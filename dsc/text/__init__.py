@@ -1,1 +1,1 @@
-"""Text forms of plots: YAML in and out, text diagrams, JSON Schema."""
+"""Text forms of plots: reading and writing of YAML, text diagrams, JSON Schema."""

@@ -1,4 +1,4 @@
-"""Cloning copies plots and their files for another robot, with all plots that they depend on (S2.10)."""
+"""Cloning: copies of plots and their files for another robot, with all plots on which they depend (S2.10)."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameErr
 from knowledge_base.output_files import Output, write_all
 
 _ROLE = ("implements", "effects", "confirm")
-"""The properties of a plot as an implementation of a planning action."""
+"""Fields of a plot that concern the planning action that the plot implements."""
 
 
 def cloned(plot: ActionPlot, library: Library, prefix: str, *, made: Library | None = None) -> tuple[ActionPlot, ...]:
-    """Return copies of a plot and of all plots that it depends on; the prefix precedes their names.
+    """Return clones of a plot and of all plots on which it depends; the prefix precedes their names.
 
-    The copies use each other.
+    Each clone refers to the other clones.
 
     Args:
-        plot: the original.
-        library: has its dependencies.
-        prefix: the beginning of the clones' names.
-        made: the clones' library, if that is another one. Plots in it with a clone's name are earlier clones. There,
-            clones implement planning actions in place of their originals. A goal then depends on all plots that
-            implement planning actions. Without `made`, clones share the originals' library and implement no planning
-            actions, so that existing plans stay unchanged.
+        plot: the plot to clone.
+        library: provider of the plots on which `plot` depends.
+        prefix: common beginning of the clones' names.
+        made: another library for the clones; a plot in this library with the name of a clone is an earlier clone. In
+            this library, clones implement planning actions in place of their originals. A goal then depends on all
+            plots that implement planning actions. With `None`, clones share the originals' library and implement no
+            planning actions, so that existing plans stay unchanged.
 
     Returns:
-        The new clones, that of the plot first, unless it was made before.
+        The new clones, without earlier clones; a new clone of `plot` is the first one.
 
     Raises:
-        UnknownNameError: a plot uses a missing one.
+        UnknownNameError: a plot refers to a missing plot.
         SchemaError: an earlier clone no longer fits as a substitute of its original; the message has the reason.
     """
     apart = made is not None
@@ -59,7 +59,7 @@ def cloned(plot: ActionPlot, library: Library, prefix: str, *, made: Library | N
 
 
 def cloned_profile(profile: Profile, prefix: str, names: Container[str]) -> Profile:
-    """Return the profile under a new name, with its values for the named plots moved to their clones."""
+    """Return a profile for clones: `prefix` precedes its name and, in its values, the names of the plots in `names`."""
     plots = {prefix + name if name in names else name: values for name, values in profile.plots.items()}
     return profile.model_copy(update={"name": prefix + profile.name, "plots": plots})
 
@@ -98,8 +98,8 @@ class Clones:
     """The result of cloning, before any file is written.
 
     Attributes:
-        texts: file -> its new text.
-        kept: files with earlier clones, which stay unchanged.
+        texts: the new text of each file to write.
+        kept: files that contain earlier clones and stay unchanged.
     """
 
     texts: Mapping[Path, str]
@@ -107,17 +107,17 @@ class Clones:
 
 
 def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Sequence[Path] = ()) -> Clones:
-    """Clone a plot file with all plots that it depends on.
+    """Return clones of a plot file and of the files with all plots on which it depends; write no file.
 
     Args:
-        file: a plot file; the plot's dependencies are in its folder.
-        prefix: the beginning of the names of clones and their files.
-        into: the folder for them, if it is another one; see `made` in `dsc.text.cloning.cloned`.
-        profiles: files with values of the plots' parameters; their clones have values of the clones' parameters.
+        file: the plot file; its folder must contain the plots on which the plot depends.
+        prefix: common beginning of the names of clones and of their files.
+        into: another folder for the clones; see `made` in `dsc.text.cloning.cloned`. `None` means the folder of `file`.
+        profiles: files of profiles to clone; a cloned profile sets the parameters of the cloned plots.
 
     Raises:
-        InputError: a file cannot be read or exists already, or a plot uses a missing one. The prefix does not begin a
-            name, two clones have one file, or an earlier clone no longer fits.
+        InputError: a file cannot be read or already exists, or a plot refers to a missing plot. The prefix cannot begin
+            a name, two clones have an equal file name, or an earlier clone no longer fits.
     """
     if not re.fullmatch(r"[a-zA-Z_][\w\-]*", prefix):
         raise SchemaError(f"no name begins with '{prefix}': letters, digits, _ and -, a letter first", found=prefix)
@@ -131,7 +131,7 @@ def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Seq
         library = Library({one.name: one for one in (*library, *made)}.values())
     try:
         clones = cloned(plot, library, prefix, made=made if apart else None)
-    except UnknownNameError as error:  # the missing plot may be in a file that cannot be read
+    except UnknownNameError as error:  # an unreadable file may contain the missing plot
         raise (broken or [error])[0] from None
     new = {clone.name: clone for clone in clones}
     names = {one.name: prefix + one.name for one in library if prefix + one.name in (*new, *(p.name for p in made))}
@@ -154,7 +154,7 @@ def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Seq
 
 
 def write_clones(clones: Clones) -> None:
-    """Write all files or none, and make their folder if it is missing.
+    """Write either all files of the clones or none; create a missing folder.
 
     Raises:
         InputError: the folder or a file cannot be written.
@@ -175,7 +175,7 @@ def _add(texts: dict[Path, str], target: Path, text: str) -> None:
 
 
 def _plots_in(folder: Path) -> Iterator[tuple[Path, ActionPlot]]:
-    """Yield the plots that can be read."""
+    """Yield file and plot of each readable plot file in a folder."""
     for file in sorted(folder.glob("*.yaml")):
         with suppress(InputError):
             yield file, load_plot(file)
@@ -187,7 +187,7 @@ def _stem(plot: ActionPlot) -> str:
 
 
 def _text(original: ActionPlot, clone: ActionPlot, names: Mapping[str, str]) -> str:
-    """Return the original's text with other names, if it reads as the clone; else the clone's own text."""
+    """Return the original's text with the clones' names if it reads as the clone; else the clone's YAML."""
     place = original.place(("plot",))
     if place is not None and place.source:
         text = _substituted(read_file(place.source), original, names)
@@ -200,7 +200,7 @@ def _text(original: ActionPlot, clone: ActionPlot, names: Mapping[str, str]) -> 
 
 
 def _substituted(text: str, plot: ActionPlot, names: Mapping[str, str]) -> str:
-    """Replace the names of plots that are found at their places in the text, from the end, because places move."""
+    """Return the text with new names of plots, replaced from the end, so that earlier places stay valid."""
     lines = text.splitlines(keepends=True)
     for line, column, path, old in sorted(_written(plot), key=lambda one: one[:2], reverse=True):
         key = _KEY if isinstance(path[-1], str) else ""
@@ -212,7 +212,7 @@ def _substituted(text: str, plot: ActionPlot, names: Mapping[str, str]) -> str:
 
 
 def _written(plot: ActionPlot) -> Iterator[tuple[int, int, FormPath, str]]:
-    """Yield line and column of each name of a plot, its path, and the name."""
+    """Yield line, column, path and name of each occurrence of a plot's name in the text of `plot`."""
     for path, name in ((("plot",), plot.name), *plot.references()):
         place = plot.place(path)
         if place is not None and place.line is not None and place.column is not None:

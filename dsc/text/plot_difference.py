@@ -1,4 +1,4 @@
-"""Difference of two plots: states, transitions and the interface, as lines and as a drawing."""
+"""Difference of two plots in interface, states and transitions, as lines of text and as a drawing."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _INSIDE = ("states", "regions")
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One difference.
+    """One difference between two plots.
 
     Attributes:
         kind: `added`, `removed` or `changed`.
-        what: the element, e.g. `state clear` or `parameter table`.
-        state: the state's name, if it is about one.
-        detail: for a change, the changed parts.
+        what: kind and name of the element, e.g. `state clear` or `parameter table`.
+        state: name of the state that differs; `None` for any other element.
+        detail: the changed parts of the element; empty for an addition or removal.
     """
 
     kind: str
@@ -33,18 +33,18 @@ class Difference:
     detail: str = ""
 
     def __str__(self) -> str:
-        """Return one line with a sign in front: `+ state clear`."""
+        """Return one line that begins with a sign, e.g. `+ state clear`."""
         sign = {"added": "+", "removed": "-", "changed": "~"}[self.kind]
         return f"{sign} {self.what}" + (f": {self.detail}" if self.detail else "")
 
 
 def differences(old: ActionPlot, new: ActionPlot) -> list[Difference]:
-    """Return the additions, removals and changes from `old` to `new`: the interface first, then states in order."""
+    """Return the additions, removals and changes from `old` to `new`: interface first, then states in order."""
     return [*_interface(old.to_form(), new.to_form()), *_states(old, new)]
 
 
 def draw_difference(old: ActionPlot, new: ActionPlot) -> tuple[str, str]:
-    """Draw both plots as SVG: removals marked in the first, additions in the second, changes in both."""
+    """Return both plots as SVG; `old` has marks at removals and changes, `new` at additions and changes."""
     found = differences(old, new)
 
     def marks(*kinds: str) -> dict[str, str]:
@@ -91,7 +91,7 @@ def _states(old: ActionPlot, new: ActionPlot) -> Iterator[Difference]:
 
 
 def _own_forms(plot: ActionPlot) -> dict[str, dict[str, Any]]:
-    """Return each state's form with its path but without its inner states, which are compared separately."""
+    """Return the written form of each state by name, with its path but without its inner states."""
     form, found = plot.to_form(), {}
     for name, _, path in plot.walk():
         own: Any = form

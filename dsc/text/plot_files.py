@@ -1,4 +1,4 @@
-"""Plot files: conversion between YAML and `ActionPlot`s, their JSON Schema, and related plots of a folder."""
+"""Plot files: conversion between YAML and `ActionPlot`, JSON Schema, and related plots of a folder."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from knowledge_base.errors import InputError, Place
 
 
 def parse_plot(text: str, source: str | None = None) -> ActionPlot:
-    """Read a plot from YAML text.
+    """Return the plot that YAML text contains; `source` is the file name in messages.
 
     Raises:
-        InputError: it is not a plot; the message has the place and the nearest valid key.
+        InputError: the text is not a plot; the message has the place and the nearest valid key.
     """
     document = load_document(text, source)
     return read_model(ActionPlot, document).written_at(document.places)
 
 
 def load_plot(path: Path | str) -> ActionPlot:
-    """Read a plot file; see `parse_plot`."""
+    """Return the plot in a plot file; errors as for `parse_plot` and `read_file`."""
     return parse_plot(read_file(path), str(path))
 
 
 def load_library(folder: Path | str) -> Library:
-    """Return all plots (`*.yaml`) of a folder, by file name.
+    """Return a library of all plots (`*.yaml`) of a folder, in the order of file names.
 
     Raises:
-        InputError: the folder is missing, a file is not a plot, or two plots have one name.
+        InputError: the folder is missing, a file is not a plot, or two plots have an equal name.
     """
     files = sorted(path_of(folder).glob("*.yaml"))
     if not files:
@@ -44,7 +44,7 @@ def load_library(folder: Path | str) -> Library:
 
 
 def plot_to_yaml(plot: ActionPlot) -> str:
-    """Return the plot as YAML in its short form; reading it gives the same plot."""
+    """Return the plot as YAML with all short forms; `parse_plot` returns an equal plot."""
     return dump(_short(plot.to_form()))
 
 
@@ -55,22 +55,22 @@ _ORDER = (
     "then", "limit", "rule", "choice", "select", "cases", "else", "entry", "at_least", "initial", "final", "states",
     "regions", "on", "after", "every", "always", "exit", "on_break", "rules", "handlers",
 )  # fmt: skip
-"""Keys in reading order."""
+"""Keys of a plot file in the order in which they are written."""
 _SINGLE = frozenset({
     "entry", "exit", "on_break", "before", "after", "every", "always", "event", "clear", "command",
 })  # fmt: skip
-"""Lists whose only element is written in place of the list; `event` stands for the transitions of an event."""
+"""Keys of lists that may be written as their only element; `event` stands for the transitions of an event."""
 _NAMES = {
     "on": "event", "states": "state", "connectors": "state", "regions": "region", "cases": "transition",
     "parameters": "declaration", "variables": "declaration", "outputs": "declaration",
     "emits": "attributes", "receives": "attributes", "with": "value", "pass": "value", "as": "value",
     "assign": "value",
 }  # fmt: skip
-"""Mappings with names as keys, which keep their order -> the kind of their values."""
+"""Kind of the values, by the key of each mapping whose own keys are names and keep their order."""
 
 
 def _short(node: Any, role: str = "plot") -> Any:
-    """Return lists of one and mappings with only `to` or `type` in their short form, with keys in reading order."""
+    """Return data in short form: shorten lists of one and mappings with only `to` or `type`, and order the keys."""
     if isinstance(node, list):
         short = [_short(one, "transition" if role in {"event", "always", "choice"} else "element") for one in node]
         return short[0] if len(short) == 1 and role in _SINGLE else short
@@ -87,7 +87,7 @@ def _short(node: Any, role: str = "plot") -> Any:
 
 
 def _key(name: str, role: str) -> str | int | float:
-    """Return the key of a case as YAML writes its constant; other names unchanged."""
+    """Return the key of a case as the constant that YAML writes; return every other key unchanged."""
     value = case_value(name) if role == "cases" else name
     return name if isinstance(value, str) else value
 
@@ -100,17 +100,18 @@ _DECLARES = re.compile(r"""\bplot["']?\s*:\s*["']?([\w\-#.]+)""")
 
 
 class Neighbours:
-    """Folders of plots; each file is read once for all plots of its folder."""
+    """A cache of plot folders: each file is read once for all plots of its folder."""
 
     def __init__(self) -> None:
         self._folders: dict[Path, dict[Path, str | InputError]] = {}
         self._plots: dict[Path, ActionPlot | InputError] = {}
 
     def of(self, file: Path, plot: ActionPlot) -> tuple[Library, list[InputError]]:
-        """Return the plot with its related plots, and the errors of files that could not be read.
+        """Return a library of a plot and its related plots, and the errors of unreadable files.
 
-        Related plots are the used ones, directly or not, and with rules or plans also the implementations of planning
-        actions. If one of them is missing, all plots of the folder are read: its name may be a misspelt one.
+        Related plots are all plots that the plot uses, directly or indirectly. With rules or plans, these include the
+        implementations of planning actions. If a related plot is missing, all plots of the folder are read, so that a
+        message can report similar names.
         """
         library, broken = Library([plot]), list[InputError]()
         planned = any(isinstance(state, DynamicState) for _, state, _ in plot.walk())
@@ -148,7 +149,7 @@ class Neighbours:
 
 
 def _holding(texts: dict[Path, str | InputError], names: set[str], *, actions: bool) -> Iterator[Path]:
-    """Yield the files that seem to contain one of these plots, or an implementation of a planning action."""
+    """Yield the files whose text may contain a plot in `names` or, with `actions`, an implementation of an action."""
     for file, text in texts.items():
         if isinstance(text, str) and (
             not names.isdisjoint(_DECLARES.findall(text)) or (actions and "implements" in text)
@@ -164,11 +165,11 @@ def _text(file: Path) -> str | InputError:
 
 
 _BY_NAME = frozenset({"Transition", "PlotParameter", "PlotVariable"})
-"""Values with a short form: only their target or type."""
+"""Classes of values whose short form is only the target or the type."""
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of plot files, for editors; it accepts every spelling of every plot."""
+    """Return the JSON Schema of plot files, for editors; it accepts short and long forms of every plot."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "action plot",
@@ -177,14 +178,14 @@ def json_schema() -> dict[str, Any]:
 
 
 def _with_short_forms(node: Any) -> Any:
-    """Return the schema with short forms as alternatives to the long ones."""
+    """Return the schema with the short forms as alternatives to the long forms."""
     if isinstance(node, list):
         return [_with_short_forms(one) for one in node]
     if not isinstance(node, dict):
         return node
     if str(node.get("$ref", "")).rsplit("/", 1)[-1] in _BY_NAME:
         return {"anyOf": [node, {"type": "string"}]}
-    # Distinctive keys determine the kind; a form without one matches several of the alternatives.
+    # Data without a distinctive key match several alternatives, which `oneOf` would refuse.
     schema = {"anyOf" if key == "oneOf" else key: _with_short_forms(value) for key, value in node.items()}
     if isinstance(schema.get("properties"), dict):
         schema["properties"] = {name: _property(name, one) for name, one in schema["properties"].items()}
@@ -197,11 +198,11 @@ def _property(name: str, schema: dict[str, Any]) -> dict[str, Any]:
         return _alone(schema)
     if name == "on" and isinstance(inner, dict):
         return {**schema, "additionalProperties": _alone(inner)}
-    if name == "states" and isinstance(inner, dict):  # `over:` without a value is a simple state
+    if name == "states" and isinstance(inner, dict):  # a state without a value, e.g. `over:`, is a simple state
         return {**schema, "additionalProperties": {"anyOf": [inner, {"type": "null"}]}}
     return schema
 
 
 def _alone(schema: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of a list, or of its only element."""
+    """Return a schema that accepts a list or its only element; any other schema is returned unchanged."""
     return {"anyOf": [schema, schema["items"]]} if "items" in schema else schema

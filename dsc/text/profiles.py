@@ -1,4 +1,4 @@
-"""Profiles: values of parameters for one robot or simulation, over one set of plots (S2.10, S1.11)."""
+"""Settings profiles: values of parameters for one robot or simulation, for a common set of plots (S2.10, S1.11)."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Settings = dict[str, dict[str, Setting]]
 
 
 class Profile(Written):
-    """A robot and the values of its parameters.
+    """A settings profile: a robot, and values of parameters for this robot.
 
     Attributes:
-        name: its name (`profile`).
-        robot: one of the world's robots; by default its usual one.
-        components: component -> parameter -> value, within the range that its builder declares.
-        plots: plot -> parameter -> value, as the parameter's new default; users of the plot may set another value.
+        name: name of the profile (`profile`).
+        robot: name of a robot in the world; without it, the world's default robot.
+        components: values by component and parameter, within the range that the component's builder declares.
+        plots: new defaults by plot and parameter; plots that use the plot may pass another value.
     """
 
     name: str = Field(alias="profile", pattern=r"^[a-zA-Z_][\w\-]*$")
@@ -33,35 +33,35 @@ class Profile(Written):
 
     @property
     def digest(self) -> str:
-        """A hash of the content."""
+        """Hash of the content as 12 hexadecimal digits."""
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:12]
 
 
 def parse_profile(text: str, source: str | None = None) -> Profile:
-    """Read a profile from YAML text.
+    """Return the profile that YAML text contains; `source` is the file name in messages.
 
     Raises:
-        InputError: it is not a profile; the message has the place and the nearest valid key.
+        InputError: the text is not a profile; the message has the place and the nearest valid key.
     """
     document = load_document(text, source)
     return read_model(Profile, document).written_at(document.places)
 
 
 def load_profile(path: Path | str) -> Profile:
-    """Read a profile file; see `parse_profile`."""
+    """Return the profile in a profile file; errors as for `parse_profile` and `read_file`."""
     return parse_profile(read_file(path), str(path))
 
 
 def profile_to_yaml(profile: Profile) -> str:
-    """Return the profile as YAML; reading it gives the same profile."""
+    """Return the profile as YAML; `parse_profile` returns an equal profile."""
     return dump(profile.model_dump(mode="json", by_alias=True, exclude_defaults=True))
 
 
 def find_profile(name: str, folder: Path) -> Profile:
-    """Return the profile of that name in a folder, or else in the file of that path.
+    """Return the profile `name` of a folder; if the folder has none, `name` is the path of a profile file.
 
     Raises:
-        InputError: both are missing, or the file is not a profile; the message has the nearest name.
+        InputError: neither file exists, or the file is not a profile; the message has the nearest name.
     """
     known = {file.stem: file for file in sorted(folder.glob("*.yaml"))}
     if name in known:

@@ -1,4 +1,4 @@
-"""Plots in the text forms of Mermaid (stateDiagram-v2) and PlantUML, which differ only slightly."""
+"""Text diagrams: plots in the forms of Mermaid (stateDiagram-v2) and PlantUML, which have similar syntax."""
 
 from __future__ import annotations
 
@@ -26,15 +26,16 @@ def to_mermaid(plot: ActionPlot) -> str:
 
 
 def to_plantuml(plot: ActionPlot) -> str:
-    """Return the plot as a PlantUML state diagram; errors as for `to_mermaid`."""
+    """Return the plot as a PlantUML state diagram; raise `UnknownNameError` if a target is missing."""
     lines = _Writer(plot, hulls_have_rows=True).lines()
     return "\n".join(["@startuml", f"title {plot.name}", *lines, "@enduml"]) + "\n"
 
 
 class _Writer:
-    """Writes states under generated short names, because their own names may contain any character.
+    """Writer of one diagram; it generates an alias for each state, because a state's name may contain any character.
 
-    Mermaid refuses rows of text in states with inner states (`hulls_have_rows`); their titles contain the text then.
+    Mermaid allows no rows of text in states with inner states. With `hulls_have_rows=False`, the titles of these states
+    contain the text.
     """
 
     def __init__(self, plot: ActionPlot, *, hulls_have_rows: bool) -> None:
@@ -53,7 +54,7 @@ class _Writer:
 
     def _states(self, states: Mapping[str, AnyState], indent: str) -> Iterator[str]:
         for name, state in states.items():
-            if isinstance(state, Connector):  # a choice has no title in these forms
+            if isinstance(state, Connector):  # Mermaid and PlantUML allow no title for a choice
                 yield f"{indent}state {self._alias[name]} <<choice>>"
                 continue
             rows = [_safe(text) for text in _rows(state)]
@@ -93,7 +94,7 @@ class _Writer:
 
 
 def _rows(state: AnyState) -> Iterator[str]:
-    """Yield a state's texts besides its name: least duration, actions, and events without an exit."""
+    """Yield the rows of a state's text: least duration, actions, and events that do not exit the state."""
     if not isinstance(state, State):
         return
     if state.at_least is not None:
@@ -117,7 +118,7 @@ def _title(name: str, state: AnyState) -> str:
 
 
 def _safe(text: str) -> str:
-    """Replace special characters of these forms in a text: quotes, colons, line ends."""
+    """Return a text without quotes, colons, semicolons and line ends, which are special in both forms."""
     return " ".join(text.split()).replace('"', "'").replace(":=", "=").replace(":", ".").replace(";", ",")
 
 
@@ -131,7 +132,7 @@ def require_targets(plot: ActionPlot) -> None:
 
 
 def _named(plot: ActionPlot) -> Iterator[tuple[str, Path]]:
-    """Yield the names of states that occur in the plot, each with its path."""
+    """Yield name and path of each reference to a state in the plot."""
     yield initial_of(plot), ("initial",)
     for _, state, path in plot.walk():
         if isinstance(state, CompositeState):

@@ -1,8 +1,8 @@
-"""Plots and scenarios as YAML 1.2, read with places; features of YAML that surprise authors are refused.
+"""Reader and writer of YAML 1.2 for plots and scenarios; the reader records places and refuses error-prone features.
 
-These are duplicate keys, tags, anchors, aliases and merge keys, and texts that are too large or nested too deeply for a
-plot. Scalars follow YAML 1.2's core schema (10.3): `yes`, `off`, `1_000` and `2024-01-01` are text. Every error names
-file, line and column. One pass builds the data from the parser's events, so that the number of parts bounds the time.
+Refused are duplicate keys, tags, anchors, aliases and merge keys, and texts that are too large or nested too deeply for
+a plot. Scalars follow the core schema of YAML 1.2 (10.3): `yes`, `off`, `1_000` and `2024-01-01` are text. Every error
+has file, line and column. One pass over the parser's events builds the data, in time proportional to their size.
 """
 
 from __future__ import annotations
@@ -41,15 +41,18 @@ from knowledge_base.pddl.files import read_text, require_size
 
 MAX_DEPTH = 128
 MAX_PARTS = 18_000
-"""Keys, values and collections: a plot of 1,000 states has 16,000; reading and checking that many takes a second."""
+"""Upper bound of keys, values and collections in a document.
+
+A plot of 1,000 states has 16,000 of these parts; they are read and checked within a second.
+"""
 
 _SPACES = "\0 \t\r\n\x85\u2028\u2029"
 
 
 class _Scanner(Scanner):
-    """Reads `{table: ?table}` as YAML 1.2 (7.3.3): `?` before a non-space begins a plain scalar.
+    """Scanner that reads `{table: ?table}` as YAML 1.2 does (7.3.3): `?` before a non-space begins a plain scalar.
 
-    The library keeps YAML 1.1's reading inside braces, where `?` always begins a complex key.
+    Inside braces, the library's scanner follows YAML 1.1, where `?` always begins a complex key.
     """
 
     def check_key(self) -> Any:
@@ -61,7 +64,7 @@ class _Scanner(Scanner):
         return super().check_plain()
 
     def fetch_flow_collection_start(self, *args: Any, **named: Any) -> None:
-        if self.flow_level > MAX_DEPTH:  # the scanner looks ahead for a key, at a cost that grows with the depth
+        if self.flow_level > MAX_DEPTH:  # the search for a key takes longer at each level
             raise ScannerError(None, None, _TOO_DEEP, self.reader.get_mark())
         super().fetch_flow_collection_start(*args, **named)
 
@@ -87,15 +90,15 @@ class Document:
     """A YAML file as plain data.
 
     Attributes:
-        data: dicts, lists and scalars.
-        places: place of each part, by its path of keys and positions; a key's place is the key's own.
+        data: the content as dicts, lists and scalars.
+        places: place of each part, by its path of keys and positions; a value in a mapping has the place of its key.
     """
 
     data: Any
     places: Mapping[FormPath, Place] = field(default_factory=dict)
 
     def place(self, path: FormPath) -> Place | None:
-        """Return the place of the part at `path`, or of the closest known part around it."""
+        """Return the place of the part at `path`, or of the closest outer part with a known place; else `None`."""
         for length in range(len(path), -1, -1):
             if path[:length] in self.places:
                 return self.places[path[:length]]
@@ -103,11 +106,11 @@ class Document:
 
 
 def load_document(text: str, source: str | None = None) -> Document:
-    """Read one YAML document.
+    """Return the one YAML document in a text; `source` is the file name in messages.
 
     Raises:
-        ParseError: it is not YAML, or uses a refused feature.
-        InputError: it is too large.
+        ParseError: the text is not YAML, or uses a refused feature.
+        InputError: the text is too large.
     """
     require_text(text, "the YAML text")
     check_size(len(text), Place(source))
@@ -125,7 +128,7 @@ def load_document(text: str, source: str | None = None) -> Document:
 
 
 def dump(data: Mapping[str, Any]) -> str:
-    """Return plain data as YAML in the project's style; `load_document` reads it back."""
+    """Return plain data as YAML in the project's style; `load_document` returns equal data."""
     stream = StringIO()
     yaml = YAML()
     yaml.default_flow_style = None
@@ -136,7 +139,7 @@ def dump(data: Mapping[str, Any]) -> str:
 
 
 class _Reader:
-    """Builds the data of one document from the parser's events."""
+    """Builder of one document's data from the parser's events."""
 
     def __init__(self, text: str, source: str | None, places: dict[FormPath, Place]) -> None:
         yaml = YAML(typ="safe", pure=True)
@@ -181,7 +184,7 @@ class _Reader:
         return found
 
     def _key(self, event: Event, path: FormPath) -> str | int:
-        """Return a name; the cases of a `select` may also be numbers or truth values."""
+        """Return a key; only the cases of a `select` may be numbers or truth values, any other key must be a name."""
         self._refuse_surprises(event, path)
         key = self._scalar(event) if isinstance(event, ScalarEvent) else None
         if isinstance(key, str):
@@ -202,7 +205,7 @@ class _Reader:
 
     def _scalar(self, event: Any) -> Any:
         value: str = event.value
-        if not event.implicit[0]:  # written in quotes or as a block
+        if not event.implicit[0]:  # the scalar is quoted or a block
             if _SURROGATE.search(value):
                 raise ParseError("an escape that stands for no character", place=self._place(event))
             return value
@@ -248,7 +251,7 @@ _SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def _plain(text: str) -> Any:
-    """Return the value of a scalar without quotes in the core schema of YAML 1.2 (10.3.2)."""
+    """Return the value of an unquoted scalar according to the core schema of YAML 1.2 (10.3.2)."""
     if text in _PLAIN:
         return _PLAIN[text]
     match = _NUMBER.fullmatch(text)
@@ -262,12 +265,12 @@ def _plain(text: str) -> Any:
 
 
 def _quoted(data: Any) -> Any:
-    """Return the data with quotes around texts that would otherwise be read as another type."""
+    """Return the data with double quotes around each text that YAML would otherwise read as another type."""
     if isinstance(data, Mapping):
         return {_quoted(key): _quoted(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
         return [_quoted(one) for one in data]
-    if isinstance(data, str) and (_plain(data) != data or not data.isprintable()):  # other quotes fold line breaks
+    if isinstance(data, str) and (_plain(data) != data or not data.isprintable()):  # single quotes fold line breaks
         return DoubleQuotedScalarString(data)
     return data
 
@@ -287,7 +290,7 @@ _PLAINER = {
     r"found unexpected end of stream": "a quote is never closed",
     r"'<stream end>'": "the end of the text",
 }
-"""Messages of the YAML library -> plainer ones."""
+"""Clearer messages, by the message of the YAML library."""
 
 
 def _parse_error(error: MarkedYAMLError, source: str | None) -> ParseError:
@@ -309,7 +312,7 @@ def read_model(model: type[_Model], document: Document) -> _Model:
     """Return the document as a value of `model`.
 
     Raises:
-        InputError: the document does not match; the message has file, line, and the nearest valid key.
+        InputError: the document does not match `model`; the message has file, line, and the nearest valid key.
     """
     if not isinstance(document.data, Mapping):
         found = in_yaml(document.data)
@@ -329,25 +332,28 @@ def _adapter(model: type[_Model]) -> TypeAdapter[_Model]:
 
 
 MAX_BYTES = 250_000
-"""A hundred times the longest plot of this project; a larger file would delay its author's error message."""
+"""Upper bound of a file's size in bytes: a hundred times the longest plot of this project.
+
+The check of a larger file would take too long.
+"""
 
 
 def read_file(path: Path | str) -> str:
-    """Return the text of a file.
+    """Return the text of a file in UTF-8.
 
     Raises:
-        InputError: it cannot be read, is not UTF-8, or has more than `MAX_BYTES`; as `knowledge_base.pddl.files`.
+        InputError: the file cannot be read, is not UTF-8, or has more than `MAX_BYTES` bytes.
     """
     return read_text(path_of(path), most=MAX_BYTES)
 
 
 def path_of(path: object) -> Path:
-    """Return the path of that name; raise `InputError` for any value except a text or path."""
+    """Return a text or path as a path; raise `InputError` for any other value."""
     if not isinstance(path, str | Path):
         raise InputError(f"a file or folder is named by a text or a Path, not {shown(path)}")
     return Path(path)
 
 
 def check_size(size: int, place: Place) -> None:
-    """Raise `InputError` for a text of more than `MAX_BYTES`."""
+    """Raise `InputError` if `size`, in bytes, exceeds `MAX_BYTES`."""
     require_size(size, MAX_BYTES, place.source)

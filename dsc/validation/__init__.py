@@ -1,4 +1,4 @@
-"""Validation of plots before a run; every finding has file, line, rule and remedy."""
+"""Validation of plots before a run; each finding has file, line, violated rule and remedy."""
 
 from dsc.validation.library import raise_findings, validate_library, validate_plot
 from dsc.validation.review import review_plot

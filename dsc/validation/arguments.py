@@ -1,4 +1,4 @@
-"""Arguments of plots and components: names exist, values are in range, and no required value is missing."""
+"""Checks of arguments for plots and components: names exist, values are in range, required values are present."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ALLOW = "set it in a profile, or let `changed_by` allow it"
 
 
 def check_parameters(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about the roles of a plot's own parameters, and about its arguments for other plots."""
+    """Yield findings about the declarations of a plot's parameters, and about its arguments for other plots."""
     plot, library = subject.plot, subject.library
     for name, parameter in plot.parameters.items():
         yield from _own(subject, name, parameter)
@@ -64,7 +64,7 @@ def _handed(
     for plot in used:
         for name, term in arguments.items():
             parameter, full, here = plot.parameters.get(name), f"{plot.name}.{name}", (*path, name)
-            if parameter is None:  # another candidate's parameter, or a separate finding
+            if parameter is None:  # another candidate has the parameter, or another check reports it
                 continue
             try:
                 refuse_change(full, who, parameter.changed_by)
@@ -83,10 +83,10 @@ def _fits(subject: Subject, name: str, parameter: PlotParameter, term: Constant,
 
 
 def check_components(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about `set`, `send` and `switch` actions to missing components, or with undeclared parameters."""
+    """Yield findings about `set`, `send` and `switch` actions with missing components or undeclared parameters."""
     components = subject.components
     for path, action, who in subject.actions() if components is not None else ():
-        name = None if isinstance(action, Trigger) else component_of(action)  # triggers are checked with the skills
+        name = None if isinstance(action, Trigger) else component_of(action)  # the check of skills covers triggers
         if name is not None and name not in (components or ()):
             message = f"there is no component '{name}'"
             yield subject.finding(path, "known component", message, found=name, valid=components)
@@ -115,7 +115,7 @@ def _setting(
 
 
 def check_outputs(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about outputs without an assignment."""
+    """Yield findings about outputs to which the plot assigns no value."""
     open_ones = [name for name, output in subject.plot.outputs.items() if output.initial is None]
     if not open_ones:
         return
@@ -143,7 +143,7 @@ def _actions(state: AnyState) -> Iterator[ExternalAction | Internal]:
 
 
 def check_arguments(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about the arguments of used plots."""
+    """Yield findings about the arguments that the plot passes to other plots."""
     entrances = _Entrances(subject)
     for name, state, path in subject.states:
         if isinstance(state, Step):
@@ -167,7 +167,7 @@ def check_arguments(subject: Subject) -> Iterator[Finding]:
 
 
 def _passed_by_rule(subject: Subject, rule: Rule, path: Path) -> Iterator[Finding]:
-    """Require that some step of the rule takes each passed argument; other steps do not receive it."""
+    """Yield a finding for each passed argument that is a parameter of none of the rule's steps."""
     library, to_state = subject.library, rule.then in subject.names
     used: list[ActionPlot] = []
     for name, state, _ in subject.steps:
@@ -210,7 +210,7 @@ def _unknown(subject: Subject, used: ActionPlot, given: Iterable[str], path: Pat
 def _untaken(
     subject: Subject, used: Iterable[ActionPlot], given: Iterable[str], path: Path, rule: str, message: str
 ) -> Iterator[Finding]:
-    """Yield findings about arguments that none of the plots takes; `message` has room for the name."""
+    """Yield a finding for each argument that is a parameter of none of the plots; `message` formats its name."""
     taken = {name for plot in used for name in plot.parameters}
     for name in sorted(set(given) - taken):
         yield subject.finding((*path, name), rule, message.format(name), found=name, valid=taken)
@@ -221,7 +221,7 @@ def _untaken(
 
 @dataclass(frozen=True, slots=True)
 class _Need:
-    """A parameter without default, and the plot that has it."""
+    """A required parameter, and the plot that declares the parameter."""
 
     plot: str
     parameter: str
@@ -232,18 +232,18 @@ def _needed(plot: ActionPlot) -> Iterator[str]:
 
 
 class _Entrances:
-    """Transitions into states, collected on first use: in most plots `with` sets every parameter."""
+    """Transitions by target state, collected on first use, because in most plots `with` sets every parameter."""
 
     def __init__(self, subject: Subject) -> None:
         self._subject = subject
 
     @cached_property
     def ways(self) -> Mapping[str, list[tuple[Transition, Path | None]]]:
-        """State -> the transitions of the expanded plot that lead to it; the path is `None` if a rule created it."""
+        """Transitions of the expanded plot, with paths, by target state; a rule's transition has the path `None`."""
         subject = self._subject
         try:
             expanded = subject.library.expanded(subject.plot)
-        except InputError:  # the wiring check reports it
+        except InputError:  # the check of wiring reports the error
             expanded = subject.plot
         found: defaultdict[str, list[tuple[Transition, Path | None]]] = defaultdict(list)
         for name, state, path in expanded.walk():
@@ -254,7 +254,7 @@ class _Entrances:
         return found
 
     def by_default(self, name: str, path: Path) -> bool:
-        """Return whether the state is initial in its scope, or a history may restore it."""
+        """Return whether a state is the initial state of its scope, or a history may restore the state."""
         return name in self._defaults or any(path[:length] in self._remembered for length in range(len(path)))
 
     @cached_property
@@ -268,7 +268,7 @@ class _Entrances:
 
 
 def _given(subject: Subject, name: str, path: Path, need: _Need, entrances: _Entrances) -> Iterator[Finding]:
-    """Require that every transition into the state passes a parameter that `with` does not set."""
+    """Yield a finding for each entry into a state that does not pass the required parameter in `need`."""
     leading, key = entrances.ways.get(name, []), need.parameter
     silent = [(way, written) for way, written in leading if way.target != name or key not in way.passed]
     if len(silent) == len(leading):

@@ -1,6 +1,7 @@
-"""Data of plots: variables exist, conditions can be evaluated, and values fit the types of their targets.
+"""Checks of data in plots: variables exist, conditions can be evaluated, and values fit their types.
 
-A finding about a type needs certainty: a name may denote any object, and a variable may hold a value of a subtype.
+A finding about a type is reported only if the value can never fit. A name may denote any object, and the value of a
+variable may have a subtype.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from knowledge_base.language.syntax.text import to_text
 
 _VALUES = frozenset({"number", "boolean"})
 FREE_TYPES = _VALUES | {"text", "symbol", "condition", "plot"}
-"""Types of parameters and variables besides those of the schema."""
+"""Types that parameters and variables may have in addition to the schema's types."""
 _ANY: Types = {}
 
 
@@ -49,9 +50,10 @@ def check_data(subject: Subject) -> Iterator[Finding]:
 
 
 class _Data:
-    """Checks every condition, effect and term in its scope: the types of all names that it can read.
+    """Check of every condition, effect and term of a plot in its scope: the types of all readable names.
 
-    Attributes of events are names such as `event.item`; of an unknown event (`None`) any attribute may be read.
+    An event's attributes have names such as `event.item`. The scope `None` stands for an unknown event, of which any
+    attribute may be read.
     """
 
     def __init__(self, subject: Subject) -> None:
@@ -111,7 +113,7 @@ class _Data:
             yield from self._condition(state.goal, self._own, (*path, "goal"))
 
     def _selection(self, state: SelectState, path: Path) -> Iterator[Finding]:
-        """Check the selected value; find cases that can never be taken, because their type differs from its type."""
+        """Yield findings about the selected term, and about cases whose type differs from the term's type."""
         yield from self._term(state.select, None, (*path, "select"))
         selected = self._kind(state.select, self._own)
         for key in state.cases:
@@ -124,7 +126,7 @@ class _Data:
             if isinstance(transition, TimedTransition):
                 yield from self._term(transition.seconds, None, (*here, "seconds"), "number")
             if transition.guard is not None or transition.passed or transition.effect:
-                # The event before a connector is unknown at validation.
+                # Validation cannot determine the event that led to a connector.
                 attributes = None
                 if isinstance(state, State) and event in state.on:
                     attributes = attributes_of(self._subject, event, state)
@@ -235,7 +237,7 @@ class _Data:
             yield from self._terms(terms_of(command), scope, (*path, "command", position))
 
     def _continued(self, rule: Rule, scope: Types, path: Path) -> Iterator[Finding]:
-        """Check a `continue` response: the rule's event lacks the outputs that `done` would provide."""
+        """Yield findings about a `continue` response whose event lacks outputs that transitions on `done` read."""
         for name, state, outcomes in self._handing_back:
             if rule.on in outcomes and concerns(rule, name, state, self._library):
                 for transition in state.on.get(DONE, ()):
@@ -243,7 +245,7 @@ class _Data:
 
     @cached_property
     def _handing_back(self) -> list[tuple[str, Step, Outcomes]]:
-        """Return the states with outputs at `done`, with their outcomes."""
+        """Return name, state and outcomes of each step that returns outputs with `done`."""
         steps = [(name, state) for name, state, _ in self._subject.steps if outputs_of(state, self._library)]
         return [(name, state, answerable(state, self._library)) for name, state in steps]
 
@@ -282,7 +284,7 @@ class _Data:
     def _given(
         self, terms: Mapping[str, Term], scope: Types | None, path: Path, used: Iterable[ActionPlot]
     ) -> Iterator[Finding]:
-        """Check the arguments for a plot, or for several candidates."""
+        """Yield findings about the arguments for a plot, or for several candidates."""
         wanted = [_types(plot) for plot in used]
         for name, term in terms.items():
             kinds = dict.fromkeys(types[name] for types in wanted if name in types)
@@ -309,14 +311,14 @@ class _Data:
             yield from self._fits(term, kind, names, path)
 
     def _scope(self, scope: Types | None, used: Expression | Term | Effect) -> Types:
-        """Return the scope; for an unknown event, the plot's own names and all attributes that are read."""
+        """Return the scope; for `None`, an unknown event, the plot's names and all attributes that `used` reads."""
         if scope is not None:
             return scope
         attributes = [name for name in mentioned(used) if name.startswith("event.")]
         return {**self._own, **dict.fromkeys(attributes)} if attributes else self._own
 
     def _known(self, scope: Types) -> dict[str, str | None]:
-        """Return the scope with the types that the schema knows; the language has no other types."""
+        """Return the scope with `None` for each type that the schema does not declare."""
         return {name: kind if kind in self._typed else None for name, kind in scope.items()}
 
     # -- types -------------------------------------------------------------------------------------------
@@ -324,7 +326,7 @@ class _Data:
     def _fits(
         self, term: Term | None, wanted: str | None, scope: Types, path: Path, what: str | None = None
     ) -> Iterator[Finding]:
-        """Require a value of a fitting type; SCXML's data have no types."""
+        """Yield a finding about a value whose type does not fit; data in dialect `scxml` have no types."""
         given = None if term is None or wanted is None or not self._subject.strict else self._kind(term, scope)
         if term is not None and wanted is not None and given is not None and not self._compatible(given, wanted):
             message = f"'{what or path[-1]}' is of type {wanted}, and {to_text(term)} is of type {given}"
@@ -344,11 +346,11 @@ class _Data:
 
     def _compatible(self, given: str, wanted: str) -> bool:
         schema = self._schema
-        if _VALUES & {given, wanted}:  # a misspelt type excludes no value
+        if _VALUES & {given, wanted}:  # an unknown type has a separate finding, and here fits every value
             known = schema is None or {given, wanted} <= FREE_TYPES | schema.types.keys()
             return given == wanted or not known
         if schema is None or not {given, wanted} <= schema.types.keys():
-            return True  # a word may name an object, a plot or a condition
+            return True  # a word may be the name of an object, a plot or a condition
         return schema.is_a(given, wanted) or schema.is_a(wanted, given)
 
 

@@ -1,4 +1,4 @@
-"""Flow of events: every outcome is wired, and every event that a state takes or fires is known."""
+"""Checks of events: each outcome has a transition, and each event of a transition or action is known."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from knowledge_base.errors import InputError
 
 
 def check_wiring(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about events."""
+    """Yield findings about outcomes without a transition, unknown events and targets of rules."""
     try:
         expanded = subject.library.expanded(subject.plot)
     except InputError as error:
@@ -43,7 +43,7 @@ def check_wiring(subject: Subject) -> Iterator[Finding]:
         if not isinstance(state, State):
             continue
         outcomes = outcomes_of(state, subject.library)
-        if outcomes or state.entry:  # otherwise the state has no outcome to wire
+        if outcomes or state.entry:  # otherwise the state has no outcome that needs a transition
             handled = _handled([wired[name], *subject.around(path)])
             yield from _outcomes(subject, name, outcomes, handled, path)
             yield from _skills(subject, name, state, path, handled)
@@ -59,7 +59,7 @@ def _reserved(subject: Subject, event: str, path: Path) -> Finding:
 
 
 def _rule_targets(subject: Subject) -> Iterator[Finding]:
-    """Require that a rule's target is in the scope of the state that it answers for."""
+    """Yield findings about rules whose target is not in the scope of a state to which the rule applies."""
     library, plot = subject.library, subject.plot
     leading = [(n, rule) for n, rule in enumerate(plot.rules) if rule.leads_away and not plot.generated]
     for scope in plot.scopes() if leading else ():
@@ -78,7 +78,7 @@ def _rule_targets(subject: Subject) -> Iterator[Finding]:
 
 
 def _left_out_in_a_circle(subject: Subject, expanded: ActionPlot) -> Iterator[Finding]:
-    """Require that in every cycle of steps at least one is never skipped by rules."""
+    """Yield a finding about a cycle of steps if rules may skip every step of the cycle."""
     if not any(rule.before for rule in subject.plot.rules):
         return
     connectors = ((name, state) for name, state, _ in expanded.walk() if isinstance(state, Connector))
@@ -89,7 +89,7 @@ def _left_out_in_a_circle(subject: Subject, expanded: ActionPlot) -> Iterator[Fi
 
 
 def _handled(states: Iterable[AnyState]) -> dict[str, bool]:
-    """Map each event to whether some transition takes it under all guards."""
+    """Return for each event whether one of its transitions has no guard, so that the event is always handled."""
     found: dict[str, bool] = {}
     for state in states:
         if isinstance(state, State):
@@ -142,12 +142,12 @@ def _skills(subject: Subject, name: str, state: State, path: Path, handled: Mapp
 
 @dataclass(frozen=True, slots=True)
 class _Traffic:
-    """The events of a plot, collected once.
+    """The events of a plot.
 
     Attributes:
         anywhere: events that every state may receive.
-        inside: path of a state -> final events of its content and skills, and of states inside.
-        heard: events with a transition.
+        inside: events of a state's content, its skills and its inner states, by the state's path.
+        heard: events for which the plot has a transition.
     """
 
     anywhere: AbstractSet[str]

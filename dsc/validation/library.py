@@ -1,4 +1,4 @@
-"""Validator: all checks over a plot, or over all plots of a library."""
+"""Validator: executes all checks of a plot, or of all plots of a library."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from knowledge_base.language.checking.inputs import require, require_several
 from knowledge_base.world.schema import Schema
 
 MAX_FINDINGS = 50
-"""Upper bound for one plot; authors read no more, and each finding takes a search for the nearest name."""
+"""Upper bound of findings about one plot: authors read no more, and each finding needs a search for similar names."""
 _CHECKS = (
     check_reach, check_wiring, check_arguments, check_parameters, check_outputs, check_data, check_components,
 )  # fmt: skip
@@ -31,7 +31,7 @@ def validate_library(
     skills: Iterable[SkillSignature] | None,
     components: Components | None = None,
 ) -> list[Finding]:
-    """Return all findings about all plots; see `validate_plot`."""
+    """Return the findings about all plots of a library; see `validate_plot`."""
     _require_parts(library, schema)
     known = None if skills is None else _known(skills)
     return [finding for plot in library for finding in validate_plot(plot, library, schema, known, components)]
@@ -47,12 +47,12 @@ def validate_plot(
     """Return the findings about a plot, at most `MAX_FINDINGS`; empty for a valid plot.
 
     Args:
-        plot: the plot.
-        library: provider of the plots it uses.
-        schema: declares types for conditions; without it, types and conditions are not checked.
-        skills: the deployed skills; without them, triggers are not checked.
-        components: names of the deployed components, or their declared parameters as well; without them, `set` and
-            `switch` are not checked.
+        plot: the plot to check.
+        library: provider of the plots to which the plot refers.
+        schema: declared types and predicates; with `None`, types and conditions are not checked.
+        skills: the deployed skills; with `None`, triggers are not checked.
+        components: names of the deployed components, or their declared parameters by name; with `None`, `set`, `send`
+            and `switch` are not checked.
 
     Raises:
         InputError: an argument is of another type.
@@ -63,7 +63,7 @@ def validate_plot(
     subject = Subject(plot, library, schema, signatures, components)
     for check in (check_structure, check_size):
         findings = list(islice(check(subject), MAX_FINDINGS))
-        if findings:  # later checks would repeat these findings in other words, or take too long
+        if findings:  # later checks would report these mistakes again, or take too long
             return findings
     return list(islice(chain.from_iterable(check(subject) for check in _CHECKS), MAX_FINDINGS))
 
@@ -83,6 +83,6 @@ def _known(skills: Iterable[SkillSignature]) -> list[SkillSignature]:
 
 
 def raise_findings(findings: list[Finding]) -> None:
-    """Raise the findings as one `PlotError`, if there are any."""
+    """Raise all findings as one `PlotError`; an empty list raises no error."""
     if findings:
         raise PlotError(findings)

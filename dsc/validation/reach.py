@@ -1,4 +1,4 @@
-"""Reach of a plot: states are entered and completed, connectors lead to a state, plots do not use each other."""
+"""Checks of reach: states can be entered and completed, connectors lead to a state, plots form no cycle."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from knowledge_base.errors import InputError
 
 
 def check_connectors(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about choices and selections."""
+    """Yield findings about choice and select connectors, e.g. about cycles of connectors."""
     connectors = {name: path for name, state, path in subject.states if isinstance(state, Connector)}
     circle = circle_of({
         name: [target for _, _, way in subject.leaving(path) for target in way.targets]
@@ -55,24 +55,24 @@ def _branches(subject: Subject, name: str, path: Path) -> Iterator[Finding]:
 
 
 def circle_of(ways: Mapping[str, Iterable[str]]) -> list[str]:
-    """Return a cycle, with its first node at its end again, or nothing; its repair uncovers a second one.
+    """Return a cycle of a graph as nodes, the first node also at the end; empty if the graph has no cycle.
 
     Args:
-        ways: node -> its targets.
+        ways: targets of each node.
     """
     try:
         TopologicalSorter(ways).prepare()
     except CycleError as error:
         circle: list[str] = error.args[1]
-        return circle[::-1]  # it follows the ways backwards
+        return circle[::-1]  # the search collects the nodes backwards
     return []
 
 
 def check_reach(subject: Subject) -> Iterator[Finding]:
     """Yield findings about unreachable states, empty dynamic states, and plots that use each other in a cycle.
 
-    Connectors count as states. SCXML does not require that all states can be reached. A generated plot always has all
-    its final states.
+    Connectors count as states. SCXML allows unreachable states. A generated plot may have unreachable final states,
+    because it always has a final state for each outcome.
     """
     yield from _circle(subject)
     for name, state, path in subject.steps:
@@ -87,10 +87,10 @@ def check_reach(subject: Subject) -> Iterator[Finding]:
 def _unreached(subject: Subject) -> Iterator[Finding]:
     try:
         expanded = subject.library.expanded(subject.plot)
-    except InputError:  # rules that cannot be applied have a separate finding
+    except InputError:  # another check reports rules that cannot be applied
         return
     ways = subject if expanded is subject.plot else Subject(expanded, subject.library)
-    responses = {rule.then for rule in subject.plot.rules}  # steps of plans may have outcomes that no state here has
+    responses = {rule.then for rule in subject.plot.rules}  # only steps of plans may have the outcomes of these rules
     for name in _unreached_in(expanded, (), ways, responses):
         if name in subject.names:
             yield _nothing_leads_to(name, subject)
@@ -108,7 +108,7 @@ def _nothing_leads_to(name: str, subject: Subject) -> Finding:
 
 
 def _unreached_in(scope: Scope, around: Path, ways: Subject, responses: set[str]) -> Iterator[str]:
-    """Yield states without a transition to them, but not their inner states; a transition stays in its scope (S0.3)."""
+    """Yield unreachable states, without their inner states; each transition stays in its scope (S0.3)."""
     reached: set[str] = set()
     waiting = [initial_of(scope), *responses]
     while waiting:
@@ -129,7 +129,7 @@ def _unreached_in(scope: Scope, around: Path, ways: Subject, responses: set[str]
 
 
 def _circle(subject: Subject) -> Iterator[Finding]:
-    """Yield the first cycle of submachine states that this plot leads to, directly or through other plots."""
+    """Yield a finding about the first cycle of plots that this plot reaches through submachine states."""
     own, used = subject.plot.name, _used(subject.states)
     for name, path in used.items():
         circle = circle_of({**_uses(name, subject.library), own: used})
@@ -142,7 +142,7 @@ def _circle(subject: Subject) -> Iterator[Finding]:
 
 
 def _uses(name: str, library: Library) -> dict[str, Iterable[str]]:
-    """Return the plots that submachine states of a plot use, directly or through other plots: plot -> used ones."""
+    """Return for each plot that `name` uses directly or indirectly the plots that its submachine states use."""
     found: dict[str, Iterable[str]] = {}
     waiting = [name]
     while waiting:
@@ -154,7 +154,7 @@ def _uses(name: str, library: Library) -> dict[str, Iterable[str]]:
 
 
 def _used(states: Iterable[tuple[str, AnyState, Path]]) -> dict[str, Path]:
-    """Return the plots that submachine states name, each with the first state that does."""
+    """Return the path of the first submachine state that uses a plot, by the name of this plot."""
     found: dict[str, Path] = {}
     for _, state, path in states:
         if isinstance(state, SubmachineState) and not state.use.startswith("?"):
@@ -166,8 +166,8 @@ def _used(states: Iterable[tuple[str, AnyState, Path]]) -> dict[str, Path]:
 
 
 def check_completion(subject: Subject, wired: Mapping[str, AnyState]) -> Iterator[Finding]:
-    """Yield findings about `done`; `wired` has the states of the expanded plot."""
-    silent = cache(lambda used: _ends_silently(subject.library.plot(used)))  # many states may use one plot
+    """Yield findings about transitions on `done`; `wired` contains the states of the expanded plot by name."""
+    silent = cache(lambda used: _ends_silently(subject.library.plot(used)))  # several states may use the same plot
     for name, state, path in subject.states:
         if type(state) is State and DONE in state.on and any(isinstance(a, Trigger) for a in state.entry):
             message = f"state '{name}' has no content, so it is done immediately and would cancel its skill"
@@ -191,11 +191,11 @@ def _completes(state: AnyState, silent: Callable[[str], bool]) -> bool:
 
 
 def _ends_silently(plot: ActionPlot) -> bool:
-    """Return whether the plot can reach a top-level final state without firing a declared outcome."""
+    """Return whether the plot can reach a top-level final state but fire no declared outcome."""
     states = [state for state in plot.states.values() if isinstance(state, State)]
     waiting = {initial_of(plot)}.union(*(_silent_ways(plot, state) for state in states))
     seen: set[str] = set()
-    while waiting:  # follow connectors along transitions without an outcome
+    while waiting:  # follow only transitions that fire no outcome
         name = waiting.pop()
         seen.add(name)
         reached = plot.states.get(name)

@@ -1,4 +1,4 @@
-"""Review of a plot: unreachable parts, and candidates that overlap or leave gaps."""
+"""Review of a plot: warnings about parts that are never used, and about candidates that overlap or leave gaps."""
 
 from __future__ import annotations
 
@@ -30,16 +30,19 @@ from knowledge_base.language.syntax.expression import (
 )
 
 MOST = 32
-"""Upper bound of conditions compared together: states with more candidates are skipped, later guards checked alone."""
+"""Upper bound of conditions that are compared with each other.
+
+States with more candidates are skipped. Of a longer list of guards, each later guard is checked alone.
+"""
 Conditions = Mapping[str, Expression]
-"""Candidates in their order, with their conditions over their common parameters."""
+"""Conditions over the common parameters, by candidate, in the order of candidates."""
 
 
 _LEFT_OUT = "remove it, or change its condition"
 
 
 def _candidates(subject: Subject) -> Iterator[Finding]:
-    """Yield warnings about the candidates of dynamic states, and about those for the steps of plans."""
+    """Yield warnings about the candidates of dynamic states, and about the candidates for steps of plans."""
     for name, state, path in subject.steps:
         if not isinstance(state, DynamicState) or len(state.dynamic) > MOST:
             continue
@@ -59,7 +62,10 @@ def _unclear(subject: Subject, name: str, path: Path, message: str, fix: str) ->
 
 
 def _for_steps(library: Library) -> Iterator[Finding]:
-    """Ignore overlaps between implementations of a planning action: after one fails, another one is tried."""
+    """Yield warnings about gaps between implementations of a planning action.
+
+    Overlaps are allowed, because another implementation is tried if the first one fails.
+    """
     for action in dict.fromkeys(plot.implements for plot in library if plot.implements):
         plots = library.implementing(action)
         conditions = {plot.name: _condition(plot, plot.parameters) for plot in plots}
@@ -70,7 +76,7 @@ def _for_steps(library: Library) -> Iterator[Finding]:
 
 
 def _condition(plot: ActionPlot, given: Iterable[str]) -> Expression:
-    """Return the plot's condition; a parameter that others lack is replaced by its default or a unique name."""
+    """Return the plot's condition; a default or a unique name replaces each parameter that is not in `given`."""
     own: dict[str, Term] = {}
     for name in free_variables(plot.when or TRUE) - set(given):
         default = plot.parameters[name].default if name in plot.parameters else None
@@ -89,16 +95,16 @@ def _never_chosen(conditions: Conditions) -> Iterator[str]:
 
 
 def _overlapping(conditions: Conditions) -> Iterator[str]:
-    """Yield pairs that overlap although they read the same facts, which suggests exclusive conditions."""
+    """Yield pairs of candidates that overlap although they read equal facts, which suggests exclusive conditions."""
     for (one, first), (other, second) in combinations(conditions.items(), 2):
         about = subjects(first)
-        nested = implied(first, by=second) or implied(second, by=first)  # the special case precedes the general one
+        nested = implied(first, by=second) or implied(second, by=first)  # a special case may precede the general case
         if about and about == subjects(second) and not nested and not contradictory(first, second):
             yield f"the candidates '{one}' and '{other}' overlap: both can fit, and then '{one}' is chosen"
 
 
 def _leave_a_gap(conditions: Conditions) -> bool:
-    """Return whether several candidates read the same facts, and together do not cover all cases."""
+    """Return whether several candidates read equal facts, and their conditions do not cover all cases."""
     many = list(conditions.values())
     about = {subjects(condition) for condition in many}
     if len(many) < 2 or len(about) != 1 or about == {frozenset()}:
@@ -107,7 +113,7 @@ def _leave_a_gap(conditions: Conditions) -> bool:
 
 
 def _counts(conditions: Sequence[Expression]) -> Iterator[Expression]:
-    """Yield bounds for counts: terms that are only compared with numbers from 0 on are taken as never negative."""
+    """Yield the condition `>= 0` for each term that is compared only with numbers of at least 0, e.g. a count."""
     compared: dict[Call, list[Constant]] = {}
     for comparison in _comparisons(conditions):
         for term, other in ((comparison.left, comparison.right), (comparison.right, comparison.left)):
@@ -127,7 +133,7 @@ def _comparisons(parts: Iterable[Expression | Term]) -> Iterator[Comparison]:
 
 
 def review_plot(plot: ActionPlot, library: Library) -> list[Finding]:
-    """Return warnings about a plot that passes `validate_plot`, at most `MAX_FINDINGS`."""
+    """Return at most `MAX_FINDINGS` warnings about a plot for which `validate_plot` returns no finding."""
     if plot.dialect != "dsc":
         return []
     subject = Subject(plot, library)
@@ -147,7 +153,7 @@ def _rules(subject: Subject) -> Iterator[Finding]:
 
 
 def _handlers(subject: Subject) -> Iterator[Finding]:
-    """Check interrupting handlers and parallel ones separately, because they do not affect each other."""
+    """Yield warnings about handlers; interrupting and parallel handlers are independent and checked separately."""
     for number, handler in enumerate(subject.plot.handlers):
         same = (one for one in subject.plot.handlers[:number] if one.on == handler.on)
         earlier = [one for one in same if one.interrupt == handler.interrupt]
@@ -160,7 +166,7 @@ def _handlers(subject: Subject) -> Iterator[Finding]:
 
 
 def _all_answer(event: str, subject: Subject) -> bool:
-    """Return whether each interruptible state takes the event under all conditions."""
+    """Return whether each interruptible state always handles the event itself."""
     resting = [state for _, state, _ in subject.states if isinstance(state, State)]
     own = [state for state in resting if not isinstance(state, CompositeState)]
     return all(any(way.guard is None for way in state.on.get(event, ())) for state in own)
@@ -171,7 +177,7 @@ def _listed(earlier: Sequence[Rule] | Sequence[Handler]) -> str:
 
 
 def _comes_before(earlier: Rule, later: Rule) -> bool:
-    """Return whether the later rule is never evaluated if the earlier one answers, with or without a limit."""
+    """Return whether the later rule is not evaluated after a response of the earlier rule, regardless of its limit."""
     if (earlier.place, earlier.on) != (later.place, later.on):
         return False
     if earlier.steps and not (later.steps and set(later.steps) <= set(earlier.steps)):
@@ -182,7 +188,7 @@ def _comes_before(earlier: Rule, later: Rule) -> bool:
 
 
 def _settled(subject: Subject, rule: Rule, event: str) -> bool:
-    """Return whether the states of a rule already handle its event."""
+    """Return whether the transitions of a rule's states always handle the rule's event."""
     mine = [state for name, state, _ in subject.steps if concerns(rule, name, state, subject.library)]
     able = [state for state in mine if event in answerable(state, subject.library)]
     return bool(able) and all(any(way.guard is None for way in state.on.get(event, ())) for state in able)
@@ -203,7 +209,7 @@ def _transitions(subject: Subject) -> Iterator[Finding]:
 
 
 def _never(condition: Expression | None, earlier: Sequence[Expression | None]) -> str | None:
-    """Return the reason why an element with this condition, after others with theirs, can never happen."""
+    """Return the reason why an element after elements with the conditions `earlier` is never used, or `None`."""
     if condition is not None and contradictory(condition):
         return "its condition cannot hold"
     others = [Not(one or TRUE) for one in earlier]

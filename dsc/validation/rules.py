@@ -1,4 +1,4 @@
-"""Rules and handlers: names exist, and rules read only available values (S1.4, S1.14)."""
+"""Checks of rules and handlers: names exist, and rules read only available values (S1.4, S1.14)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dsc.validation.subject import Subject, Types
 
 
 def check_rules(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about names in rules and handlers."""
+    """Yield findings about unknown names in rules and handlers."""
     plot = subject.plot
     if plot.handlers and not subject.strict:
         message = "handlers are for plots of dialect dsc"
@@ -26,7 +26,7 @@ def check_rules(subject: Subject) -> Iterator[Finding]:
             yield subject.unknown_plot((*path, "use"), do.use)
     steps = subject.names.keys() | {other.implements for other in subject.library if other.implements}
     for number, rule in enumerate(plot.rules):
-        if not (plot.generated and rule.outcome in plot.emits):  # else the state is in the plot that holds the goal
+        if not (plot.generated and rule.outcome in plot.emits):  # otherwise the plot with the goal contains the state
             yield from _response(subject, rule, ("rules", number, "do"))
         key = "of" if rule.on is not None else rule.place
         for position, name in enumerate(rule.steps):
@@ -40,7 +40,7 @@ def check_rules(subject: Subject) -> Iterator[Finding]:
 
 
 def _no_step(subject: Subject, name: str, path: Path, steps: set[str]) -> Finding:
-    """Return the finding about a missing step; if it names a plot, list the names by which rules refer to it."""
+    """Return the finding about a missing step; for the name of a plot, it lists the valid names of the plot's steps."""
     if name not in subject.library:
         message = f"there is no state '{name}', nor a plot that implements an action of that name"
         return subject.finding(path, "rule", message, found=name, valid=steps)
@@ -70,7 +70,7 @@ def _response(subject: Subject, rule: Rule, path: Path) -> Iterator[Finding]:
 
 
 def attributes_of(subject: Subject, event: str, state: State) -> Types | None:
-    """Return the attributes of an event that a state of the plot takes; `None` if they are unknown."""
+    """Return the types of the attributes of an event at a state; `None` if the attributes are unknown."""
     declared = outcomes_of(state, subject.library)
     if event in declared:
         return declared[event] or {}
@@ -83,28 +83,28 @@ def attributes_of(subject: Subject, event: str, state: State) -> Types | None:
 
 
 def _brought_by(subject: Subject, trigger: Trigger, event: str) -> Types | None:
-    """Return the attributes of an event of a skill, by its name in the chart; `None` if they are unknown."""
+    """Return the types of the attributes of a skill's event; `None` if the event or skill is unknown."""
     signature = (subject.skills or {}).get(trigger.trigger)
     outcomes = {} if signature is None else signature.outcomes
     return next((outcomes[one] for one in outcomes if trigger.names.get(one, one) == event), None)
 
 
 def read_as(prefix: str, types: Types) -> Types:
-    """Return the types of attributes or arguments under the names by which terms read them."""
+    """Return the types by the names that terms read: `prefix` precedes each name."""
     return {prefix + name: kind for name, kind in types.items()}
 
 
 class RuleScope:
-    """Names and declared types that the rules and handlers of one plot can read."""
+    """Names, with declared types, that the rules and handlers of one plot can read."""
 
     def __init__(self, subject: Subject) -> None:
         self._subject, self._library, plot = subject, subject.library, subject.plot
         self._implementing = [one for one in self._library if one.implements] if subject.planned else []
-        # Declared outcomes leave the plot.
+        # A declared outcome is an event for the host state, not for this plot.
         self._fired = {event for _, _, way in subject.ways() for event in way.emitted if event not in plot.emits}
 
     def of(self, rule: Rule) -> Types | None:
-        """Return names and types; `None` if the rule's event never happens at its states."""
+        """Return the types of the names that a rule can read; `None` if its event never occurs at its states."""
         names = {**({} if self._in_plans(rule) else self._subject.types), **self._arguments(rule)}
         if rule.on is None:
             return names
@@ -113,21 +113,21 @@ class RuleScope:
         return {**read_as("event.", event), **names} if sources else None
 
     def out_of_reach(self, rule: Rule, read: Iterable[str], path: Path) -> Iterator[Finding]:
-        """Yield findings about variables of the plot in a rule that answers for steps of plans."""
+        """Yield findings about variables that a rule reads although it applies to steps of plans, other plots."""
         for name in sorted(self._subject.types.keys() & set(read) if self._in_plans(rule) else ()):
             message = f"'?{name}' is a variable of this plot; a rule that answers for steps of plans cannot read it"
             fix = "read a fact instead; or name with `of` steps that are states of this plot"
             yield self._subject.finding(path, "declared variable", message, fix, found=f"?{name}")
 
     def never(self, rule: Rule, path: Path) -> Finding:
-        """Return the finding about a rule whose event never happens at its states."""
+        """Return the finding about a rule whose event never occurs at its states."""
         what = " or ".join(f"'{name}'" for name in rule.of) or "no state of this plot"
         message = f"{what} {'cannot' if rule.of else 'can'} end with '{rule.on}'"
         valid = set(chain.from_iterable(self._sources(rule)))
         return self._subject.finding((*path, "on"), "rule event", message, found=rule.on, valid=valid)
 
     def attributes(self, handler: Handler) -> Types | None:
-        """Return the attributes of a handler's event; `None` if they are unknown."""
+        """Return the types of the attributes of a handler's event; `None` if the attributes are unknown."""
         if handler.on in self._subject.plot.receives:
             return read_as("event.", self._subject.plot.receives[handler.on] or {})
         listen = handler.listen
@@ -152,7 +152,7 @@ class RuleScope:
                 yield self._subject.finding(here, "known event", message, found=handler.on, valid=brought)
 
     def _in_plans(self, rule: Rule) -> bool:
-        """Return whether it may answer for steps of plans that are made for goals of this plot."""
+        """Return whether a rule may apply to steps of plans for this plot's goals."""
         return self._subject.planned and answers_in_plans(rule, self._library)
 
     def _sources(self, rule: Rule) -> Iterator[Outcomes]:
@@ -162,7 +162,7 @@ class RuleScope:
         yield from (plot.emits for plot in self._implementing if not rule.of or plot.implements in rule.of)
 
     def _arguments(self, rule: Rule) -> Types:
-        """Return the arguments that all steps named by the rule share."""
+        """Return the types of the arguments that all steps of a rule have in common."""
         given = list(self._given(rule)) if rule.steps else []
         common = [name for name in given[0] if all(name in one for one in given)] if given else []
         return {STEP + name: _common(name, given) for name in common}
@@ -179,12 +179,12 @@ class RuleScope:
 
 
 def unknown_skill(subject: Subject, path: Path, trigger: Trigger) -> Finding:
-    """Return the finding about a missing skill."""
+    """Return the finding about a trigger whose component or skill is missing."""
     message, found = f"no component offers the skill '{trigger.trigger}'", trigger.trigger
     return subject.finding(path, "known skill", message, found=found, valid=subject.skills or ())
 
 
 def _common(name: str, sources: Iterable[Types]) -> str | None:
-    """Return the type of a name in all its sources; `None` if they differ."""
+    """Return the type of a name if all its sources declare an equal type; else `None`."""
     types = {one[name] for one in sources if name in one}
     return types.pop() if len(types) == 1 else None

@@ -1,4 +1,4 @@
-"""Shape of a plot: names, targets, borders, histories, dialect, times and size."""
+"""Checks of structure: names, targets, borders, histories, dialect, times and size of a plot."""
 
 from __future__ import annotations
 
@@ -30,11 +30,14 @@ from knowledge_base.errors import SchemaError
 from knowledge_base.language.syntax.expression import Constant, Term
 
 MAX_ANSWERS = 1_000
-"""Upper bound of transitions from rules; ten times those of this project's largest plot, in a tenth of a second."""
+"""Upper bound of the transitions that the expansion of rules adds to a plot.
+
+This is ten times the number in this project's largest plot. Their expansion takes a tenth of a second.
+"""
 
 
 def check_structure(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about the plot's states and targets, before checks of their behaviour."""
+    """Yield findings about the plot's states and targets; checks of behaviour require a plot without such findings."""
     sound = True
     for finding in _shape(subject):
         sound = False
@@ -64,7 +67,7 @@ def _shape(subject: Subject) -> Iterator[Finding]:
 
 
 def _tables(subject: Subject) -> Iterator[Finding]:
-    """Yield errors that the chart compiler finds once all targets are known."""
+    """Yield errors of the chart compiler, which require that all targets exist."""
     try:
         compile_plot(subject.plot)
     except SchemaError as error:
@@ -115,8 +118,8 @@ def _uses(subject: Subject, state: AnyState, path: Path) -> Iterator[Finding]:
 
 
 def _histories(subject: Subject) -> Iterator[Finding]:
-    """Require targets of histories inside the state around (SCXML 3.10), and histories where they are cleared."""
-    remembering: dict[bool, set[Path]] = {False: set(), True: set()}  # with a history directly inside; at any level
+    """Yield findings about histories: targets must be inside the parent (SCXML 3.10), and `clear` needs a history."""
+    remembering: dict[bool, set[Path]] = {False: set(), True: set()}  # `True`: with a history at any level
     for _, state, path in subject.states:
         if isinstance(state, HistoryState):
             around = list(subject.way_to(path))[:-1]
@@ -133,7 +136,7 @@ def _histories(subject: Subject) -> Iterator[Finding]:
 
 
 def _cleared(subject: Subject, written: str, remembering: Mapping[bool, set[Path]], path: Path) -> Iterator[Finding]:
-    """Require a history for Harel's clear-history: directly inside the state, or with `*` at any level below."""
+    """Yield a finding if `clear` refers to a state without history: directly inside, or with `*` at any level."""
     name = written.removesuffix("*")
     holders = {name: at for name, state, at in subject.states if isinstance(state, CompositeState | OrthogonalState)}
     if name not in holders:
@@ -148,7 +151,7 @@ def _cleared(subject: Subject, written: str, remembering: Mapping[bool, set[Path
 
 
 def _timing(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about timeouts before the state's least time has passed."""
+    """Yield findings about timeouts that expire before the state's least time has passed."""
     for name, state, path in subject.states:
         least = _seconds(state.at_least) if isinstance(state, State) else None
         for number, timed in enumerate(state.after) if isinstance(state, State) and least is not None else ():
@@ -160,19 +163,19 @@ def _timing(subject: Subject) -> Iterator[Finding]:
 
 
 def _seconds(term: Term | None) -> float | None:
-    """Return the seconds of a constant."""
+    """Return the value of a constant in seconds; `None` for any other term."""
     return float(term.value) if isinstance(term, Constant) else None
 
 
 def check_size(subject: Subject) -> Iterator[Finding]:
-    """Yield a finding if the expansion of the plot's rules would take too long."""
+    """Yield a finding if the expansion of the plot's rules would exceed `MAX_ANSWERS` transitions."""
     plot = subject.plot
     if not plot.rules and not plot.handlers:
         return
     answered = Counter(event for _, state, _ in subject.states for event in answerable(state, subject.library))
     passing = sum(bool(way.passed) for _, _, way in subject.ways())
     made = sum(_answers(rule, answered, subject) for rule in plot.rules)
-    made += sum(bool(rule.before) for rule in plot.rules) * passing  # each needs a separate transition
+    made += sum(bool(rule.before) for rule in plot.rules) * passing  # one for each `before` rule
     made += sum(handler.interrupt for handler in plot.handlers) * len(subject.states)
     if made > MAX_ANSWERS:
         what = "rules and handlers" if plot.rules and plot.handlers else "rules" if plot.rules else "handlers"
@@ -182,7 +185,7 @@ def check_size(subject: Subject) -> Iterator[Finding]:
 
 
 def _answers(rule: Rule, answered: Mapping[str, int], subject: Subject) -> int:
-    """Return an upper bound of the number of states that a rule answers for, without a look at each state."""
+    """Return an upper bound of the number of states to which a rule applies, without a check of each state."""
     at_most = len(subject.steps) if rule.on is None else answered.get(rule.on, 0)
     by_state = rule.steps and all(name in subject.names for name in rule.steps)
     return min(at_most, len(rule.steps)) if by_state else at_most
@@ -192,7 +195,7 @@ def _answers(rule: Rule, answered: Mapping[str, int], subject: Subject) -> int:
 
 
 def _dialect(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about features that only SCXML has."""
+    """Yield findings about features that exist only in dialect `scxml`."""
     for path, what in _foreign(subject):
         fix = "write `dialect: scxml` if the plot is to be an SCXML chart"
         yield subject.finding(path, "dialect", f"{what}, which only dialect scxml has", fix)

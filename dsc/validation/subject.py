@@ -1,4 +1,4 @@
-"""The subject of validation: a plot with its surroundings, walked once, and the findings about it."""
+"""Subject of validation: a plot with its library and deployment, indexed for all checks."""
 
 from __future__ import annotations
 
@@ -20,28 +20,29 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.world.schema import Schema
 
 Types = Mapping[str, str | None]
-"""Names -> declared types; `None` is any type."""
+"""Declared types by name; `None` means any type."""
 Skills = Mapping[str, SkillSignature] | None
-"""The deployed skills by `component.skill`; `None` if unknown."""
+"""The deployed skills by `component.skill`; `None` if the deployment is unknown."""
 Components = Collection[str] | Mapping[str, Mapping[str, Parameter]]
-"""The names of components, or their declared parameters as well; names alone allow any parameter."""
+"""Names of components, or declared parameters by component; names alone allow any parameter."""
 Way = tuple[Path, str, Transition]
-"""A transition with its path and the label of its trigger."""
+"""Path, label of the trigger, and transition."""
 
 
 class Subject:
-    """A plot, the names that it may use, and its states and transitions by name and by path.
+    """A plot to check, the names to which it may refer, and its states and transitions by name and by path.
 
     Attributes:
-        plot: the plot.
-        library: provider of the plots it uses.
-        schema, skills, components: the declared types and the deployment; `None` if unknown.
-        strict: whether the plot has the rules of dialect `dsc`, not of SCXML.
-        states: all states in document order, with their names and paths.
-        steps: those that hold another plot.
-        names: the paths of all states by name, in document order.
-        planned: whether a step has a goal.
-        assigned, types: the declared types of variables and outputs; of parameters, too.
+        plot: the plot to check.
+        library: provider of the plots to which the plot refers.
+        schema, skills, components: declared types, deployed skills and components; `None` if unknown.
+        strict: whether the plot is in dialect `dsc`; dialect `scxml` has fewer rules.
+        states: name, state and path of all states, in document order.
+        steps: name, state and path of the states that contain another plot.
+        names: paths of all states by name, in document order.
+        planned: whether a dynamic state has a goal.
+        assigned: declared types of variables and outputs, by name.
+        types: declared types of variables, outputs and parameters, by name.
     """
 
     def __init__(
@@ -69,50 +70,50 @@ class Subject:
         }
 
     def leaving(self, path: Path) -> tuple[Way, ...]:
-        """Return the transitions of the state at `path`, in order."""
+        """Return the outgoing transitions of the state at `path`, in order."""
         return self._leaving.get(path, ())
 
     def ways(self) -> Iterator[Way]:
-        """Yield all transitions."""
+        """Yield all transitions of the plot."""
         for ways in self._leaving.values():
             yield from ways
 
     def way_to(self, path: Path) -> Iterator[Path]:
-        """Yield the paths of the states around the one at `path`, outermost first, and its own."""
+        """Yield the paths of the states that contain the state at `path`, outermost first, then `path`."""
         return (path[:length] for length in range(1, len(path) + 1) if path[:length] in self._states)
 
     def around(self, path: Path) -> Iterator[State]:
-        """Yield the composite and orthogonal states around the one at `path`, outermost first."""
+        """Yield the composite and orthogonal states that contain the state at `path`, outermost first."""
         states = (self._states[place] for place in self.way_to(path[:-1]))
         return (state for state in states if isinstance(state, State))
 
     def state(self, name: str) -> AnyState:
-        """Return the state of that name, which must exist."""
+        """Return the state of that name; raise `KeyError` if there is none."""
         return self._states[self.names[name]]
 
     def contents(self, name: str | None) -> list[ActionPlot]:
-        """Return the plots that the state of that name may hold; nothing for `None` and for other kinds of states."""
+        """Return the plots that may become the content of the step `name`; empty for any other state or `None`."""
         state = None if name is None else self.state(name)
         return contents_of(state, self.library) if isinstance(state, Step) else []
 
     def inside(self, name: str, path: Path) -> bool:
-        """Return whether the state at `path` contains a state of that name; the whole plot if `path` is empty."""
+        """Return whether the state at `path` contains a state of that name; an empty `path` is the whole plot."""
         found = self.names.get(name, path)
         return found != path and found[: len(path)] == path
 
     def within(self, path: Path) -> set[str]:
-        """Return the names of all states for which `inside` holds; slow, for messages only."""
+        """Return the names of all states inside the state at `path`; slow, for messages only."""
         return {name for name in self.names if self.inside(name, path)}
 
     def reactions(self) -> Iterator[tuple[Path, Reaction]]:
-        """Yield the reactions of all rules and handlers, with their paths."""
+        """Yield path and reaction of each rule and handler."""
         for number, rule in enumerate(self.plot.rules):
             yield ("rules", number, "do"), rule.do
         for number, handler in enumerate(self.plot.handlers):
             yield ("handlers", number, "do"), handler.do
 
     def actions(self) -> Iterator[tuple[Path, ExternalAction | Internal, Who]]:
-        """Yield the actions of states and the commands of rules and handlers: path, action, and the acting role."""
+        """Yield path, action and acting role of all actions of states and all commands of rules and handlers."""
         for _, state, path in self.states:
             for key, actions in state.blocks() if isinstance(state, State) else ():
                 yield from (((*path, key, position), action, "plots") for position, action in enumerate(actions))
@@ -130,24 +131,24 @@ class Subject:
         valid: Iterable[str] | None = None,
         level: Literal["error", "warning"] = "error",
     ) -> Finding:
-        """Return a finding at the place of the part at `path`; with `valid` names it is about an unknown name."""
+        """Return a finding about the part at `path`; with `valid` names, the finding reports an unknown name."""
         place = self.plot.place(path)
         if valid is None:
             return Finding(SchemaError(message, place=place, found=found), rule, fix, level)
         return Finding(UnknownNameError(message, place=place, found=found, valid=valid), rule, fix, level)
 
     def caught(self, error: InputError, path: Path, rule: str, fix: str = "") -> Finding:
-        """Return an error as a finding at `path`; the error's own place is relative to the text there."""
+        """Return an error as a finding about the part at `path`; the error's place is relative to this part's text."""
         error.place = self.plot.place(path) or error.place
         return Finding(error, rule, fix)
 
     def unknown_plot(self, path: Path, name: str) -> Finding:
-        """Return the finding about a missing plot."""
+        """Return the finding about a reference to a missing plot."""
         valid = {other.name for other in self.library}
         return self.finding(path, "known plot", f"there is no plot '{name}'", found=name, valid=valid)
 
 
 def addressed_by(plot: ActionPlot) -> frozenset[str]:
-    """Return the components that a plot itself uses; a plot that uses none is abstract, else primitive (S0.9)."""
+    """Return the names of the components that a plot itself uses; empty for an abstract plot (S0.9)."""
     named = (component_of(one) for one in flat(action for _, action, _ in Subject(plot, Library()).actions()))
     return frozenset(name for name in named if name is not None)
