@@ -1,10 +1,10 @@
-"""The components of two robots over one world: base, arm, camera, voice (S0.7, S0.8).
+"""The components of two robots for one world: base, arm, camera and voice (S0.7, S0.8).
 
-A skill first waits for its duration and then acts on the world in one call, so that a cancelled call changes nothing.
-Its outcome carries the robot's observations, never the true state of the world.
+A skill first waits for its duration, and then acts on the world in one call, so that a cancelled call changes nothing.
+Its outcome contains the robot's observations, and never the true state of the world.
 
 The second robot has a base on tracks, a suction arm, and a camera that looks twice. Its skills have the names and
-outcomes that the plots use, with other implementations; `vent` is its own.
+outcomes that the plots expect, with other implementations; only `vent` is additional.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def seconds(default: float) -> Parameter:
-    """Return a duration parameter in seconds, set by the integrator's profile and not by plots."""
+    """Return a parameter for a duration in seconds, which the profile of the integrator sets, and not a plot."""
     return Parameter("number", default=default, least=0.1, most=60.0, changed_by="profile")
 
 
@@ -40,29 +40,29 @@ THROWN = {"item": "item", "destination": "destination"}
 
 
 def acts(types: Mapping[str, str], **outcomes: Attributes) -> Callable[[Body], Body]:
-    """Declare a skill that acts on the world, with these types of its parameters and these outcomes.
+    """Declare a skill that acts on the world, with the types of its parameters and its outcomes.
 
-    It may also end with `not_possible`. The world executes each action id once.
+    The skill may also end with `not_possible`. The world executes each action id once.
     """
     return skill({**outcomes, "not_possible": {"reason": None}}, types, after_crash="same_id")
 
 
 drives = acts(TO, arrived=TO, no_path=TO, slipped={**ITEM_AT, **TO})
-"""The declaration of every base's `drive`."""
+"""Declares the skill `drive` of every base."""
 picks_up = acts(ITEM_AT, picked_up=ITEM_AT, grasp_failed=ITEM_AT, no_ik=ITEM_AT, gone=ITEM_AT)
-"""The declaration of every arm's `pick_up`."""
+"""Declares the skill `pick_up` of every arm."""
 takes_out = acts(ITEM_IN, taken_out=ITEM_IN, grasp_failed=ITEM_IN, no_ik=ITEM_IN, gone=ITEM_AT)
-"""The declaration of every arm's `take_out`."""
+"""Declares the skill `take_out` of every arm."""
 recognises = acts(AT, recognised={**AT, "count": None}, nothing_found=AT)
-"""The declaration of every camera's `recognise`."""
+"""Declares the skill `recognise` of every camera."""
 
 
 class TablePart(Component):
     """A component of the robot that acts on the world.
 
     Args:
-        world: keeps the results of its actions.
-        name: the component's name in charts.
+        world: the world, which keeps the results of actions.
+        name: the name of the component in charts; by default the name of its class.
     """
 
     def __init__(self, world: TableWorld, name: str | None = None) -> None:
@@ -70,32 +70,32 @@ class TablePart(Component):
         self.world = world
 
     async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
-        """Return the outcome of an executed action, or `None`: no action runs on in the world."""
+        """Return the outcome of an executed action; `None` otherwise, since no action continues in the world."""
         self.world.catch_up()
         results = [self.world.done.get(one) for one in (again(action_id), action_id)]
         return next((Ended(outcome_of(result)) for result in results if result is not None), None)
 
 
 class Base(TablePart):
-    """The mobile base."""
+    """The mobile base on wheels."""
 
     name = "base"
     declares: ClassVar[Mapping[str, Parameter]] = {
         "navigation": Parameter("text", default="planned", among=("planned", "reactive")),
         "speed": Parameter("number", default=0.5, least=0.05, most=1.5),  # metres a second
-        "starting": seconds(1.0),  # until it moves
+        "starting": seconds(1.0),  # the time before the base moves
     }
 
     @drives
     async def drive(self, call: SkillCall, to: str) -> Outcome:
-        """Drive to a place; a held item may slip, and then robot and item are at the floor."""
+        """Drive to a place; if the held item slips, the robot and the item are at the floor."""
         metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
         await call.clock.sleep(self.parameters["starting"] + metres / self.parameters["speed"])
         return outcome_of(self.world.drive(call.action_id, to))
 
 
 class Arm(TablePart):
-    """The arm with its one hand."""
+    """The arm with one hand."""
 
     name = "arm"
     declares: ClassVar[Mapping[str, Parameter]] = {
@@ -108,7 +108,7 @@ class Arm(TablePart):
 
     @picks_up
     async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
-        """Pick an item, with everything in it, up from a surface."""
+        """Pick up an item, with all items in it, from a surface."""
         await call.clock.sleep(self.parameters["grasping"])
         return outcome_of(self.world.pick_up(call.action_id, item, surface))
 
@@ -120,38 +120,38 @@ class Arm(TablePart):
 
     @acts(ITEM_IN, stacked=ITEM_IN, stack_fell={**ITEM_IN, "items": None}, gone=ITEM_AT)
     async def stack(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
-        """Put the held item into a carrier on a surface; `gone` names the carrier."""
+        """Put the held item into a carrier on a surface; the outcome `gone` contains the carrier."""
         await call.clock.sleep(self.parameters["stacking"])
         return outcome_of(self.world.stack(call.action_id, item, carrier, surface))
 
     @takes_out
     async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
-        """Take an item out of its carrier on a surface; `gone` names the carrier."""
+        """Take an item out of its carrier on a surface; the outcome `gone` contains the carrier."""
         await call.clock.sleep(self.parameters["grasping"])
         return outcome_of(self.world.take_out(call.action_id, item, carrier, surface))
 
     @acts(THROWN, thrown_away=THROWN)
     async def throw_away(self, call: SkillCall, item: str, destination: str) -> Outcome:
-        """Throw the held item, with everything in it, into its destination."""
+        """Throw the held item, with all items in it, into its destination."""
         await call.clock.sleep(self.parameters["throwing"])
         return outcome_of(self.world.throw_away(call.action_id, item, destination))
 
 
 class Camera(TablePart):
-    """The camera; it reports visible items only, and plots compare these with their expectations."""
+    """The camera, which reports only visible items; plots compare these with the expected items."""
 
     name = "camera"
     declares: ClassVar[Mapping[str, Parameter]] = {"recognising": seconds(2.0), "looking": seconds(1.5)}
 
     @recognises
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
-        """Recognise the items on a surface; `count` is their number, without items inside others."""
+        """Recognise the items on a surface; `count` is the number of visible items that are in no carrier."""
         await call.clock.sleep(self.parameters["recognising"])
         return outcome_of(self.world.recognise(call.action_id, surface))
 
     @acts(CARRIER_AT, looked=CARRIER_AT, gone=ITEM_AT)
     async def look_into(self, call: SkillCall, carrier: str, surface: str) -> Outcome:
-        """Look into a carrier on a surface, which closes one unit of its room; `gone` names the carrier."""
+        """Look into a carrier on a surface, which closes one unit of its free room; `gone` contains the carrier."""
         await call.clock.sleep(self.parameters["looking"])
         return outcome_of(self.world.look_into(call.action_id, carrier, surface))
 
@@ -166,13 +166,13 @@ class Voice(TablePart):
 
     @skill({"said": {"text": None}}, after_crash="same_id")
     async def say(self, call: SkillCall, text: str) -> Outcome:
-        """Tell the operator something."""
+        """Speak a text to the operator."""
         await call.clock.sleep(1.0 + len(text) / self.parameters["pace"])
         return outcome_of(self.world.say(call.action_id, text))
 
 
 class Tracks(Base):
-    """A base on tracks: slow, turns on the spot first, and waits at a blocked path before it reports it."""
+    """A base on tracks, which is slow, turns before it drives, and tries a blocked path a second time."""
 
     declares: ClassVar[Mapping[str, Parameter]] = {
         **Base.declares,
@@ -183,7 +183,7 @@ class Tracks(Base):
 
     @drives
     async def drive(self, call: SkillCall, to: str) -> Outcome:
-        """Turn, drive to a place, and try a second time if the path is blocked."""
+        """Turn and drive to a place; if the path is blocked, wait and try a second time."""
         metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
         await call.clock.sleep(self.parameters["turning"] + metres / self.parameters["speed"])
         result = self.world.drive(call.action_id, to)
@@ -194,7 +194,7 @@ class Tracks(Base):
 
 
 class SuctionArm(Arm):
-    """A suction arm: it pumps before a grasp, and tries a failed grasp a second time."""
+    """A suction arm, which pumps before a grasp, and tries a failed grasp a second time."""
 
     declares: ClassVar[Mapping[str, Parameter]] = {
         **Arm.declares,
@@ -205,17 +205,17 @@ class SuctionArm(Arm):
 
     @picks_up
     async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
-        """Pick an item, with everything in it, up from a surface."""
+        """Pick up an item, with all items in it, from a surface."""
         return await self._held(call, lambda action_id: self.world.pick_up(action_id, item, surface))
 
     @takes_out
     async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
-        """Take an item out of its carrier on a surface; `gone` names the carrier."""
+        """Take an item out of its carrier on a surface; the outcome `gone` contains the carrier."""
         return await self._held(call, lambda action_id: self.world.take_out(action_id, item, carrier, surface))
 
     @skill(outcomes={"vented": {}}, after_crash="repeat")
     async def vent(self, call: SkillCall) -> Outcome:
-        """Let air into the suction cup, which empties the pump; nothing is held then."""
+        """Let air into the suction cup; the arm then holds no item."""
         await call.clock.sleep(0.5)
         return Outcome("vented")
 
@@ -234,7 +234,7 @@ class PatientCamera(Camera):
 
     @recognises
     async def recognise(self, call: SkillCall, surface: str) -> Outcome:
-        """Recognise the items on a surface; `count` is their number, without items inside others."""
+        """Recognise the items on a surface; `count` is the number of visible items that are in no carrier."""
         await call.clock.sleep(self.parameters["recognising"])
         result = self.world.recognise(call.action_id, surface)
         if result.outcome == "nothing_found":
@@ -244,11 +244,11 @@ class PatientCamera(Camera):
 
 
 def again(action_id: str) -> str:
-    """Return the id of a second attempt within one call, for which faults are drawn again."""
+    """Return the id of the second attempt in one call, so that faults are drawn separately."""
     return f"{action_id}/again"
 
 
 def outcome_of(result: Result) -> Outcome:
-    """Return the outcome of a skill for the world's result."""
+    """Return the outcome of a skill that corresponds to a result of the world."""
     attributes = {k: list(v) if isinstance(v, tuple) else v for k, v in result.attributes.items()}
     return Outcome(result.outcome, attributes, learned(result))

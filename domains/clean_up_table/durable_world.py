@@ -1,6 +1,6 @@
-"""A world that survives the death of the robot's program: each action is in a file before its outcome is reported.
+"""A world that survives a crash of the robot program, because a file keeps each action before its outcome is reported.
 
-Several programs may act on the same world; each reads the actions of the others first.
+Several programs may act on one world; each of them first reads the actions of the others.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from domains.clean_up_table.observations import Result
 
 KIND = Kind("simulated world", 0x64736377, 2)
-"""Format 1 had no number and no application id."""
+"""The kind and format of the file; files of format 1 have no format number and no application id."""
 PATIENCE_MS = 5000
-"""Milliseconds that an action waits for another program's transaction."""
+"""The milliseconds for which an action waits for the transaction of another program."""
 _TABLES = (
     "CREATE TABLE world (state TEXT NOT NULL)",
     "CREATE TABLE done (action_id TEXT PRIMARY KEY, result TEXT NOT NULL)",
@@ -33,17 +33,17 @@ _TABLES = (
 
 
 def beside(store: Path) -> Path:
-    """Return the path of the world of a run in that store.
+    """Return the path of the file that keeps the world of the run in `store`.
 
     Raises:
-        StoreError: as `located`.
+        StoreError: see `located`.
     """
     place = located(store)
     return place.with_name(place.name + WORLD)
 
 
 def require_free(path: Path) -> None:
-    """Raise `StoreError` unless the path is free or holds another world."""
+    """Raise `StoreError` if the path leads to a file that is not the file of a world."""
     with _reported(path, "read"):
         if is_there(path):
             require_own(path, KIND)
@@ -51,13 +51,13 @@ def require_free(path: Path) -> None:
 
 
 class DurableWorld(TableWorld):
-    """A world in a file, from `create` or `open` until `close`."""
+    """A world that is kept in a file, from `create` or `open` until `close`."""
 
     _file: sqlite3.Connection | None = None
     _seen = 0
 
     def create(self, path: Path) -> None:
-        """Write this world to a file and keep it there, instead of any world in that file.
+        """Write this world to a file, and keep all later actions there; the file's earlier world is deleted.
 
         Raises:
             StoreError: the file is of another kind, or cannot be written.
@@ -78,7 +78,7 @@ class DurableWorld(TableWorld):
 
     @classmethod
     def open(cls, path: Path) -> Self:
-        """Return the world in a file.
+        """Return the world that a file contains, and keep all later actions in the file.
 
         Raises:
             StoreError: the file is missing, of another kind, or unreadable.
@@ -98,15 +98,15 @@ class DurableWorld(TableWorld):
         return lasting
 
     def catch_up(self) -> None:
-        """Read the actions of other programs."""
+        """Read the actions of other programs from the file, if there are any."""
         if self._file is not None and self._version() != self._seen:
             self._seen = self._version()
             self.become(_state(self._file))
 
     def executed(self, action_id: str, result: Result) -> None:
-        """Write the result of the action and the world after it in one transaction; each action is written once."""
+        """Write the result of an action and the world after it in one transaction."""
         super().executed(action_id, result)
-        assert self._file is not None  # noqa: S101  it was created or opened
+        assert self._file is not None  # noqa: S101  `create` or `open` has set the file
         self._file.execute("BEGIN")
         self._file.execute("INSERT INTO done VALUES (?, ?)", (action_id, RESULT.dump_json(result).decode()))
         self._file.execute("UPDATE world SET state = ?", (self._present(),))
@@ -118,13 +118,13 @@ class DurableWorld(TableWorld):
             self._file.close()
 
     def _version(self) -> int:
-        """Return SQLite's data version, which another program's commit changes."""
-        assert self._file is not None  # noqa: S101  as above
+        """Return SQLite's data version, which a commit of another program changes."""
+        assert self._file is not None  # noqa: S101  `create` or `open` has set the file
         (version,) = self._file.execute("PRAGMA data_version").fetchone()
         return int(version)
 
     def _present(self) -> str:
-        """Return the state without `done`, which grows with each action."""
+        """Return the state without `done`, since the file has a separate table for it."""
         return json.dumps({name: value for name, value in self.state().items() if name != "done"})
 
 

@@ -1,4 +1,4 @@
-"""The places, and the items: cups, cans and crisp cans, with their carriers and destinations."""
+"""Places and items of the room: cups, cans and crisp cans, with their carriers and destinations."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ OPERATOR = "operator"
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A place seen from above, in metres: x to the right, y away from the viewer.
+    """A place as seen from above, in metres; x points to the right, y away from the viewer.
 
     Attributes:
-        type: the place's type in the planning domain.
-        x, y: its centre.
-        width, depth: its extent.
+        type: the type of the place in the planning domain.
+        x, y: the centre of the place.
+        width, depth: the extent of the place in x and y.
     """
 
     type: str
@@ -47,21 +47,21 @@ SURFACES, DESTINATIONS = (
 
 
 def distance(start: str, end: str) -> float:
-    """Return the distance between two places in metres, in a straight line."""
+    """Return the distance between two places in metres, measured in a straight line."""
     here, there = SPOTS[start], SPOTS[end]
     return math.dist((here.x, here.y), (there.x, there.y))
 
 
 CUP, CAN, CRISP_CAN = "cup", "can", "crisp-can"
 KINDS = (CUP, CAN, CRISP_CAN)
-"""Kinds of items; the names are the planning domain's types."""
+"""The kinds of items; the planning domain has a type with the name of each kind."""
 
 DESTINATION_OF = {CUP: "sink", CAN: "bin", CRISP_CAN: "bin"}
 SIZES = {"small": 1, "large": 2}
-"""Number of cans that fit into a crisp can, by its size."""
+"""The number of cans that fit into a crisp can of each size."""
 
 ROOMS = ("none", "one", "two")
-"""The planning domain's names for 0, 1 and 2 units of free room."""
+"""The names of 0, 1 and 2 units of free room in the planning domain."""
 
 HAND = "hand"
 RESERVED = frozenset({*PLACES, *ROOMS, HAND})
@@ -69,7 +69,7 @@ _NAME = re.compile(r"[a-z][a-z0-9_-]{0,59}")
 
 
 def check_name(name: str) -> None:
-    """Raise `InputError` unless `name` can name an item in PDDL and is not a place or a room."""
+    """Raise `InputError` if `name` is not a valid name of an item in PDDL, or is the name of a place or a room size."""
     if not _NAME.fullmatch(name):
         usual = re.sub(r"[^a-z0-9_-]+", "_", name.lower())
         raise InputError(
@@ -82,11 +82,11 @@ def check_name(name: str) -> None:
 
 
 def check_behind(name: str, fronts: Mapping[str, str | None]) -> None:
-    """Raise `InputError` unless the item called `name` is behind nothing or behind an item that can hide it.
+    """Raise `InputError` if the item is behind a missing item, or if items hide each other in a cycle.
 
     Args:
-        name: the item.
-        fronts: for every item's name the one it is behind, or `None`.
+        name: the name of the item.
+        fronts: for the name of each item, the name of the item in front of it, or `None`.
     """
     passed = {name}
     front = fronts[name]
@@ -104,14 +104,14 @@ class Item:
     """An item and its place.
 
     Attributes:
-        name: unique; never a place.
+        name: the name, which is unique and not the name of a place.
         kind: one of `KINDS`.
-        capacity: number of items that fit directly into it.
-        where: exactly one of: a surface, the carrier's name, `HAND`, or the destination it was thrown into.
-        behind: the item that hides it while both are on the same surface.
-        on_table: whether it was ever on the table, and so counts for the goal.
-        seen: whether the camera ever reported it.
-        closed: units of room that `check-room` has closed; only a fall opens them again.
+        capacity: the number of items that fit directly into the item.
+        where: a surface, the name of the carrier, `HAND`, or the destination into which the item was thrown.
+        behind: the item that hides this item while both are on one surface.
+        on_table: whether the item was ever on the table, so that it counts for the goal.
+        seen: whether the camera has ever reported the item.
+        closed: the units of room that `check-room` has closed; only a fall of the stack opens them again.
     """
 
     name: str
@@ -125,25 +125,25 @@ class Item:
 
     @property
     def destination(self) -> str:
-        """The destination of its kind."""
+        """The destination of all items of this kind."""
         return DESTINATION_OF[self.kind]
 
     @property
     def disposed(self) -> bool:
-        """Whether it is in its destination."""
+        """Whether the item is in its destination."""
         return self.where == self.destination
 
     def fits(self, carrier: Item) -> bool:
-        """Return whether its kind fits into the carrier's, regardless of free room."""
+        """Return whether items of this kind fit into items of the carrier's kind, regardless of free room."""
         return self is not carrier and (self.kind, carrier.kind) in {(CUP, CUP), (CAN, CRISP_CAN)}
 
 
 def new_item(kind: str, name: str, *, surface: str = "table", size: str = "small", behind: str | None = None) -> Item:
-    """Return an item on a surface; `size` matters for a crisp can only.
+    """Return a new item on a surface; `size` applies only to a crisp can.
 
     Raises:
-        UnknownNameError: no such kind, size or surface.
-        InputError: the name cannot name an item.
+        UnknownNameError: the kind, size or surface is unknown.
+        InputError: the name is not a valid name of an item.
     """
     check_name(name)
     for what, found, valid in (("kind", kind, KINDS), ("size", size, SIZES), ("surface", surface, SURFACES)):
@@ -157,7 +157,7 @@ class Inventory:
     """All items, in the order in which they were added.
 
     Raises:
-        InputError: two items of one name, or an item behind one that does not exist or is behind it.
+        InputError: two items have equal names, an item is behind a missing item, or items hide each other in a cycle.
     """
 
     def __init__(self, items: Iterable[Item] = ()) -> None:
@@ -176,14 +176,14 @@ class Inventory:
         return self._items[name]
 
     def get(self, name: str) -> Item | None:
-        """Return the item of that name, or `None`."""
+        """Return the item with this name, or `None`."""
         return self._items.get(name)
 
     def add(self, item: Item) -> None:
-        """Add a new item at its place.
+        """Add a new item at the place that it contains.
 
         Raises:
-            InputError: the name is taken.
+            InputError: another item has this name, or the item is behind a missing item.
         """
         check_behind(item.name, {**{known.name: known.behind for known in self}, item.name: item.behind})
         self._put(item)
@@ -199,7 +199,7 @@ class Inventory:
             check_behind(name, fronts)
 
     def free_name(self, kind: str) -> str:
-        """Return the first unused name of cup1, cup2, … (can1, …, crisp_can1, …)."""
+        """Return the first unused name of the kind: cup1, cup2, … or can1, … or crisp_can1, …."""
         stem, number = kind.replace("-", "_"), 1
         while f"{stem}{number}" in self._items:
             number += 1
@@ -207,23 +207,23 @@ class Inventory:
 
     @property
     def held(self) -> Item | None:
-        """The item in the hand itself, without items inside it."""
+        """The item that the hand itself holds; `None` if the hand is free."""
         return next((item for item in self if item.where == HAND), None)
 
     def lying(self, surface: str) -> list[Item]:
-        """Return the items directly on a surface, hidden ones too."""
+        """Return the items that lie directly on a surface, including hidden items."""
         return [item for item in self if item.where == surface]
 
     def contents(self, carrier: Item) -> list[Item]:
-        """Return the items directly inside a carrier."""
+        """Return the items that are directly in a carrier."""
         return [item for item in self if item.where == carrier.name]
 
     def stack(self, item: Item) -> list[Item]:
-        """Return the item and everything in it, carriers before their contents."""
+        """Return the item and all items in it, each carrier before its contents."""
         return [item, *(deep for inner in self.contents(item) for deep in self.stack(inner))]
 
     def outermost(self, item: Item) -> Item:
-        """Return the outermost carrier of an item; the item itself if it is in none."""
+        """Return the outermost carrier of an item; the item itself if no carrier contains it."""
         carrier = self._items.get(item.where)
         return item if carrier is None else self.outermost(carrier)
 
@@ -232,16 +232,16 @@ class Inventory:
         return carrier.capacity - len(self.contents(carrier))
 
     def room(self, carrier: Item) -> str:
-        """Return the free room without closed units, as the planning domain names it."""
+        """Return the free room of a carrier without closed units, as the planning domain names it."""
         return ROOMS[max(0, self.free_room(carrier) - carrier.closed)]
 
     def hidden(self, item: Item) -> bool:
-        """Return whether the item in front of it is on the same surface."""
+        """Return whether the item in front of this item is on the same surface."""
         front = self._items.get(item.behind) if item.behind else None
         return front is not None and item.where in SURFACES and front.where == item.where
 
     def move(self, item: Item, where: str) -> None:
-        """Move an item, with everything in it."""
+        """Move an item, with all items in it, to another place."""
         item.where = where
         if self.outermost(item).where == "table":
             for moved in self.stack(item):

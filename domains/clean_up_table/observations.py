@@ -1,7 +1,7 @@
-"""Results of the world's verbs, and the change of the robot's knowledge by them.
+"""Results of the world's verbs, and the changes of the robot's knowledge that follow from them.
 
-A success reports the effect of the planning action of the same name, in the domain's predicates. A failure reports the
-robot's observations of it. Facts are retracted whether they were known or not.
+A success reports the effect of the planning action with the same name, in the predicates of the domain. A failure
+reports the robot's observations. A fact may be retracted even if it was unknown.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ Attribute = str | int | tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """An item in the robot's view.
+    """An item in the view of the robot.
 
     Attributes:
-        item: its name.
-        kind: its kind.
-        where: the surface it lies on or the carrier it is directly in.
-        room: its free room in the planning domain's terms (`none`, `one`, `two`).
-        new: whether it was never seen before.
+        item: the name of the item.
+        kind: the kind of the item.
+        where: the surface on which the item lies, or the carrier that directly contains it.
+        room: the free room of the item, as in the planning domain (`none`, `one`, `two`).
+        new: whether the robot has never seen the item before.
     """
 
     item: str
@@ -39,15 +39,15 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """The result of one verb.
+    """The result of one verb of the world.
 
     Attributes:
-        outcome: the outcome event's name.
-        attributes: the event's attributes.
-        sightings: items with an observed place or room.
-        apart: (item, carrier) pairs that no longer hold.
-        fits: (item, carrier) pairs that were recognised as fitting for the first time.
-        failures: number of consecutive failures, this one included.
+        outcome: the name of the outcome event.
+        attributes: the attributes of the outcome event.
+        sightings: the items whose place or room the robot observed.
+        apart: pairs (item, carrier) of items that are no longer in the carrier.
+        fits: pairs (item, carrier) of items that fit into the carrier, recognised for the first time.
+        failures: the number of consecutive failures, including this one.
     """
 
     outcome: str
@@ -59,11 +59,11 @@ class Result:
 
 
 RESULT = TypeAdapter(Result)
-"""Results as JSON data."""
+"""Converts results to and from JSON data."""
 
 
 def not_possible(reason: str) -> Result:
-    """Return the result of a verb that could not be tried; the world is unchanged."""
+    """Return the result of a verb that is impossible; the world stays unchanged."""
     return Result("not_possible", {"reason": reason})
 
 
@@ -73,7 +73,7 @@ def gone(item: str, surface: str) -> Result:
 
 
 class _Notes:
-    """A change under construction; an addition wins over a removal."""
+    """A change of knowledge under construction; an added fact has priority over a removed one."""
 
     def __init__(self) -> None:
         self.nodes: dict[str, str] = {}
@@ -88,14 +88,14 @@ class _Notes:
         self.removed.append(fact(predicate, *args))
 
     def holds_only(self, predicate: str, *args: str, of: Iterable[str]) -> None:
-        """Add the fact with this last argument, and retract it for all others in `of`."""
+        """Add the fact with this last argument, and retract the facts with the other values in `of`."""
         for other in of:
             if other != args[-1]:
                 self.holds_not(predicate, *args[:-1], other)
         self.holds(predicate, *args)
 
     def known(self, item: str) -> None:
-        """Retract that the item is missing, since the robot sees or handles it."""
+        """Retract that the item is missing, because the robot sees or handles the item."""
         self.holds_not("missing", item)
 
     def counts(self, function: str, argument: str, number: int) -> None:
@@ -106,7 +106,7 @@ class _Notes:
 
 
 def initial_knowledge(robot_at: str) -> Delta:
-    """Return the robot's knowledge before its first look: places, its own place, and the order of rooms."""
+    """Return the robot's knowledge before its first observation: places, its place, and the order of room sizes."""
     notes = _Notes()
     notes.nodes.update({name: spot.type for name, spot in SPOTS.items()})
     notes.holds("robot-at", robot_at)
@@ -119,7 +119,7 @@ def initial_knowledge(robot_at: str) -> Delta:
 
 
 def learned(result: Result) -> Delta:
-    """Return the change of knowledge by the result of any verb."""
+    """Return the change of knowledge that follows from the result of any verb."""
     notes = _Notes()
     if result.outcome in _LEARNED:
         _LEARNED[result.outcome](notes, result)
@@ -225,11 +225,12 @@ def _sighted(notes: _Notes, sighting: Sighting) -> None:
     else:
         for surface in SURFACES:
             notes.holds_not("lies-at", item, surface)
-        # The plots decide whether it is tidy there: in a carrier that cannot be grasped it is not.
+        # The plots decide whether the item is tidy there: an item in a carrier that cannot be grasped is not.
         notes.holds("inside", item, sighting.where)
     if sighting.new:
         notes.holds("goes-to", item, DESTINATION_OF[sighting.kind])
-        # Once only: rules retract it after too many failures, and a second look must not restore it.
+        # Only at the first sighting: rules retract the fact after too many failures, and a later sighting must keep
+        # that.
         notes.holds("graspable", item)
 
 

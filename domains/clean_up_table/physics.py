@@ -1,4 +1,4 @@
-"""Foresight: a plan simulated on a copy of the world as the robot believes it, without faults (S1.10)."""
+"""Foresight: simulation of a plan on a copy of the world that the robot believes in, without faults (S1.10)."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ _VERBS: dict[str, Callable[[TableWorld, str, tuple[str, ...]], Result]] = {
     "check-room": lambda world, name, args: world.look_into(name, args[0], args[3]),
     "throw-away": lambda world, name, args: world.throw_away(name, args[0], args[1]),
 }
-"""The verb of each planning action, with the step's arguments in the order of `domain.pddl`."""
+"""The verb of the world for each planning action; the arguments are in the order of `domain.pddl`."""
 
 _HOPED_FOR = frozenset({"arrived", "picked_up", "put_down", "stacked", "taken_out", "looked", "thrown_away"})
 
 
 class Physics:
-    """A `Foresight` with the true rules of carriers, room and obstacles."""
+    """A `Foresight` that applies the true rules of carriers, room and obstacles."""
 
     def foresee(self, plan: Plan, world: Belief) -> Validation:
-        """Return whether every step succeeds without faults; `world` stays unchanged."""
+        """Simulate the plan without faults, and return the first step that fails; `world` stays unchanged."""
         ahead = believed(world)
         for number, step in enumerate(plan.steps):
             result = self._tried(ahead, f"step {number}", step)
@@ -48,7 +48,7 @@ class Physics:
 
 
 def believed(belief: Belief) -> TableWorld:
-    """Return the world in which all beliefs are true; items without a known place are omitted."""
+    """Return the world in which all beliefs are true; items without a believed place are omitted."""
     at = [str(place) for (place,) in belief.match("robot-at", (None,))]
     return TableWorld(_items(belief), robot_at=at[0] if at else OPERATOR)
 
@@ -62,7 +62,7 @@ def _items(belief: Belief) -> Iterator[Item]:
 
 
 def _item(name: str, kind: str, where: str, belief: Belief) -> Item:
-    """Return an item with the smallest capacity that fits the believed content and free room."""
+    """Return an item with the smallest capacity that agrees with the believed contents and free room."""
     inside = len(list(belief.match("inside", (None, name))))
     room = max((ROOMS.index(str(room)) for _, room in belief.match("free-room", (name, None))), default=0)
     item = new_item(kind, name, size="large" if kind == CRISP_CAN and inside + room > 1 else "small")

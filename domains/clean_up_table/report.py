@@ -1,4 +1,4 @@
-"""The report of a run: the true state of the world, with explanations from the robot's knowledge."""
+"""The report of a run: the true state of the world, with reasons from the robot's knowledge."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ FAILURES = frozenset({
     "nothing_found", "grasp_failed", "no_ik", "no_path", "slipped", "stack_fell", "gone", "not_possible",
     "timed_out", "skill_error",
 })  # fmt: skip
-"""Outcomes of skills that count as failures of a plan step."""
+"""The outcomes of skills that count as failures of a plan step."""
 STOPPED = "stopped"
-"""The event that the plot emits when the operator stops the run."""
+"""The event that the plot emits if the operator stops the run."""
 
 
 @dataclass(frozen=True, slots=True)
 class LeftItem:
-    """An item that was not cleared away: its true place, and the reason if the robot knows it."""
+    """An item that was not cleared away, with its true place, and the reason from the robot's knowledge."""
 
     item: str
     where: str
@@ -31,7 +31,7 @@ class LeftItem:
 
 @dataclass(frozen=True, slots=True)
 class ReportedFault:
-    """A fault of the simulation: its kind, whether it is permanent, and the items it hit."""
+    """A fault of the simulation: its kind, whether it is permanent, and the items that it affects."""
 
     kind: str
     permanent: bool
@@ -43,20 +43,20 @@ class Report:
     """The result of a run.
 
     Attributes:
-        goal_reached: every item that was ever on the table, seen or not, is in its destination, and the run ended
-            without a problem.
-        items: number of items that were on the table.
-        left: items that are not in their destinations.
-        trips: number of throws.
-        plans, replans: plans found, and plans replaced by a new one.
-        skill_failures: number of each failure outcome of skills.
-        recoveries: number of answers of each rule.
-        candidates_chosen: number of choices of each plot by dynamic states.
-        excluded: number of exclusions of each step that plans avoided for a while after a failure.
-        faults: the simulation's faults, in order.
-        touched: items that a permanent fault keeps from their destinations.
-        simulated_s, wall_s: seconds of run time and of real time.
-        problem: the reason if the run ended early.
+        goal_reached: whether every item that was ever on the table, seen or not, is in its destination, and the run
+            ended without a problem.
+        items: the number of items that were on the table.
+        left: the items that are not in their destinations.
+        trips: the number of throws.
+        plans, replans: the number of plans found, and the number of plans that replaced another plan.
+        skill_failures: the number of each failure outcome of skills.
+        recoveries: the number of uses of each rule.
+        candidates_chosen: the number of choices of each plot by dynamic states.
+        excluded: the number of exclusions of each plan step after failures.
+        faults: the faults of the simulation, in order.
+        touched: the items that a permanent fault keeps from their destinations.
+        simulated_s, wall_s: the duration of the run in run time and in real time, in seconds.
+        problem: the reason why the run ended early; `None` otherwise.
     """
 
     goal_reached: bool
@@ -76,11 +76,11 @@ class Report:
     problem: str | None = field(default=None)
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data."""
+        """Return the report as plain data."""
         return asdict(self)
 
     def lines(self) -> list[str]:
-        """Return the report as lines for people."""
+        """Return the report as lines of text."""
         done = self.items - len(self.left)
         what = "The table is clear" if self.goal_reached else "Not everything could be cleared"
         lines = [
@@ -100,7 +100,7 @@ class Report:
 
 
 def summarise(world: TableWorld, knowledge: KnowledgeBase, tally: Tally, end: RunEnd, wall_s: float) -> Report:
-    """Return the report of a run that has ended."""
+    """Return the report of a run that has ended, which took `wall_s` seconds of real time."""
     left = tuple(LeftItem(one.item, one.where, reason_for(one.item, knowledge, end)) for one in world.left())
     return Report(
         goal_reached=not left and end.problem is None,
@@ -122,7 +122,7 @@ def summarise(world: TableWorld, knowledge: KnowledgeBase, tally: Tally, end: Ru
 
 
 def reason_for(item: str, knowledge: KnowledgeBase, end: RunEnd) -> str:
-    """Return why an item is left, from the robot's knowledge."""
+    """Return the reason why an item is left, from the robot's knowledge."""
     about = {"item": item}
     if knowledge.type_of(item) is None:
         return "it was never seen"

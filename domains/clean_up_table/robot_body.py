@@ -1,4 +1,4 @@
-"""The robot's body in the room: obstacles, and the results of driving, grasping, stacking and seeing."""
+"""The robot's body in the room: reasons that prevent a verb, and the results of driving, grasping and seeing."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _OUTCOMES = {GRASP_FAILED: "grasp_failed", NO_INVERSE_KINEMATICS: "no_ik"}
 
 
 class RobotBody(Room):
-    """A room with a robot in it: one place at a time, one hand, one camera."""
+    """A room with a robot that is at one place, has one hand, and has one camera."""
 
-    # Obstacles of a verb: a result, or `None` without one.
+    # Methods that return the result of a verb that an obstacle prevents, or `None` without an obstacle.
 
     def _not_at(self, place: str, places: tuple[str, ...]) -> Result | None:
         if place not in places:
@@ -43,7 +43,7 @@ class RobotBody(Room):
         return None if held and held.name == item else not_possible(f"the hand does not hold '{item}'")
 
     def _absent(self, name: str, surface: str) -> Result | None:
-        """Return `gone` if an item is not on the surface or unrecognisable: the arm needs the camera."""
+        """Return `gone` if an item is not on the surface or not recognisable, since the arm needs the camera."""
         item = self.items.get(name)
         if item is None or name in self.faults.unrecognisable:
             return gone(name, surface)
@@ -109,7 +109,7 @@ class RobotBody(Room):
     # Handling items
 
     def _meddle(self, action_id: str, possible: dict[str, bool], keep: str | None = None) -> Draw | None:
-        """Draw a call's fault: apply an interference here, return any other fault."""
+        """Draw the fault of a call; apply an interference immediately, and return any other fault."""
         draw = self.faults.draw(action_id, {**possible, **self._interferences(keep)})
         if draw is None or draw.kind not in {ITEM_MOVED, ITEM_ADDED}:
             return draw
@@ -191,7 +191,7 @@ class RobotBody(Room):
         return Result("recognised", {"surface": surface, "count": len(visible)}, sightings, fits=fits)
 
     def _new_fits(self, new: list[Item]) -> tuple[tuple[str, str], ...]:
-        """Return the fitting pairs among new items, and between them and known items that remain."""
+        """Return the fitting pairs among new items, and between new items and known items that are not disposed of."""
         known = [item for item in self.items if item.seen and not item.disposed]
         pairs = [(a, b) for a in new for b in (*known, *new)] + [(a, b) for a in known for b in new]
         return tuple((a.name, b.name) for a, b in pairs if a.fits(b))

@@ -1,6 +1,6 @@
-"""The simulated room: its state, interference by other people, the truth about it, and its drawing.
+"""The simulated room: its state, interference by other people, its true state for reports, and its drawing.
 
-It is pure data and rules, without clock or asyncio. The robot's verbs are in `table_world`.
+This module contains only data and rules, and uses neither a clock nor asyncio. The robot's verbs are in `table_world`.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ _MOVES = {"table": "shelf", "shelf": "table"}
 
 
 class Room:
-    """Places, items, the robot's place, the faults so far and the executed actions.
+    """The state of the world: items, the robot's place, faults so far, and executed actions.
 
     Attributes:
-        items: every item and its place; `items.held` is in the robot's one hand.
-        faults: draws faults and keeps them.
+        items: every item and its place; `items.held` is the item in the hand.
+        faults: draws and records faults.
         robot_at: the place of the robot.
-        trips: number of throws.
-        said: the robot's sentences, in order.
-        done: the first result of every action executed, by action id.
-        departure: the last drive, and its start.
+        trips: the number of throws.
+        said: the sentences that the robot spoke, in order.
+        done: the first result of each executed action, by action id.
+        departure: the action id of the last drive, and the place where it started.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Room:
     ) -> None:
         if robot_at not in PLACES:
             raise UnknownNameError(f"there is no place '{robot_at}'", found=robot_at, valid=PLACES)
-        # The room changes its items: copies keep two rooms made from one list apart.
+        # The room changes its items, so two rooms constructed from one list need separate copies.
         self.items = Inventory(copy.copy(item) for item in items)
         self.faults = WorldFaults(seed, faults)
         self.robot_at = robot_at
@@ -65,14 +65,14 @@ class Room:
         self.departure = "", robot_at
 
     def catch_up(self) -> None:
-        """Read the actions of other programs, if the world is shared."""
+        """Read the actions of other programs, if programs share the world."""
 
     def executed(self, action_id: str, result: Result) -> None:
-        """Keep the result of an executed action."""
+        """Store the result of an executed action."""
         self.done[action_id] = result
 
     def place_before(self, action_id: str) -> str:
-        """Return the start of a drive; an executed drive keeps its start, so that it takes the same time again."""
+        """Return the start of a drive; a repeated drive has its first start, so that its duration stays equal."""
         drive, place = self.departure
         return place if drive == action_id else self.robot_at
 
@@ -87,27 +87,27 @@ class Room:
         size: str = "small",
         behind: str | None = None,
     ) -> str:
-        """Add a new item on a surface, as another person would; return its name.
+        """Add a new item on a surface, as another person would, and return its name.
 
         Args:
             kind: `cup`, `can` or `crisp-can`.
-            name: a unique name; by default the next free one of its kind.
-            surface: its surface.
-            size: `small` or `large`, for a crisp can.
-            behind: the item that hides it.
+            name: a unique name; by default the next free name of the kind.
+            surface: the surface on which the item lies.
+            size: `small` or `large`; only for a crisp can.
+            behind: the name of the item that hides the new item.
 
         Raises:
-            InputError: an unknown kind, size, surface or front item, or a name that is taken.
+            InputError: the kind, size, surface or front item is unknown, or another item has the name.
         """
         name = name or self.items.free_name(kind)
         self.items.add(new_item(kind, name, surface=surface, size=size, behind=behind))
         return name
 
     def move_item(self, name: str, surface: str) -> None:
-        """Move an item, with everything in it, to another surface, as another person would.
+        """Move an item, with all items in it, to another surface, as another person would.
 
         Raises:
-            InputError: no such item or surface, or the item does not lie on a surface itself.
+            InputError: the item or the surface is unknown, or the item does not lie directly on a surface.
         """
         item = self.items.get(name)
         if item is None:
@@ -120,7 +120,7 @@ class Room:
         self.items.move(item, surface)
 
     def _interferences(self, keep: str | None) -> dict[str, bool]:
-        """Return the possible interferences during a call, none of them permanent; `keep` is not moved."""
+        """Return the possible interferences during a call, none of them permanent; the item `keep` is not moved."""
         kinds = []
         if self._movable(keep) and self.faults.left_for(ITEM_MOVED):
             kinds.append(ITEM_MOVED)
@@ -141,24 +141,24 @@ class Room:
             kind = choose(seed, action_id, "item", (CUP, CAN))
             self.faults.fire(draw, action_id, self.add_item(kind))
 
-    # The truth
+    # The true state
 
     @property
     def fired(self) -> list[FiredFault]:
-        """Every fault that happened, in order."""
+        """The faults that happened, in order."""
         return self.faults.fired
 
     def touched(self) -> set[str]:
         """Return the items that a permanent fault keeps from their destination.
 
-        These items can never be grasped or recognised, or have no path to their destination (added later or not). Items
-        hidden behind one of these count too, and items in a carrier that is stuck in another one. Items that were
-        thrown away, e.g. inside their carrier, do not count.
+        Such an item can never be grasped, can never be recognised, or has no path to its destination. Items hidden
+        behind such an item count too, and items in a carrier that is stuck in another carrier. Items that were thrown
+        away, e.g. in their carrier, do not count.
         """
         return {item.name for item in self.items if blame(item, self.items, self.faults)}
 
     def left(self) -> list[Left]:
-        """Return the items that were ever on the table and are not in their destination, in order of addition."""
+        """Return the items that were ever on the table and are not in their destination, in the order of addition."""
         return [
             Left(item.name, self._whereabouts(item), blame(item, self.items, self.faults))
             for item in self.items
@@ -170,16 +170,16 @@ class Room:
 
     @property
     def goal_reached(self) -> bool:
-        """Whether every item that was ever on the table, seen or not, is in its destination."""
+        """Whether every item that was ever on the table is in its destination, even if the robot never saw the item."""
         return not self.left()
 
-    # Seen from above
+    # The drawing
 
     def scene(self) -> list[dict[str, Any]]:
-        """Return every place, the robot and every item: `id, shape, x, y, label` in metres.
+        """Return every place, the robot and every item as `id`, `shape`, `x`, `y` and `label`, with lengths in metres.
 
-        Places also have `width` and `depth`. An item inside another or in the hand has `in`, the id of its holder. An
-        item keeps its spot on a surface while others come and go.
+        Places also have `width` and `depth`. An item in a carrier or in the hand has `in`, the id of the carrier or the
+        robot. An item keeps its position on a surface when other items are added or removed.
         """
         places = [
             {"id": name, "shape": name, "x": at.x, "y": at.y, "label": name, "width": at.width, "depth": at.depth}
@@ -202,10 +202,10 @@ class Room:
             drawn["in"] = "robot" if item.where == HAND else item.where
         return drawn
 
-    # As data
+    # Conversion to and from data
 
     def state(self) -> dict[str, Any]:
-        """Return the whole state as JSON data; `from_state` restores it."""
+        """Return the whole state as JSON data."""
         return {
             "robot_at": self.robot_at,
             "items": _ITEMS.dump_python(list(self.items), mode="json"),
@@ -218,20 +218,20 @@ class Room:
 
     @classmethod
     def from_state(cls, state: Mapping[str, Any]) -> Self:
-        """Return the room of a state; the inverse of `state`.
+        """Return the room with a state that `state` returned.
 
         Raises:
-            InputError: this is not the state of a world.
+            InputError: `state` is not the state of a world.
         """
         room = cls()
         room.become(state)
         return room
 
     def become(self, state: Mapping[str, Any]) -> None:
-        """Replace this room's state.
+        """Replace the state of this room by a state that `state` returned.
 
         Raises:
-            InputError: this is not the state of a world.
+            InputError: `state` is not the state of a world.
         """
         try:
             Room.__init__(self, _ITEMS.validate_python(state["items"]), robot_at=state["robot_at"])
@@ -246,7 +246,7 @@ class Room:
 
 
 def _position(at: Spot, slot: int, count: int) -> tuple[float, float]:
-    """Return the position of the item with that number in a place, on a grid for all items."""
+    """Return the position of the item with number `slot` in a place, on a grid for `count` items."""
     row, column = divmod(slot, _COLUMNS)
     rows = -(-count // _COLUMNS)
     across, along = (column + 0.5) / _COLUMNS - 0.5, (row + 0.5) / rows - 0.5

@@ -61,7 +61,7 @@ class _ScenarioForm(Form):
 
 
 class NamedItem(_ScenarioForm):
-    """One item by name; `red_cup: cup` is short for `red_cup: {kind: cup}`."""
+    """One named item; `red_cup: cup` is short for `red_cup: {kind: cup}`."""
 
     kind: str
     size: str | None = None
@@ -74,7 +74,7 @@ class NamedItem(_ScenarioForm):
 
 
 class Table(_ScenarioForm):
-    """The items on the table."""
+    """The items that are on the table at the start."""
 
     cups: Count = 0
     cans: Count = 0
@@ -92,16 +92,17 @@ class Scenario(_ScenarioForm):
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a scenario file.
+        """Return the scenario of a file.
 
         Raises:
-            InputError: the file has a mistake; with its place, the word found and the nearest valid name.
+            InputError: the file contains an error; the message contains the place, the wrong word and the nearest valid
+                name.
         """
         return cls.parse(read_file(path), str(path))
 
     @classmethod
     def parse(cls, text: str, source: str | None = None) -> Self:
-        """Read a scenario's text; `source` names it in errors (`InputError`)."""
+        """Return the scenario of a text; `InputError` messages identify the text by `source`."""
         document = load_document(text, source)
         scenario = read_model(cls, document)
         scenario.check(document.place)
@@ -109,18 +110,18 @@ class Scenario(_ScenarioForm):
 
     @classmethod
     def default(cls) -> Self:
-        """Return four cups, three cans, a small and a large crisp can."""
+        """Return the default scenario: four cups, three cans, a small and a large crisp can."""
         return cls(table=Table(cups=4, cans=3, crisp_cans=("small", "large")))
 
     def world(self, seed: int | None = None, faults: float | None = None) -> TableWorld:
         """Return a new world of the scenario.
 
         Args:
-            seed: seed of the faults; by default the scenario's, or 0.
-            faults: chance of a fault per skill call in [0, 1]; by default the scenario's, or 0.
+            seed: the seed of the faults; by default the seed of the scenario, or 0.
+            faults: the chance of a fault per skill call, in [0, 1]; by default the chance of the scenario, or 0.
 
         Raises:
-            InputError: the scenario was made in Python with an invalid name or word.
+            InputError: the scenario was constructed in Python with an invalid name or value.
         """
         self.check()
         seed = self.seed if seed is None else seed
@@ -128,7 +129,7 @@ class Scenario(_ScenarioForm):
         return TableWorld(self._items(), seed=seed or 0, faults=faults or 0.0, robot_at=self.robot_at)
 
     def check(self, place_of: PlaceOf = lambda _path: None) -> None:
-        """Raise `InputError` for an invalid name or word; `place_of` returns the place of its path of keys."""
+        """Raise `InputError` for an invalid name or value; `place_of` returns the place of a path of keys."""
         _check_word("place", self.robot_at, PLACES, place_of(("robot_at",)))
         for position, size in enumerate(self.table.crisp_cans):
             _check_word("size", size, SIZES, place_of(("table", "crisp_cans", position)))
@@ -151,7 +152,7 @@ class Scenario(_ScenarioForm):
     def _items(self) -> list[Item]:
         table = self.table
         items = Inventory()
-        # A named item may be hidden by a numbered one, which is added later: `behind` is set last.
+        # A numbered item, which is added later, may hide a named one. The attribute `behind` is therefore set last.
         for name, named in table.items.items():
             items.add(new_item(_KINDS[named.kind], name, size=named.size or _DEFAULT_SIZE))
         for kind, sizes in (

@@ -1,8 +1,8 @@
-"""The simulated world of clean-up-table, with one verb for each of the robot's skills.
+"""The simulated world of clean-up-table, with one method ("verb") for each skill of the robot.
 
-Every verb takes the id of the action it executes. A repeated id returns its first result and changes nothing, so that a
-run can be resumed after a crash. A physically impossible call returns `not_possible` or `gone`. No verb raises an
-error, and no result contradicts the world.
+Every verb receives the id of the action that it executes. For a repeated id it returns the first result and changes
+nothing, so that a run can be resumed after a crash. A physically impossible call returns `not_possible` or `gone`. No
+verb raises an error, and no result contradicts the world.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _World = TypeVar("_World", bound="TableWorld")
 def _verb(
     body: Callable[Concatenate[_World, str, _Arguments], Result],
 ) -> Callable[Concatenate[_World, str, _Arguments], Result]:
-    """Execute an action once: a repeated id returns the first result."""
+    """Decorate a verb so that each action id is executed once; a repeated id returns the first result."""
 
     @functools.wraps(body)
     def once(world: _World, action_id: str, /, *args: _Arguments.args, **named: _Arguments.kwargs) -> Result:
@@ -38,11 +38,11 @@ def _verb(
 
 
 class TableWorld(RobotBody):
-    """The world that the robot's skills act on, one method per skill."""
+    """The world on which the robot's skills act, with one method for each skill."""
 
     @_verb
     def drive(self, action_id: str, to: str) -> Result:
-        """Drive to a place: `arrived`, `no_path`, or `slipped` (the held item fell on the floor)."""
+        """Drive to a place; return `arrived`, `no_path`, or `slipped` if the held item fell on the floor."""
         if to not in PLACES:
             return not_possible(f"there is no place '{to}'")
         if to in self.faults.unreachable:
@@ -59,7 +59,7 @@ class TableWorld(RobotBody):
 
     @_verb
     def pick_up(self, action_id: str, item: str, surface: str) -> Result:
-        """Grasp an item that lies on a surface: `picked_up`, `grasp_failed`, `no_ik` or `gone`."""
+        """Grasp an item that lies on a surface; return `picked_up`, `grasp_failed`, `no_ik` or `gone`."""
         refusal = self._not_at(surface, SURFACES) or self._hand_full()
         if refusal:
             return refusal
@@ -70,7 +70,7 @@ class TableWorld(RobotBody):
 
     @_verb
     def put_down(self, action_id: str, item: str, surface: str) -> Result:
-        """Put the held item on a surface: `put_down`."""
+        """Put the held item on a surface; return `put_down`."""
         refusal = self._not_at(surface, SURFACES) or self._not_held(item)
         if refusal:
             return refusal
@@ -80,7 +80,7 @@ class TableWorld(RobotBody):
 
     @_verb
     def stack(self, action_id: str, item: str, carrier: str, surface: str) -> Result:
-        """Put the held item into a carrier that lies on a surface: `stacked`, `stack_fell` or `gone`."""
+        """Put the held item into a carrier on a surface; return `stacked`, `stack_fell` or `gone`."""
         refusal = (
             self._not_at(surface, SURFACES)
             or self._not_held(item)
@@ -96,7 +96,7 @@ class TableWorld(RobotBody):
 
     @_verb
     def take_out(self, action_id: str, item: str, carrier: str, surface: str) -> Result:
-        """Grasp an item directly inside a carrier: `taken_out`, `grasp_failed`, `no_ik` or `gone`."""
+        """Grasp an item that is directly in a carrier; return `taken_out`, `grasp_failed`, `no_ik` or `gone`."""
         refusal = self._not_at(surface, SURFACES) or self._hand_full()
         if refusal:
             return refusal
@@ -109,7 +109,7 @@ class TableWorld(RobotBody):
 
     @_verb
     def look_into(self, action_id: str, carrier: str, surface: str) -> Result:
-        """Look into a carrier, which closes one unit of its free room: `looked` or `gone`."""
+        """Inspect a carrier, which closes one unit of its free room; return `looked` or `gone`."""
         refusal = self._not_at(surface, SURFACES) or self._absent(carrier, surface)
         if refusal:
             return refusal
@@ -120,7 +120,7 @@ class TableWorld(RobotBody):
 
     @_verb
     def throw_away(self, action_id: str, item: str, destination: str) -> Result:
-        """Throw the held item, with everything in it, into its destination: `thrown_away`."""
+        """Throw the held item, with all items in it, into its destination; return `thrown_away`."""
         refusal = self._not_at(destination, DESTINATIONS) or self._not_held(item)
         if refusal:
             return refusal
@@ -138,7 +138,7 @@ class TableWorld(RobotBody):
 
     @_verb
     def recognise(self, action_id: str, surface: str) -> Result:
-        """Look at a surface: `recognised` with everything visible on it, or `nothing_found`."""
+        """Recognise the visible items on a surface; return `recognised` with these items, or `nothing_found`."""
         refusal = self._not_at(surface, SURFACES)
         if refusal:
             return refusal
@@ -153,6 +153,6 @@ class TableWorld(RobotBody):
 
     @_verb
     def say(self, _action_id: str, text: str) -> Result:
-        """Tell the operator something: `said`."""
+        """Speak a text to the operator; return `said`."""
         self.said.append(text)
         return Result("said", {"text": text})

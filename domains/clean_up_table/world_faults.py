@@ -1,8 +1,8 @@
-"""Faults of the clean-up-table world: seeded, bounded, recorded.
+"""Faults of the clean-up-table world: seeded, bounded, and recorded.
 
-Seed and action id decide whether a fault happens in a call; the possible faults of the call also decide which one. A
-transient fault hits the same subject at most `IN_A_ROW` times in a row, so that one more failure proves a permanent
-fault.
+The seed and the action id determine whether a fault happens in a call. The possible faults of the call also determine
+its kind. Transient faults hit one subject at most `IN_A_ROW` consecutive times. One more consecutive failure therefore
+proves a permanent fault.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ KINDS = (
 )
 
 IN_A_ROW = 3
-"""Maximum number of consecutive transient faults of the same subject."""
+"""The maximum number of consecutive transient faults of one subject."""
 PERMANENT_SHARE = 0.12
-"""The share of permanent faults where a permanent form exists."""
+"""The share of permanent faults among faults that may be permanent."""
 PER_RUN = {ITEM_MOVED: 3, ITEM_ADDED: 2}
-"""Maximum number of interferences by other people in a run."""
+"""The maximum number of interferences by other people in a run, by kind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class FiredFault:
 
     Attributes:
         kind: one of `KINDS`.
-        permanent: whether it is permanent.
-        action_id: the call with the fault.
-        items: the items it hit; for a permanent `no_path` those it keeps from being thrown away.
+        permanent: whether the fault is permanent.
+        action_id: the call in which the fault happened.
+        items: the items that the fault affects; for a permanent `no_path`, the items that can no longer be thrown away.
     """
 
     kind: str
@@ -64,7 +64,7 @@ class FiredFault:
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """A fault that is about to happen in a call."""
+    """A fault that will happen in a call."""
 
     kind: str
     permanent: bool
@@ -72,16 +72,16 @@ class Draw:
 
 @dataclass
 class WorldFaults:
-    """Draws faults and records them.
+    """Random draws of faults, and the record of all faults.
 
     Attributes:
-        seed: decides, with the action id, each draw.
-        chance: of a fault in a call.
-        fired: every fault that happened, in order.
-        ungraspable: items that can never be grasped, with the kind of fault.
-        unrecognisable: items that the camera no longer finds.
-        unreachable: destinations without a path from now on.
-        in_a_row: number of consecutive failures of each effort.
+        seed: the seed, which determines each draw together with the action id.
+        chance: the chance of a fault in a call, in [0, 1].
+        fired: the faults that happened, in order.
+        ungraspable: the kind of fault of each item that can never be grasped.
+        unrecognisable: the items that the camera no longer finds.
+        unreachable: the destinations that no longer have a path.
+        in_a_row: the number of consecutive failures of each effort on a subject, e.g. `grasp cup1`.
     """
 
     seed: int = 0
@@ -97,11 +97,11 @@ class WorldFaults:
             raise InputError(f"the chance of a fault is between 0 and 1, not {self.chance}", found=str(self.chance))
 
     def draw(self, action_id: str, possible: Mapping[str, bool]) -> Draw | None:
-        """Return the fault of this call, or `None`.
+        """Return the fault that happens in this call, or `None`.
 
         Args:
-            action_id: the call.
-            possible: the kinds that can happen in it now; true for a kind that may be permanent.
+            action_id: the id of the call.
+            possible: the kinds of faults that can happen in the call; true for a kind that may be permanent.
         """
         if not possible or uniform(self.seed, action_id, "fault") >= self.chance:
             return None
@@ -114,21 +114,21 @@ class WorldFaults:
         self.fired.append(FiredFault(draw.kind, draw.permanent, action_id, items))
 
     def left_for(self, kind: str) -> bool:
-        """Return whether this interference may happen again in this run."""
+        """Return whether an interference of this kind may happen again in this run."""
         return sum(fault.kind == kind for fault in self.fired) < PER_RUN[kind]
 
     def may_fail(self, effort: str, subject: str) -> bool:
-        """Return whether another transient fault may hit this effort (e.g. `grasp` of `cup1`)."""
+        """Return whether another transient fault may hit this effort on this subject (e.g. `grasp` on `cup1`)."""
         return self.in_a_row.get(f"{effort} {subject}", 0) < IN_A_ROW
 
     def failed(self, effort: str, subject: str) -> int:
-        """Count a failure; return the number of consecutive failures."""
+        """Count a failure, and return the number of consecutive failures of the effort on the subject."""
         key = f"{effort} {subject}"
         self.in_a_row[key] = self.in_a_row.get(key, 0) + 1
         return self.in_a_row[key]
 
     def passed(self, effort: str, subject: str) -> None:
-        """Count a success, which ends a sequence of failures."""
+        """Record a success, which resets the number of consecutive failures."""
         self.in_a_row.pop(f"{effort} {subject}", None)
 
 
@@ -140,9 +140,9 @@ class Left:
     """An item that was on the table and is not in its destination.
 
     Attributes:
-        item: its name.
-        where: the surface it lies on, `hand`, or `in CARRIER`.
-        reason: the permanent fault that keeps it from its destination; `None` without one.
+        item: the name of the item.
+        where: the surface on which the item lies, `hand`, or `in CARRIER`.
+        reason: the permanent fault that keeps the item from its destination; `None` without a permanent fault.
     """
 
     item: str
@@ -151,7 +151,7 @@ class Left:
 
 
 def blame(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
-    """Return the permanent fault that keeps an item from its destination, in words, or `None`."""
+    """Return, as text, the permanent fault that keeps an item from its destination; `None` without one."""
     if item.disposed:
         return None
     if item.name in faults.ungraspable:
@@ -166,7 +166,7 @@ def blame(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
 
 
 def _stuck(item: Item, items: Inventory, faults: WorldFaults) -> str | None:
-    """Return why a carrier cannot release an item: the arm unloads carriers on a surface only."""
+    """Return why an item cannot leave its carrier; the arm unloads only carriers that are on a surface."""
     carrier = items.get(item.where)
     outer = items.get(carrier.where) if carrier else None
     if carrier and outer and blame(carrier, items, faults) and blame(outer, items, faults):

@@ -195,7 +195,7 @@ class CausalTrace:
             self._numbers[ground].users |= 1 << user
 
     def _make(self, number: int, makes: Iterable[Literal]) -> None:
-        """Order the step after users and makers of the opposite literals, and record that it makes the literals true."""
+        """Order the step after users and makers of the opposite literals, and record its own literals as true."""
         records = [(self._facts[literal.fact], literal.positive) for literal in makes]
         own = 1 << number
         for record, positive in records:
