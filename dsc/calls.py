@@ -43,14 +43,15 @@ class SkillCall:
     """One execution of a skill.
 
     Attributes:
-        action_id: identifies this execution; it is stable across restarts and never used for another execution.
+        action_id: identifies this execution; the id is stable across restarts and never used for another execution.
         clock: the only clock that a skill may use.
         report: posts an intermediate event while the skill continues (e.g. progress, a perception).
         deadline: second of run time at which the skill is cancelled.
         give_up: reports a part of the skill that continues and cannot be stopped, as text.
 
-    After a crash, a resumed run may repeat a call with an equal id. Its clock then begins at the start of the action,
-    and repeated reports are dropped. So a skill that acts only one time for each id executes the same steps again.
+    After a crash, a resumed run may repeat a call with an equal id. The clock of the repeated call begins at the start
+    of the action, and repeated reports are dropped. So a skill that acts only one time for each id executes the same
+    steps again.
     """
 
     action_id: str

@@ -27,13 +27,13 @@ class Finding:
         return self.error.place
 
     def __str__(self) -> str:
-        """One line for people: the error and its remedy, and the level of a warning."""
+        """Return one line for people: the error with its remedy and, for a warning, the level."""
         text = f"{self.error}" + (f" ({self.fix})" if self.fix else "")
         return text if self.level == "error" else f"{text} [{self.level}]"
 
 
 class PlotError(InputError):
-    """Mistakes that make a plot unusable, as `findings`; its text has one line for each."""
+    """An error about an unusable plot; `findings` lists the mistakes, and the message has one line for each."""
 
     def __init__(self, findings: Sequence[Finding]) -> None:
         first = findings[0].error
@@ -41,7 +41,7 @@ class PlotError(InputError):
         self.findings = tuple(findings)
 
     def __str__(self) -> str:
-        """All findings, one per line."""
+        """Return all findings, one per line."""
         return "\n".join(map(str, self.findings))
 
 

@@ -66,7 +66,7 @@ class ParameterMessage:
 
 @dataclass(frozen=True, slots=True)
 class LateMessage:
-    """A message from outside whose scheduled time has come; `number` distinguishes it from other messages."""
+    """A message from outside that was scheduled; `number` distinguishes it from other scheduled messages."""
 
     message: FromOutside
     number: int
@@ -75,6 +75,6 @@ class LateMessage:
 FromOutside = Event | KnowledgeMessage | ParameterMessage
 """Messages from outside of the run."""
 Message = SkillMessage | TimerMessage | KnowledgeMessage | ParameterMessage | LateMessage | SendLater | Event
-"""Messages that the sequencer handles; a `SendLater` is the chart's own event whose scheduled time has come."""
+"""Messages that the sequencer handles; a `SendLater` is the chart's own delayed event."""
 Told = SetParameter | SwitchMode | SendMessage
 """Commands to components without an answer: parameters, modes and messages."""

@@ -51,7 +51,10 @@ class Record(NamedTuple):
 
 
 Listener = Callable[[Record], None]
-"""Function that receives every record immediately; it must not block. It may keep the record, which is immutable."""
+"""Function that receives every record immediately; it must not block.
+
+The function may store the record, which is immutable.
+"""
 
 
 class Trace:

@@ -92,7 +92,7 @@ def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
 
 @app.command()
 def check(file: Store) -> None:
-    """Check that each row of a store, of runs and of knowledge, is as it was written; the command reads all rows."""
+    """Check that no row of a store, of runs or of knowledge, has changed since it was written; all rows are read."""
     from dsc.runs.archive import archive
     from knowledge_base.journal.archive import Archive
 

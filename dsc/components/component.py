@@ -158,7 +158,7 @@ class Component(ComponentHooks, RestartHooks):
         self.life.mode = mode
 
     def needed(self) -> tuple[str, ...]:
-        """Return the names of required components in the present mode; override if other values determine them."""
+        """Return the names of required components in the present mode; override if needs depend on other values."""
         return tuple(dict.fromkeys((*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))))
 
     async def reach(self, name: str) -> Component:  # noqa: ARG002

@@ -1,7 +1,7 @@
 """Calls of hooks, which a robot's builder wrote: each hook returns a value or raises an `Exception`.
 
-Without this containment, `sys.exit` in a hook would end the program with the hook's task. So would an exception that is
-not an `Exception`.
+Otherwise, `sys.exit` in a hook would end the program with the hook's task. So would an exception whose class does not
+derive from `Exception`.
 """
 
 from __future__ import annotations

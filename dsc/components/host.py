@@ -135,7 +135,7 @@ class _Action:
     def take(self, received: int) -> None:
         """Record that the client has received the first `received` messages.
 
-        This permits further reports, and replaces old reports by empty ones.
+        The component may then post further reports; empty reports replace old ones.
         """
         assert self.reports is not None  # noqa: S101
         for number in range(self.received, min(received, len(self.messages))):

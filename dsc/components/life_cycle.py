@@ -83,7 +83,7 @@ class LifeCycle(Announcer):
 
     @property
     def mode(self) -> str:
-        """The sub-state of Alive; it is kept while the component is not alive."""
+        """The sub-state of Alive; the mode is kept while the component is not alive."""
         return self._mode
 
     @mode.setter
@@ -121,7 +121,7 @@ class LifeCycle(Announcer):
         finally:
             self.starting = False
             self.announce()
-        if self.state is Life.INIT:  # else it was shut down meanwhile, or `start` has set the state
+        if self.state is Life.INIT:  # else `start` itself, or a shutdown, has set the state
             self.become(became, reason)
 
     async def become_active(self, activator: int, activate: Callable[[bool], Awaitable[None]], *, active: bool) -> None:

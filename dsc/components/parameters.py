@@ -38,8 +38,8 @@ class Parameter:
         changed_by: the role that may change the value: `nobody`; a `profile`, before a run; an `operator`, during a
             run; the `rules` of plots, after a failure; `plots` anywhere. Each role includes those before it.
         follows: instead of a default, a term over other parameters, e.g. `(* 0.5 ?cycle)`.
-        depends_on: parameters that the value depends on, besides those in `follows`. A new value of one of them resets
-            this parameter to its default, to the value of its term, or to no value.
+        depends_on: parameters that the value depends on, besides those in `follows`. A new value of such a parameter
+            resets this parameter to its default, to the value of its term, or to no value.
     """
 
     type: Type

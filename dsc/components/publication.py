@@ -1,7 +1,7 @@
 """Push ports over a transport: one component publishes values, and each subscriber receives the newest (S1.1).
 
-A subscriber renews its subscription periodically. So it receives the newest value also after a lost push. A publisher
-that starts late, or restarts, learns its subscribers. The publisher forgets subscribers that do not renew.
+A subscriber renews its subscription periodically. So the subscriber receives the newest value also after a lost push. A
+publisher that starts late, or restarts, learns its subscribers. The publisher forgets subscribers that do not renew.
 """
 
 from __future__ import annotations

@@ -261,7 +261,7 @@ class RunArchive:
             if self._worlds is None:
                 self._worlds = dict(self.connection.execute("SELECT version, head FROM snapshots").fetchall())
             made = self._worlds.get(row.version)
-            if made is None and row.version < min(self._worlds, default=0):  # its version was forgotten since
+            if made is None and row.version < min(self._worlds, default=0):  # the store has deleted the version
                 return
         if made != row.knowledge:
             raise damaged(self.path, f"version {row.version} of the knowledge is not the one after {name}")

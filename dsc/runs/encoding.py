@@ -1,7 +1,7 @@
 """Encoding of messages, pending items and frames of a machine as plain JSON values, and their decoding.
 
-A plot that is a value (e.g. a plan, in a variable or an attribute) is long and occurs repeatedly. So it is stored one
-time, by its hash; `{"$form": hash}` replaces each occurrence.
+A plot that is a value (e.g. a plan, in a variable or an attribute) is long and occurs repeatedly. So the plot is stored
+one time, by its hash; `{"$form": hash}` replaces each occurrence.
 """
 
 from __future__ import annotations

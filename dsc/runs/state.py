@@ -222,10 +222,10 @@ class RunState:
             self._cancelled.append(place)
 
     def _put_in_effect(self, key: _Key, place: int) -> None:
-        """Register that a component received the command, which replaces the one effective before."""
+        """Register that a component received the command, which replaces the command that was effective before."""
         before = self._in_effect.get(key)
         self._in_effect[key] = place
-        if before == place:  # repeated after a restart
+        if before == place:  # the command was repeated after a restart
             return
         if before is not None:
             self._drop_row(before)

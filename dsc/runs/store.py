@@ -244,7 +244,7 @@ class RunStore:
     def late(self, late: LateMessage, due: float) -> None:
         """Store a message from outside that is scheduled for second `due` of run time."""
         self._state.put(late, self._number, due)
-        if self._number:  # else it is written with the first macrostep
+        if self._number:  # else the first macrostep writes the change
             self.writing.more(change=self._state.change())
 
     def step(

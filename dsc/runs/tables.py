@@ -109,7 +109,7 @@ class RunSnapshot:
         self.memory.update(change.get("memory", {}))
         for place, row in change.get("pending", {}).items():
             if row is None:
-                self.pending.pop(int(place), None)  # it may have begun and ended in one macrostep
+                self.pending.pop(int(place), None)  # the item may have begun and ended in one macrostep
             else:
                 self.pending[int(place)] = row
 

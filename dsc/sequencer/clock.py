@@ -249,8 +249,8 @@ class _IdleSelector(selectors.DefaultSelector):
 def run_simulated(main: Coroutine[Any, Any, _Result], at: float = 0.0) -> _Result:
     """Run a coroutine in simulated time that begins at `at`, and return its result.
 
-    The loop compares scheduled times in its own time. With an equal `at`, a `LoopClock` shows these times without a
-    rounding error.
+    The loop compares scheduled times in its own time. With an equal `at`, a `LoopClock` returns exactly the loop's
+    times, without a rounding error.
     """
     with asyncio.Runner(loop_factory=lambda: SimulatedEventLoop(at)) as runner:
         return runner.run(main)

@@ -89,7 +89,7 @@ class Outbox:
     async def taken(self, component: Component) -> None:
         """Wait until the component has received its `untaken` outputs; raise the error of a delivery, one time."""
         pending = self.untaken[component.name]
-        await asyncio.wait([pending])  # unlike `await pending`, keeps the delivery when a skill is cancelled
+        await asyncio.wait([pending])  # `await pending` would cancel the delivery together with the skill
         if self.untaken.get(component.name) is pending:
             del self.untaken[component.name]
         why = failure(pending)

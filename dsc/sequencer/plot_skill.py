@@ -35,7 +35,7 @@ class PlotComponent(Component):
         components: the components that the plots use.
         knowledge: returns the world model for one execution; by default an empty one.
         after_crash: the treatment of an interrupted plot. A repeated plot starts again, and repeats its actions. The
-            actions have their former ids if the plot chooses the same ones.
+            actions have their former ids if the plot chooses the same actions in the same order.
     """
 
     def __init__(

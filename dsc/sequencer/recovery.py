@@ -24,8 +24,8 @@ def require_components(kept: Kept, dispatcher: Dispatcher) -> None:
 async def recover(kept: Kept, dispatcher: Dispatcher) -> None:
     """Restore components, and continue the pending actions, timers and inputs.
 
-    The outputs of the last macrostep may never have reached the components. So they are dispatched (again) after
-    everything else is restored.
+    The outputs of the last macrostep may never have reached the components. So these outputs are dispatched (again)
+    after everything else is restored.
 
     Raises:
         InputError: a component cannot recall its data or stop a cancelled skill, or a component is not deployed.

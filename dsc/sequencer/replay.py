@@ -38,7 +38,7 @@ class Divergence:
     replayed: str
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line for people."""
         return f"step {self.step}: {self.what} was: {self.recorded}; now: {self.replayed}"
 
 
@@ -100,7 +100,7 @@ class _ReplayedRun:
 
     def take(self, step: StepRow) -> Divergence | None:
         """Repeat one macrostep; return its first result that differs, or `None`."""
-        for change in self._past.changes(self._knowledge.version, step.before):  # of other authors
+        for change in self._past.changes(self._knowledge.version, step.before):  # changes of other authors
             self._knowledge.apply(change.delta, change.author)
         action_id = step.message.get("action")
         if action_id not in (None, *self._started):

@@ -33,7 +33,7 @@ class InterruptedSkill:
 
 
 class RunningSkill:
-    """A skill during its execution; it posts its reports and, one time, its end.
+    """An execution of a skill, which posts the skill's reports and, one time, its end.
 
     A single timer bounds the execution. The timer cancels the task at second `due`, and abandons the task after `GRACE`
     further seconds.
@@ -166,7 +166,7 @@ class RunningSkill:
 
 
 class PendingCleanups:
-    """Cancelled tasks until they have stopped.
+    """Register of cancelled tasks until they have stopped.
 
     A task that ignores its cancellation is abandoned after `GRACE` seconds.
 

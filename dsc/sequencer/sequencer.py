@@ -308,8 +308,8 @@ class Sequencer:
     def _may_group(self, message: Message, output: Collection[Output]) -> bool:
         """Return whether the next macrostep may share the commit of this one.
 
-        It may not if this macrostep has outputs, as they are dispatched after its commit. Each answer of a component
-        has a separate commit.
+        Macrosteps with outputs may not share a commit with the next one, as outputs are dispatched after the commit.
+        Each answer of a component has a separate commit.
         """
         waiting = self._inbox.waiting
         if output or self._before_events or not waiting:

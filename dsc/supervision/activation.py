@@ -21,8 +21,8 @@ LONGEST = 30.0
 class ComponentActivation(Announcer):
     """The activation tree of a run: a supervisor for each required component.
 
-    It releases the supervisors of other components, and announces changes of components. A component without resources
-    and without needs only participates if another component needs it.
+    The tree releases supervisors of components that are not required, and announces changes of components. A component
+    without resources and without needs only participates if another component needs it.
 
     Args:
         registry: the deployed components.
@@ -96,7 +96,8 @@ class ComponentActivation(Announcer):
             component.life.leave(self.look)
         self._keep_only({})
         if self._released:
-            _, others = await asyncio.wait(self._released.values(), timeout=2 * GRACE)  # for two components in sequence
+            # A task may wait `GRACE` for another component, then `GRACE` for its own.
+            _, others = await asyncio.wait(self._released.values(), timeout=2 * GRACE)
             for task in others:
                 task.cancel()
                 give_up(task)

@@ -33,7 +33,7 @@ class SkillDependencies:
     def missing(self) -> str:
         """The dependency that the skill waits for, as text; empty if it waits for none."""
         if self._waits:
-            with suppress(InputError):  # then that error is the reason
+            with suppress(InputError):  # `ready` raises this error
                 name = next((one.name for one in self._activation.supervisors_of(self._component) if not one.on), "")
                 return name and self._activation.registry.state_of(name)
         return ""
@@ -81,7 +81,8 @@ class SkillDependencies:
         def look() -> None:
             name = self._lost()
             if name is not None and not lost and me is not None:
-                said = self._activation.registry.state_of(name)  # now: it may restart before the cancellation arrives
+                # The component may restart before the cancellation arrives.
+                said = self._activation.registry.state_of(name)
                 lost.append(said if name == self._component.name else f"it needs {said}")
                 me.cancel()
 
@@ -93,7 +94,7 @@ class SkillDependencies:
         try:
             return await work
         except asyncio.CancelledError:
-            if not lost or me is None or me.uncancel() > 0:  # or the state was left, too
+            if not lost or me is None or me.uncancel() > 0:  # or the state was exited, too
                 raise
             raise NotAliveError(lost[0]) from None
         finally:
@@ -106,6 +107,6 @@ class SkillDependencies:
             return self._component.name
         if not self.concerned:
             return None
-        with suppress(InputError):  # the error fails the next skill
+        with suppress(InputError):  # the next skill fails with the error
             return next((one.name for one in self._activation.supervisors_of(self._component) if one.lost), None)
         return None

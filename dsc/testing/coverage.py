@@ -59,7 +59,7 @@ class Coverage:
         return tuple(item for name in self._names(plot) for item in self._missing(name))
 
     def count(self, plot: str, kind: Kind) -> tuple[int, int]:
-        """Return two numbers of a plot's states, transitions or rules: the reached ones, and all.
+        """Return the number of reached states, transitions or rules of a plot, and the number of all.
 
         Raises:
             UnknownNameError: the plot is not covered.
@@ -122,7 +122,7 @@ class Coverage:
     def _is_ours(self, plot: ActionPlot) -> bool:
         if plot.name not in self._items:
             return False
-        kept = self._seen.get(id(plot))  # one object occurs often; only the first time needs a comparison of texts
+        kept = self._seen.get(id(plot))  # one plot object occurs often; only its first use needs a comparison
         if kept is None or kept[0] is not plot:
             kept = (plot, self._library.expanded(self._library.plot(plot.name)) == plot)
             self._seen[id(plot)] = kept

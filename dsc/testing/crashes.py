@@ -46,9 +46,9 @@ class Crashes(Generic[_Result]):
     - after a component's action, when its answer is not committed yet;
     - at every call of `reached`.
 
-    After a commit, the disk may become full; SQLite then reports an error at each write. At each boundary other than a
-    commit's beginning, another program may take over the run, as on a file system without locks. That program runs to
-    the end, while the old program continues to write.
+    After a commit, the disk may become full; SQLite then reports an error when the file grows. At each boundary other
+    than a commit's beginning, another program may take over the run, as on a file system without locks. That program
+    runs to the end, while the old program continues to write.
 
     Args:
         folder: parent of the folders of all program executions.

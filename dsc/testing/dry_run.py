@@ -28,8 +28,8 @@ _ROUNDING = 1e-9
 class _Due:
     """A pending event.
 
-    It is dropped when its activation is exited, its skill answers, or its `send` is revoked. `action_id` identifies the
-    skill; `sent` has the plot instance and the id for a revocation.
+    The event is dropped when its activation is exited, its skill answers, or its `send` is revoked. `action_id`
+    identifies the skill; `sent` has the plot instance and the id for a revocation.
     """
 
     at: float

@@ -77,7 +77,7 @@ class Faults:
     """Source of faults: draws faults, injects them, and records them.
 
     A skill that fails or hangs, or whose component dies, has no effect. A skill with a lost answer has its full effect,
-    and then hangs. Events (`@event`) may arrive late, and so reordered, or twice. They are never lost, because a plot
+    and then hangs. Events (`@event`) may arrive late, and so reordered, or twice. Events are never lost, because a plot
     might wait for an event without end; `LossyTransport` simulates such losses.
 
     Args:
@@ -195,7 +195,7 @@ class _Injected:
         if fault is Fault.ANSWER_LOST:
             await _never(call)
         if fault is Fault.ANSWER_LATE:
-            with suppress(asyncio.CancelledError):  # its work is done: a cancellation can only return its outcome
+            with suppress(asyncio.CancelledError):  # the skill is done: a cancellation can only return its outcome
                 await call.clock.sleep(min(LATE, call.remaining / 2) * self._faults.share(call.action_id))
         if fault is Fault.ANSWER_TWICE:
             call.report(outcome)
@@ -247,10 +247,10 @@ async def _never(call: SkillCall) -> NoReturn:
 class Interleaving:
     """Permutation of the messages of one simulated time, by a seed.
 
-    Before each macrostep, it waits for all messages of that time, and draws the source of the next message. Messages of
-    one source keep their order, as every communication pattern guarantees. Sources are the events and the answer of one
-    action, the chart's timers, the changes of one author, and events from outside. Messages of different sources may
-    arrive in any order, e.g. an answer and its timeout.
+    Before each macrostep, the permutation waits for all messages of that time, and draws the source of the next
+    message. Messages of one source keep their order, as every communication pattern guarantees. Sources are the events
+    and the answer of one action, the chart's timers, the changes of one author, and events from outside. Messages of
+    different sources may arrive in any order, e.g. an answer and its timeout.
 
     Args:
         seed: the seed of all draws.

@@ -64,7 +64,7 @@ def ends_with(
     Args:
         original: the plot to replace.
         outcome: one of its outcome events, or `done`.
-        attributes: the event's attributes as in a plot: constants, or `?name` for a parameter. With `done`, these are
+        attributes: the event's attributes as in a plot: constants, or `?name` for a parameter. With `done`, they are
             values of its outputs.
         tell: a PDDL effect on the knowledge base, instead of the original's actions.
         after: seconds until the plot ends.

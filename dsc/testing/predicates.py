@@ -1,8 +1,8 @@
 """Predicates over a step, or over all steps of a run, for use in `assert`.
 
 A state is identified by its name or by its path from the outermost plot, e.g. `clear/execute/step_2`. A `Rehearsal` or
-`DryRun` has its library. Predicates over it raise `UnknownNameError` for a state, trigger, rule or skill of no plot,
-because they could never be true.
+`DryRun` has its library. Predicates over such a run raise `UnknownNameError` for a state, trigger, rule or skill of no
+plot, because the predicate could never be true.
 """
 
 from __future__ import annotations
@@ -212,7 +212,8 @@ def _check(
     """Raise `UnknownNameError` for a name that cannot occur in a run with plots; a state may also be a path."""
     if isinstance(run, Step | Iterable):
         return
-    bound = (bound.plot for micro in _microsteps(run) for bound in micro.bound)  # includes those of rules and planners
+    # The bound plots include plots of rules and planners.
+    bound = (bound.plot for micro in _microsteps(run) for bound in micro.bound)
     known = _KnownNames([*run.library, *bound])
     known.check("state", (name for state in states if state is not None for name in state.split("/")))
     known.check("transition on", (trigger,))

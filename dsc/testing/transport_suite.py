@@ -398,7 +398,7 @@ class TransportSuite:
 
     @in_loop
     async def test_whom_a_component_needs_is_said_when_it_changes(self) -> None:
-        """Cases: its client has changed the mode, or the component itself has."""
+        """Cases: the client has changed the component's mode, or the component itself has."""
         async with self._robot() as (robot, remote, _):
             assert remote.needed() == ()
             await remote.change_mode("scanning")
@@ -478,7 +478,7 @@ class TransportSuite:
     async def test_components_are_active_while_somebody_active_needs_them(self) -> None:
         """Activation proceeds from the root downwards, in any order of arrival.
 
-        It ends with the need or the activator.
+        A component becomes inactive when its activator ends, or no longer needs it.
         """
         transport = self.transport()
         active: set[str] = set()
@@ -501,7 +501,7 @@ class TransportSuite:
                 await asyncio.sleep(3 * SILENCE)
                 assert active == {"root", "arm", "motor"}
                 assert hearts["motor"].activators == {"arm"}
-                needs["arm"] = ["camera"]  # another state of the arm
+                needs["arm"] = ["camera"]  # the arm enters another state
                 hearts["arm"].stir()
                 await until(lambda: active == {"root", "arm", "camera"})
             await until(lambda: active == {"root"})

@@ -72,7 +72,7 @@ class PageAddress:
 
     @property
     def url(self) -> str:
-        """The address for people; it is valid any number of times."""
+        """The address for people; the address is valid any number of times."""
         return f"http://127.0.0.1:{self.port}/?token={self.token}"
 
     @property

@@ -166,6 +166,6 @@ class Broadcast:
         served = tuple(self._served)
         status = {"type": "status", "live": self._log.live, **self._status()}
         for one in served:
-            if one in self._served:  # the browser may have left meanwhile
+            if one in self._served:  # the browser may have left during the round
                 one.offer(status)
             await self._sleep(INTERVAL_S / len(served) if self._log.live else 0)

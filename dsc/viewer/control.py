@@ -47,7 +47,7 @@ class Hands(Protocol):
 class Breakpoint:
     """A condition for a pause.
 
-    It is the entry of a state, the handling of an event, a condition that becomes true, or the start of a plan step.
+    A run pauses when it enters a state, handles an event, makes a condition true, or begins a plan step.
     """
 
     kind: str
@@ -156,7 +156,8 @@ class Control:
         if kind == "condition":
             condition = parse_condition(said, "EXPR")
             check(condition, self._run().knowledge.schema)
-            self._run().knowledge.ask(condition, bounds=Bounds(work=MOST_WORK))  # refused now rather than dropped later
+            # An expensive condition is refused here, rather than dropped during the run.
+            self._run().knowledge.ask(condition, bounds=Bounds(work=MOST_WORK))
         self._numbers += 1
         self._breaks[self._numbers] = Breakpoint(kind, said, condition)
 
@@ -200,7 +201,7 @@ class Control:
         for number, one in tuple(self._breaks.items()):
             try:
                 met = self._is_met(number, one, step)
-            except InputError as error:  # its condition has become too expensive, or reads a removed element
+            except InputError as error:  # the condition has become too expensive, or reads a removed element
                 self._drop(number, f"{one}: {error}")
                 continue
             if met:

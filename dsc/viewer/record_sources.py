@@ -120,7 +120,7 @@ def _header(path: Path, changes: list[Change]) -> str:
 def records_of(path: Path) -> Iterator[RecordLog]:
     """Yield the records in a trace or store; for a store, append new records during the block.
 
-    For a store with runs, these are the records of its last run; for another store, the changes of its knowledge.
+    A store with runs yields the records of its last run; another store yields the changes of its knowledge.
 
     Raises:
         InputError: the file is missing, or it is neither a trace nor a store.

@@ -206,7 +206,7 @@ async def _while_there(
 ) -> Any:
     """Return the result of `answer`, executed in a separate thread.
 
-    Its second argument returns whether the browser has left.
+    The second argument of `answer` is a function that returns whether the browser has left.
     """
     left = threading.Event()
 
