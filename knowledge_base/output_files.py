@@ -26,7 +26,7 @@ from knowledge_base.journal.sidecar_files import is_database, store_owning
 
 STANDARD_OUTPUT = Path("-")
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
-"""Errors of a storage medium, which another file name would not avoid."""
+"""Error numbers of a full or failing storage medium; another file name would not avoid these errors."""
 PATIENCE_S = 5.0
 """Maximum time in seconds until a reader must open a FIFO."""
 
@@ -268,7 +268,7 @@ def _target(path: Path) -> Path:
 def _identity(path: Path) -> _Identity:
     """Return equal values for two names of one file.
 
-    A missing file is identified by its folder and its name.
+    For a missing file, the result contains the values of its folder, and its name.
     """
     try:
         found = _status(path)
@@ -308,7 +308,7 @@ def _lost(path: Path) -> Path | None:
 def _begins(path: Path, begin: bytes | str) -> bool:
     """Return whether the path is a regular file that begins with `begin`.
 
-    Must not be used for stores: closing a store's file releases SQLite's locks on it.
+    A caller must not use this function for stores: closing a store's file releases SQLite's locks.
     """
     wanted = begin.encode() if isinstance(begin, str) else begin
     try:

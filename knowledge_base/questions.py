@@ -100,7 +100,7 @@ class Questions:
         return rows(self.query(text, params, world), world, params)
 
     def condition(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
-        """Return the condition; `params` must have all its free variables.
+        """Return the condition; `params` must contain all free variables of the condition.
 
         Raises:
             ParseError: the text is not a condition.

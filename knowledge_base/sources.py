@@ -47,7 +47,7 @@ class DataSource:
         return self._closed
 
     def update(self, content: Content) -> None:
-        """Set the value of the fluent; wait first for the end of an open transaction.
+        """Set the value of the fluent, after the end of any open transaction.
 
         Raises:
             SchemaError: the value does not have the type of the function's result.

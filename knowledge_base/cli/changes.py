@@ -62,7 +62,7 @@ def new(
         typer.Option(metavar="PREDICATE", help="Only one of its facts that differ in the last argument alone is true."),
     ] = None,
 ) -> None:
-    """Make an empty store with the schema of a PDDL domain."""
+    """Create an empty store with the schema of a PDDL domain."""
     from knowledge_base.store import KnowledgeBase
     from knowledge_base.world.schema import Schema
 
@@ -80,7 +80,7 @@ def tell(
     key: Key = None,
     json: Json = False,
 ) -> None:
-    """Make facts true, set numbers, name things: all of it or, with a mistake, nothing."""
+    """Make facts true, set values and add objects; a mistake in any FACT changes nothing."""
     from knowledge_base.statements import told
 
     _change(store, facts, told, author, expect, key, as_json=json)
@@ -94,7 +94,7 @@ def retract(
     key: Key = None,
     json: Json = False,
 ) -> None:
-    """Retract facts, or remove things with all facts about them: all of it or, with a mistake, nothing."""
+    """Retract facts, or remove objects with all their facts; a mistake in any FACT changes nothing."""
     from knowledge_base.statements import retracted
 
     _change(store, facts, retracted, author, expect, key, as_json=json)
@@ -107,7 +107,7 @@ def compact(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Forget a store's past and make its file smaller; keys of changes are remembered."""
+    """Remove past versions of a store to make its file smaller; the keys of changes stay."""
     with writable(store) as kb:
         before = _size(store)
         kb.compact(kb.version if keep is None else kb.at(**moment(keep)).version)
@@ -142,7 +142,7 @@ def export(
     ] = None,
     domain: Domain = None,
 ) -> None:
-    """Write a world as JSON (lossless, with its schema) or as the start of a PDDL problem."""
+    """Write a world as JSON (without loss, with its schema) or as the initial state of a PDDL problem."""
     from knowledge_base.spelling import nearest_name
 
     output = _output(to, source, domain)

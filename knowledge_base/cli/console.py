@@ -47,7 +47,7 @@ readers: dict[str, Callable[[Path], KnowledgeBase]] = {}
 
 
 class Opened(NamedTuple):
-    """An opened world, and the problem that it is the initial state of, if any."""
+    """An opened world, and the problem if the world is its initial state."""
 
     kb: KnowledgeBase
     problem: ProblemText | None = None

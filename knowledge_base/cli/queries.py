@@ -111,7 +111,7 @@ def show(
     domain: Domain = None,
     json: Json = False,
 ) -> None:
-    """Show a world's things, facts and function values, and a problem's goal; or everything about THING."""
+    """Show a world's objects, facts and function values, and a problem's goal; or only the facts about THING."""
     with opened(source, domain) as (kb, problem):
         _show(kb, problem, thing, as_json=json)
 
@@ -155,7 +155,7 @@ def history(
 
 
 def check(store: Store, json: Json = False) -> None:
-    """Check that a store's knowledge is complete and unchanged; reads all of it. For runs see `dsc runs check`."""
+    """Read every row of a store's knowledge; check that it is complete and unchanged. For runs: `dsc runs check`."""
     from knowledge_base.journal.archive import Archive
 
     archive = Archive(store.resolve(), None)
@@ -173,7 +173,7 @@ def watch(
     seconds: Annotated[float | None, typer.Option(min=0.0, help="End after this number of seconds.")] = None,
     json: Json = False,
 ) -> None:
-    """Print changes as others commit them, until Ctrl-C."""
+    """Print the changes that other processes commit, until Ctrl-C."""
     with opened_store(store) as kb:
         touches, left = _touches(kb, pattern), count
         end = None if seconds is None else time.monotonic() + seconds

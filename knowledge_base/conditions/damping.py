@@ -59,7 +59,7 @@ class Hold:
         self._timer: Timer | None = None
 
     def due(self) -> float:
-        """Return the time at which a condition fires that becomes true now."""
+        """Return the time at which a condition that becomes true now will fire."""
         return self._clock.now() + self._seconds
 
     def start(self, due: float, over: Callable[[], None]) -> None:

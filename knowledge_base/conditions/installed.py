@@ -95,7 +95,7 @@ class Installed:
         self._evaluate([("said", fluent.predicate, fluent.args, BOTH)])
 
     def _evaluate(self, events: list[Event]) -> None:
-        """Update all rows that the events affect, then the conditions of the changed rows."""
+        """Update the rows that the events affect, and then the conditions of the changed rows."""
         self._changed.clear()
         reached: list[tuple[AlphaIndex, Args, int]] = []
         suspects: dict[tuple[ConditionRow, Args], None] = {}

@@ -372,7 +372,7 @@ class Join:
 
 
 _Relying = dict[Picked, dict[tuple[ConditionRow, Args], None]]
-"""Rows and witnesses, by the values of the facts that they depend on."""
+"""Rows and witnesses, by the arguments of the facts that the witnesses depend on."""
 _Open = dict[Picked, dict[DeltaJoin, dict[ConditionRow, None]]]
 """Open rows by the values of their parameters, and by the delta join that finds their witnesses."""
 

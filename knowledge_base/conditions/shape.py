@@ -34,7 +34,7 @@ from knowledge_base.world.schema import Schema
 
 Args = tuple[Value, ...]
 Kind = Literal["said", "type"]
-"""Facts and values (`said`), whose names are distinct, or the types of objects (`type`)."""
+"""Facts and values of functions (`said`), whose names are distinct; or the types of objects (`type`)."""
 
 BOTH = 0
 """Polarity of values and of the inputs of computed predicates.
@@ -171,7 +171,7 @@ class Occurrence:
 
 
 def occurrences(e: Expression, schema: Schema) -> tuple[Occurrence, ...]:
-    """Return all places in `e` that read the world, in order, without duplicates."""
+    """Return the occurrences in `e`, in the order of the text and without duplicates."""
     return tuple(dict.fromkeys(_Walk(schema).expression(e, 1, frozenset())))
 
 

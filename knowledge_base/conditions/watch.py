@@ -135,9 +135,9 @@ def _touching(pattern: str | Expression, params: Mapping[str, Value], schema: Sc
 def touches(pattern: Expression, params: Mapping[str, Value], schema: Schema) -> Touches:
     """Return a function that returns whether a change matches `pattern`.
 
-    A pattern is a predicate, function or type with arguments. A variable without a value in `params` matches any value,
-    but the same value at each of its places. The removal of an object matches the functions that may have had a value
-    for that object.
+    A pattern is a predicate, function or type with arguments. A variable without a value in `params` matches any value;
+    if the variable occurs twice, both arguments must be equal. The removal of an object matches the functions that may
+    have had a value for that object.
 
     Raises:
         InputError: `pattern` is not a pattern.

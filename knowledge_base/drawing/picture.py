@@ -54,7 +54,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class _Said:
-    """A fact or fluent: its objects in order, and its text without them."""
+    """A fact or fluent: its objects in order, and its text without these objects."""
 
     things: tuple[str, ...]
     predicate: str

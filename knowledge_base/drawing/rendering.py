@@ -25,7 +25,7 @@ HOP = 170.0
 ROW = 1400.0
 """Width of a picture after which further connected parts are placed in another row."""
 FINE = 60
-"""Maximum number of cards for the layout by Kamada and Kawai (1989), which is better and slower than springs."""
+"""Maximum number of cards for the layout by Kamada and Kawai (1989), which is better but slower than springs."""
 
 
 @dataclass(slots=True)

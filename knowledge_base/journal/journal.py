@@ -1,4 +1,4 @@
-"""The writer's side of a store file: each change is one SQLite transaction, committed when it is written."""
+"""The writer's side of a store file: each change is one SQLite transaction."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ class Journal(Archive):
         self._writers.release()
 
     def _end(self) -> None:
-        """Record the tips of the chains; if the record fails, the store is in the state after a crash."""
+        """Record the tips of the chains; after an error, the store is in the same state as after a crash."""
         if self._transaction.marked and self._group.behind is None:
             with suppress(StoreError), self._transaction as connection:
                 if mark_closed(connection, self._token):
@@ -271,7 +271,7 @@ class Journal(Archive):
 
 @contextmanager
 def _guarded(connection: sqlite3.Connection) -> Iterator[None]:
-    """Forbid the block to begin or end a transaction, which would commit the first part without the rest."""
+    """Refuse statements of the block that begin or end a transaction: they would commit a change in part."""
     refused = False
 
     def judge(action: int, *_: str | None) -> int:

@@ -45,7 +45,7 @@ _LOCK_MARK = re.compile(rb"dsc writer +(\d+)\n")
 
 
 def store_owning(path: Path, in_use: Iterable[Path] = ()) -> Path | None:
-    """Return the store that the file is or belongs to as a sidecar file.
+    """Return the store that the path denotes or is a sidecar file of.
 
     Return `None` if other programs may write the path.
 
@@ -142,12 +142,12 @@ def require_no_strangers(store: Path, *, there: bool) -> None:
 
     Args:
         store: the resolved path of the store.
-        there: whether the store exists; without it, SQLite's sidecar files are the rest of another store.
+        there: whether the store exists. Without the store, SQLite's sidecar files remain from another store.
     """
     old_log, index, log = (store.with_name(store.name + ending) for ending in (OLD_LOG, INDEX, LOG))
     if regular(old_log) is not None:
         raise foreign(old_log, store, "is not one of its files: a store has no log of that kind")
-    size = _size(index)  # read first: SQLite creates the log first, and deletes it last
+    size = _size(index)  # the index is read first: SQLite creates the log before it, and deletes the log after it
     if there and _size(log) is not None:
         _require(log, store, _head(log, 12) in (*_LOG_HEADS, b"", None), "is not a log of SQLite")
         _require(index, store, size is None or size % _INDEX_PART in (0, 3), "is not an index of SQLite")
@@ -185,7 +185,7 @@ def _require(path: Path, store: Path, holds: object, reason: str) -> None:
 def _begins_as_database(path: Path) -> bool:
     """Return whether the file begins with SQLite's magic number.
 
-    To be used only for files that SQLite cannot open, since closing a file releases locks.
+    A caller may use this function only for files that SQLite cannot open, since closing a file releases locks.
     """
     with path.open("rb") as file:
         return file.read(len(_MAGIC)) == _MAGIC
@@ -292,7 +292,7 @@ class WriterLock:
             try:
                 return self._found()
             except FileNotFoundError:
-                pass  # no writer, or a writer that has just closed the store
+                pass  # no writer exists, or the writer has just closed the store
             try:
                 return place(self._path, _lock_content(), locked=True)
             except FileExistsError:

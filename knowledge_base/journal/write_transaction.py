@@ -45,7 +45,7 @@ PAUSE = 1.0
 """Duration of the thread's pause, as a multiple of its last working time."""
 _PAGES_IN_LOG = {"process": 0, "power": 1000}
 """Number of pages (4 KiB) in SQLite's log after which a commit runs a checkpoint; with 0, a thread runs it."""
-_LOG_LENGTH = (_PAGES_IN_LOG["power"] + 24) * (4096 + 24)  # a frame is a page and its header; commits are not cut
+_LOG_LENGTH = (_PAGES_IN_LOG["power"] + 24) * (4096 + 24)  # a frame is a page and its header; commits may be longer
 _SYNCHRONOUS = {"process": "NORMAL", "power": "FULL"}  # in WAL mode, only FULL waits for the disk in each commit
 
 
@@ -277,7 +277,7 @@ class Checkpoints:
 def _started(work: Callable[[], None]) -> Thread | None:
     """Return the started thread, or `None` if the system cannot start one.
 
-    The writer then runs checkpoints itself after some requests.
+    The writer then runs a checkpoint itself after `MOST_ASKED` requests.
     """
     thread = Thread(target=work, name="checkpoints", daemon=True)
     with suppress(RuntimeError):
@@ -304,7 +304,7 @@ def to_tidy_up(path: Path) -> sqlite3.Connection:
         sqlite3.Error: the connection cannot be opened.
     """
     connection = connect(path, "rw")
-    connection.execute("PRAGMA synchronous = NORMAL")  # else the log could be reset before the file is on the disk
+    connection.execute("PRAGMA synchronous = NORMAL")  # else SQLite could reset the log before the file is on the disk
     return connection
 
 

@@ -170,7 +170,7 @@ def _group(node: Node, wanted: str) -> Group:
 
 
 def _at(when: str, parts: Iterable[tuple[str, _T]], join: Callable[[tuple[_T, ...]], _T]) -> _T:
-    """Return the parts with the time `when`, joined unless only one part has this time."""
+    """Return the parts with the time `when`, joined by `join` unless only one part has this time."""
     found = tuple(part for time, part in parts if time == when)
     return found[0] if len(found) == 1 else join(found)
 

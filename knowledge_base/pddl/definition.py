@@ -187,7 +187,7 @@ def refused(construct: _Construct, called: str, place: Place | None) -> Unsuppor
 
 
 def refuse_forms(node: Node) -> None:
-    """Raise `UnsupportedConstructError` for the first form in a condition or effect that is not evaluated.
+    """Raise `UnsupportedConstructError` for the first unsupported form in a condition or effect.
 
     A predicate may have the name of such a form; only a form has groups as arguments.
     """

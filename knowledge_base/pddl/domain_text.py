@@ -137,7 +137,7 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
 
 
 def _misspelt(name: str, valid: Collection[str]) -> bool:
-    """Return whether a name is close to a valid name, and neither is the beginning of the other (kiln, kiln8)."""
+    """Return whether a name is close to a valid name, unless one begins with the other (kiln, kiln8)."""
     close = difflib.get_close_matches(name, valid, cutoff=0.8)
     return any(not other.startswith(name) and not name.startswith(other) for other in close)
 
@@ -162,7 +162,7 @@ def _declarations(nodes: Sequence[Node]) -> list[DeclarationText]:
 def _functions(nodes: Sequence[Node]) -> list[DeclarationText]:
     """Return the declarations of functions.
 
-    `- TYPE` after functions is the type of their values; without it, they are numeric as in PDDL 2.1.
+    `- TYPE` after functions is the type of their values; without a type, the values are numbers as in PDDL 2.1.
     """
     found: list[DeclarationText] = []
     untyped: list[DeclarationText] = []

@@ -1,7 +1,7 @@
 """Input files: read up to a maximum size, or refused with a helpful message.
 
 All readers of texts use this module. A device or pipe is read like a file, up to the same size. A silent pipe is
-refused, so that no reader waits without end.
+refused, so that no reader waits indefinitely.
 """
 
 from __future__ import annotations

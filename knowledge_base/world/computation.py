@@ -32,8 +32,8 @@ _SOURCE = "@computed"
 class Computed(Generic[_Inputs]):
     """A predicate whose truth a function computes from inputs; the decorator `computed` creates it.
 
-    A caller may call it like the function. A read such as `(clean ?a)` denotes the value of a function until a schema
-    resolves it as a predicate.
+    A call of the `Computed` object calls the function. A read such as `(clean ?a)` denotes the value of a function
+    until a schema resolves it as a predicate.
 
     Attributes:
         name: name of the predicate.
@@ -50,7 +50,7 @@ class Computed(Generic[_Inputs]):
     place: Place | None = field(default=None, repr=False)
 
     def __call__(self, *args: _Inputs.args, **kwargs: _Inputs.kwargs) -> bool:
-        """Call the function with the values of its inputs."""
+        """Call the function with these arguments."""
         return self.function(*args, **kwargs)
 
     def inputs(self, args: tuple[Term, ...]) -> tuple[Read, ...]:

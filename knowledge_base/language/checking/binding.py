@@ -1,4 +1,4 @@
-"""Free variables: which a condition finds values for, which must be bound, and the errors for the others.
+"""Free variables of conditions: those with values found by the condition, those that must be bound, and errors.
 
 An atom finds values, unless its predicate is computed; `not`, `imply`, `forall` and comparisons only test values. A
 variable that occurs in no such atom has no answers to list (safe queries in the sense of Datalog).

@@ -127,7 +127,7 @@ def value_fits(value: Value, wanted: tuple[str, ...]) -> bool:
 
 
 def _written(term: Term) -> str:
-    """Return a term in the form of messages."""
+    """Return the text of a term for messages."""
     match term:
         case Variable(name):
             return f"'?{name}'"
@@ -274,7 +274,7 @@ class _Checker:
         return self.schema.is_a(given, wanted) or (isinstance(arg, Variable) and self.schema.is_a(wanted, given))
 
     def types_of(self, term: Term) -> tuple[str, ...] | None:
-        """Return the possible types of the term's value; `None` when no type is known."""
+        """Return the possible types of the term's value; `None` when the types are unknown."""
         match term:
             case Variable(name):
                 return self.scope.get(name)

@@ -1,8 +1,8 @@
-"""Test whether the form of conditions excludes that they are true together, in every world.
+"""Test whether conditions contradict each other in every world, by their form.
 
-A contradiction that is found is certain; without one, the conditions may still exclude each other. The analysis covers
-an atom and its negation, comparisons of one term with constants, and `and`, `or`, `imply` and `not` of these. A
-quantified condition counts as one atom; `(not (forall ...))` equals `(exists (... not ...))`.
+A reported contradiction is certain; conditions without a reported contradiction may still exclude each other. The
+analysis covers an atom and its negation, comparisons of one term with constants, and `and`, `or`, `imply` and `not` of
+these. A quantified condition counts as one atom; `(not (forall ...))` equals `(exists (... not ...))`.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def _ordered(operator: str, left: Term, right: Term) -> Comparison:
 
 
 class _TooManyError(Exception):
-    """The cases are more than `MOST_CASES`, or one is longer than `MOST_TOGETHER`."""
+    """A condition has more than `MOST_CASES` cases, or a case has more than `MOST_TOGETHER` literals."""
 
 
 def _cases(e: Expression) -> list[_Case]:

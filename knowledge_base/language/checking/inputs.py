@@ -1,4 +1,4 @@
-"""Checks of arguments from callers without type checks: once, in the public method, with a one-line error."""
+"""Checks of arguments in public methods, with one-line errors, for callers without static type checks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NO_CHANGE = Delta()
 
 
 def shown(value: object) -> str:
-    """Return any value as a message shows it; never raise an exception."""
+    """Return the text of any value for a message; never raise an exception."""
     try:
         return str.__str__(repr(value))
     except ValueError:  # Python refuses to write such a long number

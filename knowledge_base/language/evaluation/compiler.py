@@ -2,7 +2,7 @@
 
 A *test* returns whether a condition is true when all its free variables are bound. A *search* yields the bindings that
 make the condition true. Quantifiers are searches too: `exists` searches for a witness, and `forall` for a
-counterexample. They use the index and do not enumerate all objects.
+counterexample. These searches use the index and do not enumerate all objects.
 
 At every step, a search chooses the next condition: the one with the fewest matches for the variables bound so far.
 `SearchPlan` caches the preparation of a step, which depends only on the remaining conditions.
@@ -233,7 +233,7 @@ def _any(tests: list[Test]) -> Test:
 def _decided(tests: list[Test], world: World, bindings: Bindings, *, by: bool, otherwise: InputError) -> bool:
     """Return whether some part decides the result; raise the error `otherwise` if no part does.
 
-    Parts that cannot be computed are ignored.
+    A part that raises an error does not decide.
     """
     for part in tests:
         try:
@@ -245,7 +245,7 @@ def _decided(tests: list[Test], world: World, bindings: Bindings, *, by: bool, o
 
 
 def _found(conditions: Iterable[Conjunct], schema: Vocabulary, bound: frozenset[str]) -> Test:
-    """Return a test whether a search finds anything.
+    """Return a function that tests whether a search finds any candidate.
 
     The test needs fewer stack frames than the search, which matters for nested quantifiers.
     """

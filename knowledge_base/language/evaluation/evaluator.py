@@ -78,7 +78,7 @@ def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDIN
 
     Raises:
         UnknownNameError: a free variable is not bound, or a predicate, function or type is not declared.
-        SchemaError: a wrong number of arguments, or `<` or a similar operator met a value that is not a number.
+        SchemaError: a wrong number of arguments, or an operator such as `<` compares a value that is not a number.
         InputError: the nesting is too deep, or a part cannot be computed.
     """
     return asked(e, world.schema).holds(world, bindings)

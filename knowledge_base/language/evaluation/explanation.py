@@ -1,4 +1,4 @@
-"""Explanation why a condition is true or false: its tree with truth values, and the leaf that decides."""
+"""Explanation of a condition's truth: a tree of its parts with truth values, and the part that decides."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def _explain(e: Expression, world: World, bindings: Bindings) -> Explanation:
 
 
 def _judged(e: Expression, world: World, bindings: Bindings) -> _Judged:
-    """Return a part with its error, which is ignored if another part decides."""
+    """Return the explanation of a part with its error; the error is ignored if another part decides."""
     try:
         return _explain(e, world, bindings), None
     except InputError as error:

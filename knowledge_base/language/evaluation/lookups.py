@@ -61,9 +61,9 @@ class JoinStep:
         return not unbound or unbound <= _finds(self.conjunct, self.free & bound, self.schema)
 
     def cost(self, bound: AbstractSet[str]) -> tuple[int, int, int]:
-        """Return the kind of look-up (0 to 2 for tests), the number of open arguments, and minus that of all arguments.
+        """Return the kind of look-up (0 to 2 for tests), the number of open arguments, and a third number.
 
-        Steps with smaller costs come earlier.
+        Steps with smaller costs are executed earlier. The third number is smaller for an atom with more arguments.
 
         The cost never grows with more variables in `bound`.
         """
@@ -145,9 +145,11 @@ def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabul
 
 
 def candidates(steps: Mapping[int, JoinStep], bound: frozenset[str]) -> list[tuple[int, JoinStep]]:
-    """Return the possible next look-ups of `steps`, in the order of `order`: some atoms, or else one other look-up.
+    """Return the possible next look-ups, in the order of `steps`.
 
-    Their number is small, because the search compares their numbers of matches at every step.
+    These are at most `_MOST_COMPARED` atoms, or else one other look-up.
+
+    Only a few are returned, because the search compares their numbers of matches at every step.
     """
     atoms = ((i, s) for i, s in steps.items() if isinstance(s.conjunct, Atom) and s.is_ready(bound))
     others = ((i, s) for i, s in steps.items() if s.is_ready(bound))

@@ -53,7 +53,7 @@ class World(Protocol):
 
 
 LOOK_EVERY = 500
-"""Amount of work between two checks of the clock and of `cancelled`; it takes about a millisecond."""
+"""Number of facts and objects between two checks of the clock and of `cancelled`: about a millisecond."""
 _LONGEST_SHOWN = 120
 _T = TypeVar("_T")
 
@@ -75,7 +75,7 @@ class Bounds:
     now: Callable[[], float] = time.monotonic
 
 
-class _Given(Exception):  # noqa: N818  not an error of the query: the evaluator must not handle it
+class _Given(Exception):  # noqa: N818  not an `InputError`: the evaluator must not handle it
     """The query ends without an answer, for this reason."""
 
 

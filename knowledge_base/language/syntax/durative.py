@@ -156,7 +156,7 @@ def _unless(part: Effect, undone: tuple[Atom, ...]) -> Effect:
 
 
 def _same(atom: Atom, other: Atom) -> tuple[Expression, ...] | None:
-    """Return the equations under which both atoms are one fact; `None` if they never are."""
+    """Return the equations under which both atoms denote one fact; `None` if they never denote one fact."""
     if atom.predicate != other.predicate or len(atom.args) != len(other.args):
         return None
     pairs = [(a, b) for a, b in zip(atom.args, other.args, strict=True) if a != b]

@@ -40,7 +40,10 @@ class TypedVariable(Located):
 
 @dataclass(frozen=True, slots=True)
 class Variable(Located):
-    """`?x`, stored by its name without the question mark; `?event.item` has the name `event.item`."""
+    """A variable such as `?x`, stored by its name without the question mark.
+
+    `?event.item` has the name `event.item`.
+    """
 
     name: str
 

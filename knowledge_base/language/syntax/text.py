@@ -1,6 +1,6 @@
 """Parser of text or groups to conditions, effects and terms, and the conversion of these to text.
 
-The text of a value is read as an equal value.
+The parser reads the text of a value as an equal value.
 
 Names are converted to lower case, as PDDL ignores case; quoted text is not converted. The parser checks only the form;
 `check` compares names with a schema.
