@@ -1,1 +1,1 @@
-"""Reader and writer of SCXML (W3C Recommendation, 1 September 2015)."""
+"""Reader and writer of SCXML documents (W3C Recommendation, 1 September 2015)."""

@@ -1,6 +1,6 @@
-"""Documents of SCXML: an XML reader with the line of each element, and the refusal of unsupported elements.
+"""SCXML documents: a reader of XML that records the line of each element, and the check for unsupported elements.
 
-The reader takes no DTD, entities or instructions, and is bounded in size and depth.
+The reader refuses DTDs, entity declarations and processing instructions, and bounds size and depth.
 """
 
 from __future__ import annotations
@@ -15,7 +15,10 @@ from knowledge_base.errors import InputError, ParseError, Place, UnknownNameErro
 
 NAMESPACE = "http://www.w3.org/2005/07/scxml"
 MAX_DEPTH = 30
-"""Depth of elements. Each nested `parallel` makes a plot four levels deeper, and its YAML must stay readable."""
+"""Upper bound of the depth of elements.
+
+Each nested `parallel` adds four levels to the YAML of the plot, which must stay readable.
+"""
 
 ATTRIBUTES: Mapping[str, frozenset[str]] = {
     name: frozenset(words.split())
@@ -43,7 +46,7 @@ ATTRIBUTES: Mapping[str, frozenset[str]] = {
         "else": "",
     }.items()
 }
-"""Supported elements -> their attributes."""
+"""Supported attributes, by the name of the supported element."""
 STATES = frozenset({"state", "parallel", "final"})
 
 _CHART = frozenset({"transition", "onentry", "onexit", "datamodel", "history"})
@@ -62,7 +65,7 @@ CHILDREN: Mapping[str, frozenset[str]] = {
     "send": frozenset({"param", "content"}),
     "if": _ACTIONS | {"elseif", "else"},
 }
-"""Elements -> the elements allowed directly inside them."""
+"""Names of the elements that are allowed directly inside an element, by the name of this element."""
 _MEANINGLESS_IF_EMPTY = frozenset({"id", "target", "initial", "event", "location", "idlocation", "sendid"})
 _HOLDS_TEXT = frozenset({"data", "assign", "content"})
 _KNOWN_TO_SCXML = frozenset({"script", "foreach", "invoke", "finalize", "donedata", "onexit"})
@@ -71,7 +74,7 @@ _KNOWN_ATTRIBUTES = frozenset({"src", "targetexpr", "typeexpr", "srcexpr", "auto
 
 @dataclass(slots=True)
 class Element:
-    """An element of the SCXML namespace (or of none), or of another one, which is `foreign`."""
+    """An XML element; it belongs to SCXML if it has the namespace of SCXML or none, and is `foreign` otherwise."""
 
     name: str
     attributes: Mapping[str, str]
@@ -82,28 +85,28 @@ class Element:
 
     @property
     def foreign(self) -> bool:
-        """Whether it is not an element of SCXML."""
+        """Whether the element does not belong to SCXML."""
         return self.namespace not in {"", NAMESPACE}
 
     @property
     def text(self) -> str:
-        """Its text besides elements, stripped."""
+        """The element's text, without the text of inner elements, stripped."""
         return "".join(self.texts).strip()
 
     def walk(self) -> Iterator[Element]:
-        """Yield the element and all elements inside it."""
+        """Yield the element and all inner elements, in document order."""
         yield self
         for child in self.children:
             yield from child.walk()
 
 
 def read_xml(text: str, source: str | None = None) -> Element:
-    """Return the root element.
+    """Return the root element of an XML text; `source` is the file name in messages.
 
     Raises:
-        ParseError: it is not well-formed XML, has a document type or an entity declaration, or is too large or deep.
+        ParseError: the text is not well-formed XML, has a document type or entity declaration, or is too large or deep.
     """
-    data = text.encode(errors="surrogatepass")  # half a surrogate pair is refused with its place
+    data = text.encode(errors="surrogatepass")  # the parser then reports half a surrogate pair with its place
     check_size(len(data), Place(source))
     reader = _Reader(source)
     try:
@@ -115,7 +118,7 @@ def read_xml(text: str, source: str | None = None) -> Element:
 
 
 def written(element: Element) -> str:
-    """Return an element's name for messages; one of another namespace with that namespace."""
+    """Return an element's name for messages; the name of a foreign element includes its namespace."""
     return f"<{element.name}>" + (f" of the namespace '{element.namespace}'" if element.foreign else "")
 
 
@@ -161,11 +164,11 @@ class _Reader:
 
 
 def check(element: Element) -> None:
-    """Refuse elements and attributes, here and inside, that are unknown, misplaced or without counterpart.
+    """Raise an error if an element or its content is unknown, misplaced or without a counterpart in plots.
 
     Raises:
         NotExpressibleError: an element or attribute of SCXML has no counterpart in action plots.
-        UnknownNameError: it is not an element or attribute of SCXML, or not in this place.
+        UnknownNameError: an element or attribute does not exist in SCXML, or is not allowed in its place.
         InputError: an attribute is empty, or text is misplaced.
     """
     known = ATTRIBUTES[element.name]

@@ -1,8 +1,8 @@
-"""Translation of ECMAScript expressions into conditions and terms; anything without a counterpart is refused by name.
+"""Translation of ECMAScript expressions into conditions and terms; the error for an unsupported part has its text.
 
-The subset has numbers, strings, truth values, variables, `_event.data.x`, `+ - * /`, comparisons, `&& || !`, `In()`,
-and `Math.pow` with a small whole exponent. An expression that relies on a conversion of values is refused; the scope
-knows the kinds of values.
+The supported subset has numbers, strings, truth values, variables, `_event.data.x`, `+ - * /`, comparisons, `&& || !`,
+`In()`, and `Math.pow` with a small whole exponent. An expression that relies on a conversion of values is refused; the
+scope provides the kinds of values.
 """
 
 from __future__ import annotations
@@ -31,17 +31,20 @@ from knowledge_base.language.syntax.expression import (
 )
 
 Names = Mapping[str, str] | Scope
-"""The chart's data by their own spelling -> the name of the variable; such a mapping has no kinds of values."""
+"""Names of the plot's variables by the spelling in the document; a mapping has no kinds of values, a `Scope` has."""
 
 _COMPARE = {"===": "=", "==": "=", "!==": "!=", "!=": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
 _FALSE = {BOOLEAN: Constant(False), NUMBER: Constant(0), TEXT: Constant("", quoted=True), UNDEFINED: NO_VALUE}  # noqa: FBT003
-"""The values that count as false; NaN cannot occur."""
+"""The value that counts as false, by kind; NaN cannot occur."""
 MAX_WHOLE = 2**53
 """Largest whole number that ECMAScript represents exactly."""
 MAX_EXPONENT = 8
 MAX_NESTING = 50
 MAX_OPERATIONS = 100
-"""Upper bound of a term, counted after the expansion of `Math.pow`: `a + b - c` nests, and later stages recurse."""
+"""Upper bound of the operations in a term, counted after the expansion of `Math.pow`.
+
+Chains such as `a + b - c` nest terms, and later stages of the reader are recursive.
+"""
 _WORDS = re.compile(
     r"""\s*(?:
     (?P<number>\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)
@@ -56,36 +59,39 @@ _ESCAPE = re.compile(r"\\(u[0-9a-fA-F]{4}|x[0-9a-fA-F]{2}|[^0-9ux])")
 
 
 class Token(NamedTuple):
-    """A token: its kind (`number`, `text`, `name`, `sign`, `end`) and its text or value."""
+    """A token of an expression: its kind (`number`, `text`, `name`, `sign`, `end`) and its text or value."""
 
     kind: str
     text: str
 
 
 def condition(text: str, names: Names, place: Place | None = None) -> Expression:
-    """Return a `cond` as a condition.
+    """Return the condition for the text of a `cond` attribute.
 
     Args:
-        text: the expression.
-        names: the names it may use.
-        place: for errors.
+        text: the ECMAScript expression.
+        names: the names that the expression may use.
+        place: place of the expression, for errors.
 
     Raises:
-        NotExpressibleError: it has a part without counterpart in conditions, or relies on a conversion.
-        UnknownNameError: it uses data that the chart does not declare.
+        NotExpressibleError: a part of the expression has no counterpart in conditions, or relies on a conversion.
+        UnknownNameError: the expression uses data that the chart does not declare.
     """
     parser = _Parser(text, names, place)
     return parser.as_condition(parser.whole())
 
 
 def term(text: str, names: Names, place: Place | None = None) -> Term:
-    """Return an `expr` as a term; see `condition`."""
+    """Return the term for the text of an `expr` attribute; arguments and errors as for `condition`."""
     parser = _Parser(text, names, place)
     return parser.as_term(parser.whole())
 
 
 def joined(text: str, names: Names, place: Place | None = None) -> list[Term]:
-    """Return the parts of a `log`: the terms that `+` joins, from the first string on; before it, numbers are added."""
+    """Return the parts of a `log` expression: the terms that `+` joins.
+
+    Operands before the first string are numbers, which `+` adds; they form one part.
+    """
     return _Parser(text, names, place).whole_join()
 
 
@@ -254,7 +260,7 @@ class _Parser:
         return self._bounded(Arithmetic(sign, sides))
 
     def _number(self, part: Expression | Term) -> Term:
-        """Return an operand of arithmetic or of an order comparison as a term."""
+        """Return an operand of arithmetic or of an order comparison as a term; refuse an operand of another kind."""
         found = self.as_term(part)
         if isinstance(found, Constant) and not _is_number(found):
             raise self._refused("text cannot be computed with")
@@ -267,7 +273,7 @@ class _Parser:
         return f"'{found.name}' ({kinds})" if isinstance(found, Variable) else f"a value ({kinds})"
 
     def _check_comparison(self, sign: str, left: Term, right: Term) -> None:
-        """Refuse conversions of ECMAScript: `==` between kinds, and order between values other than numbers."""
+        """Refuse comparisons that convert values: `==` between different kinds, and order of values except numbers."""
         if sign not in {"===", "!==", "==", "!="}:
             self._number(left), self._number(right)
             return
@@ -291,10 +297,10 @@ class _Parser:
         return self._truth(part) if isinstance(part, Term) else part
 
     def _truth(self, value: Term) -> Expression:
-        """Return whether a value is true: it differs from all false values."""
+        """Return the condition that a value counts as true in ECMAScript: it differs from all false values."""
         kinds = self._scope.kinds_of(value)
         if kinds <= {BOOLEAN, UNDEFINED} or self._scope.want(value, BOOLEAN):
-            return Comparison("=", value, Constant(True))  # noqa: FBT003  # a value to compare with
+            return Comparison("=", value, Constant(True))  # noqa: FBT003  # `True` is an operand
         if ANY in kinds:
             raise self._refused(f"{self._written(value)} would be converted to a truth value")
         parts = [Comparison("!=", value, _FALSE[kind]) for kind in sorted(kinds)]
@@ -318,7 +324,7 @@ def tokens(text: str, place: Place | None) -> list[Token]:
     """Return the tokens of an expression.
 
     Raises:
-        NotExpressibleError: a part is outside the subset, e.g. an object in braces.
+        NotExpressibleError: a part is outside the supported subset, e.g. an object in braces.
     """
     found, at, end = [], 0, len(text.rstrip())
     while at < end:
@@ -336,7 +342,7 @@ def _unquoted(word: str, place: Place | None) -> str:
     """Return the text of a string literal; two escapes that form a surrogate pair become one character.
 
     Raises:
-        NotExpressibleError: an escape is octal, in braces or cut short, or there is half a surrogate pair.
+        NotExpressibleError: an escape is octal, in braces or incomplete, or is half a surrogate pair.
     """
     inside = word[1:-1]
     if "\\" in _ESCAPE.sub("", inside):

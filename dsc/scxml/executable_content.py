@@ -1,4 +1,4 @@
-"""Executable content (SCXML 4) as internal actions, in the written form of plots."""
+"""Executable content (SCXML 4) as internal actions in the written form of plots."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ _DELAY = re.compile(r"(\d+\.?\d*|\.\d+)(ms|s)")
 
 
 def actions(elements: Iterable[Element], scope: Scope) -> list[Form]:
-    """Return the actions of the elements, in order.
+    """Return the actions for elements of executable content, in order and in written form.
 
     Raises:
-        NotExpressibleError: one of them has no counterpart.
+        NotExpressibleError: an element has no counterpart in action plots.
         InputError: an attribute is missing or wrong.
     """
     return [_READERS[element.name](element, scope) for element in elements]
 
 
 def needed(element: Element, attribute: str) -> str:
-    """Return a required attribute; raise `InputError` if it is missing."""
+    """Return the value of a required attribute; raise `InputError` if the attribute is missing."""
     if not element.attributes.get(attribute):
         raise InputError(f"<{element.name}> needs the attribute '{attribute}'", place=element.place)
     return element.attributes[attribute]
 
 
 def only_one(element: Element, *attributes: str) -> None:
-    """Raise `InputError` if the element has two of the attributes, which exclude each other."""
+    """Raise `InputError` if the element has more than one of the attributes, which exclude each other."""
     both = [name for name in attributes if name in element.attributes]
     if len(both) > 1:
         message = f"<{element.name}> has both '{both[0]}' and '{both[1]}'"
@@ -47,14 +47,14 @@ def only_one(element: Element, *attributes: str) -> None:
 
 
 def variable(name: str, scope: Scope, element: Element) -> str:
-    """Return the variable of a datum; raise `UnknownNameError`."""
+    """Return the name of the plot's variable for a `data` name; raise `UnknownNameError` if it is not declared."""
     if name not in scope.names:
         raise UnknownNameError(f"there is no data '{name}'", place=element.place, found=name, valid=scope.names)
     return scope.names[name]
 
 
 def assigned(element: Element, scope: Scope) -> Term | None:
-    """Return the value of a `data` or `assign`: its expression, or its content (SCXML B.2.1)."""
+    """Return the value of a `data` or `assign`: its expression or content (SCXML B.2.1); `None` without a value."""
     if "expr" in element.attributes:
         if element.text:
             raise InputError(f"<{element.name}> has both 'expr' and content", place=element.place)
@@ -66,7 +66,7 @@ def assigned(element: Element, scope: Scope) -> Term | None:
 
 
 def set_at_first(root: Element, scope: Scope) -> frozenset[str]:
-    """Return data that have a value before any use: set in the first state, or on every path out of it."""
+    """Return the variables that have a value before any use: the first state sets them, or each path out of it does."""
     tops = [child for child in root.children if child.name in STATES]
     named = root.attributes.get("initial")
     first = next((top for top in tops if named is None or any(_id(one) == named for one in top.walk())), None)
@@ -83,7 +83,7 @@ def set_at_first(root: Element, scope: Scope) -> frozenset[str]:
 
 
 def _set_by(block: Element, scope: Scope) -> Iterator[str]:
-    """Yield the variables that a block sets to constants before any other action."""
+    """Yield the variables to which the leading `assign` actions of a block assign constants."""
     for action in block.children:
         if action.name != "assign" or not isinstance(assigned(action, scope), Constant):
             return
@@ -91,7 +91,7 @@ def _set_by(block: Element, scope: Scope) -> Iterator[str]:
 
 
 def _mentions(element: Element, name: str) -> int:
-    """Count the name in expressions and locations, here and inside; other occurrences have no effect."""
+    """Return the number of occurrences of a name in the expressions and locations of an element and its content."""
     word = re.compile(rf"(?<![\w$.]){re.escape(name)}(?![\w$])")
     texts = (text for one in element.walk() for key, text in one.attributes.items() if key != "id")
     return sum(len(word.findall(text)) for text in texts)
@@ -102,7 +102,7 @@ def _id(element: Element) -> str | None:
 
 
 def fired(element: Element, scope: Scope) -> Sent:
-    """Return the event that a `raise` or `send` fires."""
+    """Return the event that a `raise` or `send` element fires."""
     if element.name == "raise":
         return Sent(needed(element, "event"), None, scope)
     return Sent(_constant(element, "event", scope), _carried(element, scope), scope)
@@ -173,7 +173,7 @@ def _cancel(element: Element, scope: Scope) -> Form:
 
 
 def _constant(element: Element, attribute: str, scope: Scope) -> str:
-    """Return an attribute, or the string in the expression attribute of that name."""
+    """Return the value of an attribute, or the constant string of its expression form, e.g. `eventexpr` for `event`."""
     if f"{attribute}expr" not in element.attributes:
         return needed(element, attribute)
     only_one(element, attribute, f"{attribute}expr")
@@ -194,7 +194,7 @@ def _delay(element: Element, scope: Scope) -> float:
 
 
 def _arguments(element: Element, scope: Scope) -> dict[str, Term]:
-    """Return the data of a `send`, with names in lower case; `_event.data` itself is named `data`."""
+    """Return the data of a `send` by name in lower case; data without names have the name `data`."""
     found: dict[str, Term] = {}
     for name, value in (_carried(element, scope) or {}).items():
         folded = name.lower() or "data"
@@ -208,7 +208,10 @@ def _arguments(element: Element, scope: Scope) -> dict[str, Term]:
 
 
 def _carried(element: Element, scope: Scope) -> dict[str, Term] | None:
-    """Return an event's data with their own spelling, with `WHOLE` for content other than an object; or `None`."""
+    """Return an event's data by the spelling in the document; `None` without data.
+
+    Content other than an object has the key `WHOLE`.
+    """
     contents = [child for child in element.children if child.name == "content"]
     named: dict[str, Term] = {
         name: Variable(variable(name, scope, element)) for name in element.attributes.get("namelist", "").split()
@@ -233,7 +236,7 @@ def _content(element: Element, scope: Scope) -> dict[str, Term]:
 
 
 def _literal(element: Element) -> Constant | Mapping[str, Constant]:
-    """Return content as JSON, or else as a string with its blanks collapsed (SCXML B.2.1)."""
+    """Return the content of an element as JSON; if it is not JSON, as a string with collapsed blanks (SCXML B.2.1)."""
     try:
         value = json.loads(element.text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Reader of SCXML as an action plot of dialect `scxml`.
+"""Reader of SCXML documents as action plots of dialect `scxml`.
 
 | SCXML | plot |
 |---|---|
@@ -32,12 +32,12 @@ from knowledge_base.spelling import is_plain_name
 
 
 def parse_scxml(text: str, source: str | None = None) -> ActionPlot:
-    """Read an SCXML document.
+    """Return the plot for an SCXML document; `source` is the file name in messages.
 
     Raises:
-        ParseError: it is not XML, has a document type, or is too large or deep.
+        ParseError: the text is not XML, has a document type, or is too large or deep.
         NotExpressibleError: an element has no counterpart in action plots.
-        InputError: it is not SCXML; the message has file, line and the nearest valid name.
+        InputError: the text is not SCXML; the message has file, line and the nearest valid name.
     """
     root = read_xml(text, source)
     if root.name != "scxml" or root.foreign:
@@ -71,7 +71,7 @@ class _Reader:
         return read_model(ActionPlot, Document(form, self._places)).written_at(self._places)
 
     def _note(self, path: Path, place: Place) -> None:
-        """Record the place of a part, and of the parts around it that are not elements."""
+        """Record the place of a part, and of those outer parts that are not elements of the document."""
         for length in range(1, len(path)):
             self._places.setdefault(path[:length], self._places[path[: length - 1]])
         self._places[path] = place
@@ -102,7 +102,7 @@ class _Reader:
         return form
 
     def _work_out_kinds(self) -> None:
-        """Give the scope the kinds of the data; from then on, conversions are refused."""
+        """Compute the kinds of all data; afterwards, translation refuses expressions that convert values."""
         known = self._known.data
         early = {self._known.names.get(name) for name in set_at_first(self._root, self._known)}
         given = [one for one in self._given(self._root, self._known) if one[1] is not None or one[0] not in early]
@@ -110,7 +110,7 @@ class _Reader:
         work_out(known, given)
 
     def _given(self, element: Element, scope: Scope) -> Iterator[tuple[str, Term | None, Scope]]:
-        """Yield the values that inner elements assign to variables; record the events that they fire."""
+        """Yield variable, value and scope of each assignment inside an element; record the events that it fires."""
         for child in element.children:
             if child.name == "data":
                 yield scope.names[child.attributes["id"]], assigned(child, scope), scope
@@ -135,7 +135,7 @@ class _Reader:
         return form if initial is None else {**form, "initial": initial}
 
     def _received(self) -> list[str]:
-        """Return the events that the chart takes and does not itself fire."""
+        """Return the events for which the chart has a transition but which it does not itself fire."""
         own = {sent.event for sent in self._known.data.sent}
         heard = [e for one in self._root.walk() if one.name == "transition" for e in _descriptors(one)]
         plain = dict.fromkeys(event.removesuffix(".*").removesuffix(".") for event in heard)
@@ -145,7 +145,7 @@ class _Reader:
     # -- states --------------------------------------------------------------------------------------------
 
     def _scope(self, element: Element, path: Path) -> Form:
-        """Return `states` and `initial` of the chart or of a composite state."""
+        """Return the keys `states` and `initial` of the chart or of a composite state."""
         states: Form = {}
         for child in element.children:
             if child.name in STATES or child.name == "history":
@@ -226,7 +226,10 @@ class _Reader:
     # -- transitions ---------------------------------------------------------------------------------------
 
     def _transitions(self, element: Element, form: Form, path: Path) -> None:
-        """Keep document order, also between transitions with equal descriptors that have others between them."""
+        """Add the transitions of an element to `form` in document order.
+
+        The order also holds for transitions with equal descriptors between which other transitions occur.
+        """
         on: dict[str, list[Form]] = {}
         always: list[Form] = []
         repeats: Counter[str] = Counter()
@@ -264,8 +267,8 @@ def _descriptors(transition: Element) -> list[str]:
 
 
 def _key(event: str, on: dict[str, list[Form]], repeats: Counter[str]) -> str:
-    """Return a key for a transition after those in `on`: a new one unless the last has the same descriptors."""
-    # A list with a repeated descriptor has the same meaning, and is a different key.
+    """Return the key for the next transition in `on`: the last key if its descriptors are equal; else a new key."""
+    # A repeated descriptor makes a different key with an equal meaning.
     again = f" {event.split(maxsplit=1)[0]}"
     key = event + again * repeats[event]
     while key in on and key != next(reversed(on)):
@@ -280,7 +283,7 @@ def _new(name: str, known: Form, element: Element) -> None:
 
 
 def _default(transition: Element) -> None:
-    """Refuse a trigger or guard in the transition of an `initial` or a history (SCXML 3.6, 3.10)."""
+    """Raise an error for a trigger or guard in the transition of an `initial` or history (SCXML 3.6, 3.10)."""
     for name in ("event", "cond"):
         if name in transition.attributes:
             raise InputError(f"this transition is taken always, so it has no '{name}'", place=transition.place)
@@ -293,5 +296,5 @@ def _only(element: Element) -> Element:
 
 
 def _declared(attributes: Mapping[str, str]) -> dict[str, str]:
-    """Return attributes with their types; one that is only compared for equality may have any type."""
+    """Return the types of attributes by name; an attribute that is only compared for equality is a `symbol`."""
     return {name: kind or "symbol" for name, kind in attributes.items()}

@@ -1,7 +1,8 @@
-"""Kinds of values of a chart's data and events; they show where ECMAScript would convert a value.
+"""Kinds of the values of a chart's data and events, which show where ECMAScript would convert a value.
 
-The kinds follow from the document alone: from the values of `data`, `assign` and `send`. An event that the chart does
-not itself fire comes from outside. Its attributes are declared under `receives`, with the type that the chart needs.
+The kinds are computed from the document, from the values in `data`, `assign` and `send`. An event that the chart does
+not itself fire comes from outside. The plot declares its attributes in `receives`, with the types that expressions
+require.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ NUMBER, TEXT, BOOLEAN = "number", "text", "boolean"
 UNDEFINED = "undefined"
 ANY = "any"
 NO_VALUE = Constant("undefined", quoted=True)
-"""ECMAScript's `undefined`, which is not a value of a plot: no other text of an imported chart has this spelling."""
+"""Constant for ECMAScript's `undefined`, which plots lack; no other text of an imported chart has this spelling."""
 Kinds = frozenset[str]
 WHOLE = ""
-"""The key of `_event.data` itself, next to those of its properties."""
+"""Key of `_event.data` itself; all other keys are properties of `_event.data`."""
 _EVENT = "event."
 
 
@@ -30,9 +31,9 @@ class Sent:
     """An event that the chart fires.
 
     Attributes:
-        event: its name.
-        carries: its data, by the spelling in the document; `None` without data.
-        scope: the scope of its terms.
+        event: name of the event.
+        carries: data of the event, by the spelling in the document; `None` without data.
+        scope: scope of the terms in `carries`.
     """
 
     event: str
@@ -42,13 +43,13 @@ class Sent:
 
 @dataclass(slots=True)
 class Data:
-    """Knowledge of the whole chart about its data.
+    """Kinds of all data of a chart, and the events that it fires and receives.
 
     Attributes:
-        kinds: variable -> kinds of its values; `None` before their computation, which disables the checks.
+        kinds: kinds of values by variable; `None` until they are computed, which disables the checks.
         sent: the events that the chart fires.
-        received: events from outside -> attributes that the chart reads, in lower case -> their types.
-        spelt: those attributes -> their spelling.
+        received: types of the attributes that the chart reads, by event from outside and attribute in lower case.
+        spelt: spelling in the document of the attributes in `received`.
     """
 
     kinds: dict[str, Kinds] | None = None
@@ -62,9 +63,9 @@ class Scope:
     """The names that an expression may use.
 
     Attributes:
-        names: the chart's data by their own spelling -> the name of the plot's variable.
-        data: the knowledge about them.
-        events: descriptors of the events that `_event` may be; `None` if it can be any.
+        names: names of the plot's variables, by the spelling of the data in the document.
+        data: kinds of the data.
+        events: descriptors of the events that `_event` may be; `None` if `_event` may be any event.
     """
 
     names: Mapping[str, str]
@@ -72,11 +73,11 @@ class Scope:
     events: tuple[str, ...] | None = None
 
     def on(self, events: Iterable[str]) -> Scope:
-        """Return the scope of a transition with these descriptors; without descriptors, `_event` can be any event."""
+        """Return the scope of a transition with these descriptors; without descriptors, `_event` may be any event."""
         return replace(self, events=tuple(events) or None)
 
     def kinds_of(self, term: Term) -> Kinds:
-        """Return the kinds of values that a term has."""
+        """Return the kinds of values that a term may have."""
         if isinstance(term, Constant):
             return frozenset({_kind(term.value)})
         if isinstance(term, Arithmetic):
@@ -88,10 +89,12 @@ class Scope:
         return self._kinds_of_attribute(term.name.removeprefix(_EVENT))
 
     def check_read(self, attribute: str, place: Place | None) -> None:
-        """Refuse `_event.data.ATTRIBUTE` (or `_event.data`, for `WHOLE`) if ECMAScript would find another value.
+        """Raise an error if ECMAScript would read another value for `_event.data.ATTRIBUTE` than the plot.
+
+        The attribute `WHOLE` stands for `_event.data` itself.
 
         Raises:
-            NotExpressibleError: an event that may be the last one has other data, or another spelling.
+            NotExpressibleError: an event that `_event` may be has other data, or another spelling of the attribute.
         """
         if self.data.kinds is None:
             return
@@ -111,7 +114,7 @@ class Scope:
             self.data.received[event].setdefault(attribute.lower(), "")
 
     def want(self, term: Term, kind: str) -> bool:
-        """Return whether a term has this kind; declare the kind of an attribute from outside."""
+        """Return whether a term has this kind; an attribute of an event from outside is declared with the kind."""
         kinds = self.kinds_of(term)
         if self.data.kinds is None:
             return True
@@ -125,7 +128,7 @@ class Scope:
 
     def _declare(self, attribute: str, kind: str) -> bool:
         events = self._outside()
-        if self.events is None or "*" in self.events:  # the event can be any one
+        if self.events is None or "*" in self.events:  # `_event` may be any event
             return False
         for event in events:
             declared = self.data.received[event]
@@ -142,13 +145,13 @@ class Scope:
         return [one for one in self.data.sent if self.events is None or any(matches(d, one.event) for d in self.events)]
 
     def _outside(self) -> list[str]:
-        """Return the events from outside that may be the last one."""
+        """Return the events from outside that `_event` may be."""
         if self.events is None:
             return [*self.data.received]
         return [event for event in self.data.received if any(matches(d, event) for d in self.events)]
 
     def _has_platforms(self) -> bool:
-        """Return whether the last event may be one of the interpreter itself, which has no data."""
+        """Return whether `_event` may be an event of the interpreter itself, which has no data."""
         return self.events is None or any(d.startswith(("done.", "error.", "*")) for d in self.events)
 
 
@@ -174,8 +177,8 @@ def work_out(data: Data, given: Iterable[tuple[str, Term | None, Scope]]) -> Non
     """Compute the kinds of all variables.
 
     Args:
-        data: receives the kinds.
-        given: assigned values of variables, with the scope of each term; `None` leaves a variable undefined.
+        data: data whose `kinds` are set.
+        given: variable, assigned term and scope of each assignment; the term `None` leaves the variable undefined.
     """
     listed = list(given)
     data.kinds = {name: frozenset() for name, _, _ in listed}

@@ -1,4 +1,4 @@
-"""Writer of action plots as SCXML; skills, knowledge, dynamic states and timeouts are refused by name."""
+"""Writer of action plots as SCXML; it refuses skills, knowledge, dynamic states and timeouts."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ _SIGNS = {"=": "===", "!=": "!=="}
 
 
 def expression_text(e: Expression) -> str:
-    """Return a condition as a `cond`.
+    """Return the text of a `cond` attribute for a condition.
 
     Raises:
-        NotExpressibleError: it reads the knowledge base, or quantifies.
+        NotExpressibleError: the condition reads the knowledge base, or has a quantifier.
     """
     match e:
         case And(parts):
@@ -69,7 +69,7 @@ def expression_text(e: Expression) -> str:
 
 
 def term_text(term: Term) -> str:
-    """Return a term as an `expr`; raise `NotExpressibleError` for a fluent or a name that is not an identifier."""
+    """Return a term's `expr` text; raise `NotExpressibleError` for a fluent or a name that is not an identifier."""
     match term:
         case Constant(NO_VALUE.value):
             return "undefined"
@@ -86,7 +86,7 @@ def term_text(term: Term) -> str:
 
 
 def identifier(name: str) -> str:
-    """Return a variable's name if it is an identifier in ECMAScript too."""
+    """Return a variable's name; raise `NotExpressibleError` if the name is not an identifier in ECMAScript."""
     if not name.isidentifier():
         raise NotExpressibleError("variable", f"'{name}' is not an identifier in SCXML")
     return name
@@ -98,11 +98,11 @@ def _bracketed(e: Expression) -> str:
 
 
 def to_scxml(plot: ActionPlot) -> str:
-    """Return the plot as an SCXML document; `parse_scxml` reads it back as an equivalent chart.
+    """Return the plot as an SCXML document; `parse_scxml` returns an equivalent plot for this document.
 
     Raises:
         NotExpressibleError: a part of the plot has no counterpart in SCXML.
-        UnknownNameError: a transition names a missing state.
+        UnknownNameError: a transition refers to a missing state.
     """
     require_targets(plot)
     for what, there in (("parameters", plot.parameters), ("outputs", plot.outputs), ("rules", plot.rules),
@@ -211,7 +211,11 @@ class _Writer:
         _actions(element, transition.effect)
 
     def _block(self, around: ET.Element, tag: str, actions: Iterable[ExternalAction | Internal]) -> None:
-        """Write one element for each block; actions outside blocks form one block."""
+        """Add an element for each block of actions; actions without blocks share one element.
+
+        Raises:
+            NotExpressibleError: some actions are inside blocks and some outside.
+        """
         listed = tuple(actions)
         blocks: list[tuple[ExternalAction | Internal, ...]] = [one.block for one in listed if isinstance(one, Block)]
         if blocks and len(blocks) < len(listed):
@@ -246,7 +250,7 @@ def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -
 
 
 def _joined(parts: Sequence[Term]) -> str:
-    """Return the parts in sequence; `+` concatenates only if one of them is text."""
+    """Return an expression that concatenates the parts; without a text among several parts, `+` would add numbers."""
     texts = list(map(term_text, parts))
     joins = len(parts) == 1 or any(isinstance(part, Constant) and isinstance(part.value, str) for part in parts)
     return " + ".join(texts if joins else ['""', *texts])
