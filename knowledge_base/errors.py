@@ -36,7 +36,7 @@ The cost of a comparison is quadratic in this length.
 MAX_COMPARED = 50
 """Maximum number of valid names to compare with a misspelt name.
 
-If more names are valid, those that share the most pairs of letters are compared.
+If more names are valid, only the names that share the most pairs of letters are compared.
 """
 
 
@@ -84,7 +84,7 @@ def described(error: BaseException, *, named: bool = True) -> str:
 
     A group includes its first exceptions.
 
-    User code defines the type, metaclass and text of an exception, and each of them may fail. This function never
+    User code defines the type, metaclass and text of an exception, and each of these may fail. This function never
     raises.
 
     Args:
@@ -127,7 +127,7 @@ class InputError(Exception):
         message: the mistake, in one sentence without a full stop.
         place: the place of the mistake in the text.
         found: the wrong word as written, if any.
-        valid: the valid names, if they can be listed.
+        valid: the valid names; empty if no list of them exists.
     """
 
     def __init__(

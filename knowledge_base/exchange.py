@@ -32,7 +32,7 @@ FORMAT = "dsc-knowledge/2"
 MAX_WORLD_BYTES = 64 * 1024 * 1024
 """Maximum size of a world in JSON, in bytes: about a million facts.
 
-The read requires about ten bytes of memory for each byte.
+A reader needs about ten bytes of memory for each byte of the file.
 """
 _PARTS = ("format", "version", "schema_hash", "schema", "nodes", "facts", "values")
 

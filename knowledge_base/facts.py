@@ -62,8 +62,8 @@ class Delta:
         removed: facts that become false; a false fact has no effect.
         added: facts that become true.
         values: new values of functions; the key contains the function and its arguments.
-        removed_nodes: objects to remove, with all their facts and values. They are removed first: an object that is
-            also in `nodes` becomes a new object. An unknown object has no effect.
+        removed_nodes: objects to remove, with all their facts and values. These objects are removed first: an object
+            that is also in `nodes` becomes a new object. An unknown object has no effect.
         replaced: facts that become true, while facts that differ only in the last argument become false.
             `fact("at", "cup1", "shelf")` ends each other place of the cup. Always empty in an effective change.
     """
@@ -116,7 +116,8 @@ class Change:
         version: the version of the knowledge base after the change; consecutive versions differ by one.
         author: the author, e.g. a component's name.
         delta: the effective change.
-        time: time of the commit, in seconds of the knowledge base's clock; it never decreases. Equality ignores it.
+        time: time of the commit, in seconds of the knowledge base's clock; later changes never have an earlier time.
+            Equality ignores the time.
     """
 
     version: int

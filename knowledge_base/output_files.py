@@ -128,7 +128,7 @@ class Output:
                 raise self.refused(f"the command needs '{other}' for something else")
 
     def _is_special(self) -> bool:
-        """Return whether the file is written in place: it is not a regular file, or it is open already."""
+        """Return whether the file is written in place: a file that is not regular, or that is open already."""
         found = _status(self.path)
         return _descriptor(self.path) is not None or (found is not None and not stat.S_ISREG(found.st_mode))
 

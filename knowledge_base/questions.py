@@ -38,8 +38,8 @@ def _keep(kept: dict[_K, _T], key: _K, made: _T) -> None:
 class Questions:
     """Parser and checker of query texts for one schema and the known objects.
 
-    A query that passed the check is not checked again, not even after the removal of an object that it mentions. No
-    fact about a removed object is true.
+    A query that passed the check is not checked again, not even after the removal of an object in the query. No fact
+    about a removed object is true.
     """
 
     def __init__(self) -> None:

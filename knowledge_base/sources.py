@@ -1,7 +1,7 @@
 """Data sources: sensor streams and transforms by reference, with only the latest value (S4.9).
 
 A fluent that is bound to a source has the latest value of the source. Queries and installed conditions see the value
-immediately, in the present version. Versions, changes and journals do not contain it.
+immediately, in the present version. Versions, changes and journals do not contain this value.
 """
 
 from __future__ import annotations

@@ -80,11 +80,11 @@ class KnowledgeBase(View):
     ) -> KnowledgeBase:
         """Open a knowledge base in memory or in a file.
 
-        The caller must close the knowledge base, or use it in a `with` block.
+        The caller must close the knowledge base, or use the knowledge base in a `with` block.
 
         Args:
-            schema: the declarations; `None` uses the schema of the file. A schema that only adds declarations to the
-                schema of the file replaces it.
+            schema: the declarations; `None` uses the schema of the file. An extension of the file's schema (more
+                declarations, none changed) replaces the file's schema.
             path: the store's file, which is created if it is missing; `None` keeps the knowledge base in memory.
             durability: the failure that a commit survives. "process" is the end of this process (default with a path);
                 "power" also includes a power cut; "memory" is none (only without a path).
@@ -188,7 +188,7 @@ class KnowledgeBase(View):
     def transaction(
         self, author: str, *, expect: int | None = None, key: str | None = None, along: Writer | None = None
     ) -> Iterator[Transaction]:
-        """Commit the changes of a `with` block together at its end; discard them if the block raises.
+        """Commit the changes of a `with` block together at its end; discard the changes if the block raises.
 
         Queries of other threads continue during the block; changes of other threads wait for its end. If a change with
         the same `key` was committed before, the block runs without effect. `Transaction.change` is then that earlier
@@ -297,12 +297,12 @@ class KnowledgeBase(View):
     ) -> Condition:
         """Evaluate a condition at every later version, and fire when it becomes true (S2.4).
 
-        The cost of an update depends on the size of the change, see `conditions.join`. If the condition is true
-        already, it does not fire, but its hold time begins.
+        The cost of an update depends on the size of the change, see `conditions.join`. A condition that is true at its
+        installation does not fire, but its hold time begins.
 
         Args:
-            text: a condition. It is true if values for its free variables exist that make it true; these values are its
-                witness.
+            text: a condition. The condition is true if some values of its free variables make it true; these values are
+                its witness.
             params: variables of the condition with a fixed value.
             fire: `edge` fires when the condition becomes true; `each` also fires at every change of the set of its
                 witnesses while the condition is true.
@@ -331,8 +331,8 @@ class KnowledgeBase(View):
     ) -> Watch:
         """Return an asynchronous iterator over the later commits that match `pattern`.
 
-        If a change arrives while `limit` changes wait for the reader, all of them are discarded; the next item is a
-        `Missed`.
+        If a change arrives while `limit` changes wait for the reader, the watch discards the new and the waiting
+        changes; the next item is a `Missed`.
 
         Args:
             pattern: a predicate, function or type with arguments, e.g. `(on ?o table)`; `None` for all changes.
@@ -382,7 +382,7 @@ class KnowledgeBase(View):
         """Return a view of a past version.
 
         Args:
-            version: number of the version, i.e. of the changes before it.
+            version: number of the version, which equals the number of changes before.
             time: time in seconds of the clock; the view includes changes at exactly this time.
 
         Raises:
@@ -424,7 +424,7 @@ class KnowledgeBase(View):
     def digest(self) -> bytes:
         """Digest of the newest version in the store's file.
 
-        The digest covers all versions before it; in memory it is empty.
+        The digest covers all versions before it; in memory the digest is empty.
         """
         return self._history.digest
 

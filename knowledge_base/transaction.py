@@ -125,7 +125,7 @@ class Transaction:
 class GroupCommit:
     """Several commits, and rows of the caller, in one transaction of the file; see `KnowledgeBase.together`.
 
-    Only one thread at a time may use a `GroupCommit`; it may be used repeatedly. If an exception interrupts `__exit__`
+    Only one thread at a time may use a `GroupCommit`. Repeated use is allowed. If an exception interrupts `__exit__`
     before its first line, `__del__` rolls the block back.
 
     Args:

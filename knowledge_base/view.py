@@ -46,7 +46,7 @@ class View:
 
     @property
     def version(self) -> int:
-        """Number of the version, i.e. of the changes committed before it."""
+        """Number of the version, which equals the number of changes committed so far."""
         return self._version
 
     @property
@@ -54,7 +54,7 @@ class View:
         """The world as a read-only graph; `world.graph` describes its nodes and arcs.
 
         The first access builds the graph. In a `KnowledgeBase`, every later commit updates the graph; other threads
-        must not commit while a caller iterates over it.
+        must not commit while a caller iterates over the graph.
         """
         with self._lock:
             if self._graph is None:
@@ -74,7 +74,7 @@ class View:
             text: a condition such as `(and (on ?o ?table) (cup ?o))`.
             params: variables with a fixed value; the answers do not contain them.
             limit: maximum number of answers; the search ends after this number.
-            bounds: limits of work and seconds, and a cancellation; each of them ends the search with an error.
+            bounds: limits of work and seconds, and a cancellation; each limit ends the search with an error.
 
         Raises:
             OutOfBoundsError: the search exceeds its bounds, or is cancelled.
@@ -232,7 +232,7 @@ class View:
             return list(self._state.match(predicate, pattern))
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
-        """Return an upper bound of the number of facts that match `pattern`, without reading them."""
+        """Return an upper bound of the number of facts that match `pattern`, without reading the facts."""
         with self._lock:
             return self._state.estimate(predicate, pattern)
 

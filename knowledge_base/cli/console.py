@@ -66,7 +66,7 @@ def opened(source: Path, domain: Path | None = None) -> Iterator[Opened]:
 
 
 def opened_store(store: Path) -> KnowledgeBase:
-    """Open a store for reading; other kinds of sources are refused, as they have no history.
+    """Open a store for reading; other kinds of sources are refused, since only a store has a history.
 
     Raises:
         StoreError: the file is missing, or is not a store.

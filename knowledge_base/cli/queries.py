@@ -155,7 +155,7 @@ def history(
 
 
 def check(store: Store, json: Json = False) -> None:
-    """Read every row of a store's knowledge; check that it is complete and unchanged. For runs: `dsc runs check`."""
+    """Check that the knowledge of a store is complete and unchanged; reads every row. For runs: `dsc runs check`."""
     from knowledge_base.journal.archive import Archive
 
     archive = Archive(store.resolve(), None)

@@ -1,7 +1,7 @@
 """Shape of a condition: its text without values; conditions that differ only in their values share one join.
 
-`(on ?x table7)` and `(on ?y ?t)` with `t = shelf` both have the shape `(on ?A ?P)`. They are the rows `(table7)` and
-`(shelf)` of one join. The occurrences of a shape are the places where a change can affect the condition.
+`(on ?x table7)` and `(on ?y ?t)` with `t = shelf` both have the shape `(on ?A ?P)`. Both conditions are rows of one
+join: `(table7)` and `(shelf)`. The occurrences of a shape are the places where a change can affect the condition.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Kind = Literal["said", "type"]
 BOTH = 0
 """Polarity of values and of the inputs of computed predicates.
 
-Any change of them can make a condition true or false.
+Any change of a value or input can make a condition true or false.
 """
 
 

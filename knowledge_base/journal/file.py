@@ -1,8 +1,8 @@
 """The SQLite file of a store: connections, headers, and the meaning of SQLite's errors.
 
 Some processes cannot write a store, or cannot create SQLite's sidecar files. If the log of the store is empty, such a
-process reads the store in place without locks. Otherwise it reads a private copy of the store with its log, so that the
-last commits are included.
+process reads the store in place without locks. Otherwise such a process reads a private copy of the store and its log,
+which includes the last commits.
 """
 
 from __future__ import annotations

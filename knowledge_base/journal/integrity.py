@@ -4,7 +4,7 @@ Each row of a journal contains a digest of its content and of the row before it.
 row breaks the chain. The table `ends` records the tip of each chain when a store is closed. In an open store (after a
 crash, or with a running writer), the loss of the last rows is therefore not detected.
 
-The digests detect damage. They contain no secret, and therefore do not prove who wrote the rows.
+The digests detect damage. The digests contain no secret, and therefore do not prove the author of the rows.
 """
 
 from __future__ import annotations

@@ -41,8 +41,8 @@ from knowledge_base.world.state import WorldState
 SNAPSHOT_AFTER = 2_000_000
 """Minimum number of characters of changes between two snapshots.
 
-The read of this number of characters requires a fraction of a second. A snapshot of a longer world waits until the
-changes have as many characters as that world. Snapshots therefore at most double the size of the file and the work.
+SQLite reads this number of characters in a fraction of a second. A snapshot of a longer world waits until the changes
+have as many characters as that world. Snapshots therefore at most double the size of the file and the work.
 """
 
 _INSERT_CHANGE = "INSERT INTO changes VALUES (?, ?, ?, ?, ?)"

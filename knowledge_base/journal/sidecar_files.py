@@ -18,7 +18,7 @@ LOG, INDEX, OLD_LOG, LOCK, WORLD = "-wal", "-shm", "-journal", "-lock", "-world"
 ENDINGS = (LOG, INDEX, OLD_LOG, LOCK, WORLD)
 """Endings of the sidecar files.
 
-They are SQLite's log, its index and its rollback journal, the writer lock, and the simulated world of a run.
+The files are SQLite's log, its index and its rollback journal, the writer lock, and the simulated world of a run.
 """
 MODE = 0o644
 _KINDS = {
@@ -203,8 +203,8 @@ def _beside(path: Path) -> Path | None:
 def place(path: Path, content: bytes, *, locked: bool = False, synced: bool = False, lasting: bool = False) -> int:
     """Create a file; return its file descriptor for reading and writing.
 
-    The file has no name until it is complete. On a file system without nameless files, it has a random name until then;
-    the file remains under this name if the process is killed.
+    The file has no name until it is complete. On a file system without nameless files, the file has a random name until
+    then; the file keeps this name if the process is killed.
 
     Args:
         path: the path of the new file.

@@ -1,16 +1,17 @@
 """Transactions of a store's writer: a block is written completely or not at all.
 
-The context managers here are classes instead of generators, to be fast: every change and every macrostep of a kept run
-uses them.
+The context managers here are classes, which are faster than generators. Every change and every macrostep of a kept run
+uses these context managers.
 
 A thread moves committed pages from SQLite's log into the store file (SQLite's `checkpoint`). A checkpoint waits for the
 disk twice, which would delay commits. One thread serves all stores of the process in turn, with pauses, so that the
 disk has time for commits.
 
 SQLite from 3.7.0 to 3.51.2 (except 3.44.6 and 3.50.7) may lose commits; see https://www.sqlite.org/wal.html#walresetbug
-for the details. The error requires a checkpoint that completes, another checkpoint soon after it, and a commit that
-restarts the log during the second one. A later checkpoint may then skip committed pages. The thread therefore accepts a
-request only together with a commit that left pages in the log. A caller must call `leave` before its own checkpoint.
+for the details. The error requires a completed checkpoint, a second checkpoint soon after the first, and a commit that
+restarts the log during the second checkpoint. A later checkpoint may then skip committed pages. The thread therefore
+accepts a request only together with a commit that left pages in the log. A caller must call `leave` before its own
+checkpoint.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from knowledge_base.errors import InputError, ParseError, Place
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of a PDDL file in bytes: about a million facts.
 
-The read requires about 90 µs for each fact, and 100 bytes of memory for each byte.
+A reader needs about 90 µs for each fact, and 100 bytes of memory for each byte of the file.
 """
 WRITER_S = 3.0
 """Time in seconds to wait until a process writes into a pipe."""
@@ -145,7 +145,7 @@ def files_beside(path: Path) -> list[str]:
 def _piece(handle: int, path: Path, size: int, *, begun: bool) -> bytes:
     """Return the next bytes, at most `size`; empty at the end.
 
-    Before its first bytes, a pipe without a writer is not at its end: a writer may still open it.
+    A pipe without a writer is not at its end before its first bytes: a writer may still open the pipe.
     """
     patience = time.monotonic() + WRITER_S
     while True:

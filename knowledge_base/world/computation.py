@@ -1,7 +1,7 @@
 """Computed predicates: Python functions of facts and values, e.g. `(near ?a ?b)` of two positions.
 
-A computed predicate declares the facts and values that it reads. Only a change of these inputs evaluates an installed
-condition with the predicate again.
+A computed predicate declares the facts and values that it reads. An installed condition with the predicate is evaluated
+again only after a change of these inputs.
 """
 
 from __future__ import annotations

@@ -282,7 +282,7 @@ class _Admission:
                 self.other_argument(value, known, parameter, fact)
 
     def other_argument(self, value: Value, known: str | None, parameter: TypedVariable, fact: Fact) -> None:
-        """Check an argument that is not an object of the right type: it is a value or a mistake."""
+        """Check an argument that is not an object of the right type; only a value of the right type is valid."""
         wanted = parameter.types or (ROOT_TYPE,)
         if value_fits(value, wanted):
             what = f"the argument '?{parameter.name}' of {fact.predicate}"

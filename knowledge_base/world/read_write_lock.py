@@ -44,9 +44,9 @@ class Exit(Protocol):
 class FairLock:
     """Re-entrant lock that admits threads in order of arrival; used as a context manager.
 
-    A thread that finds the lock free acquires it immediately until the patience of the first waiting thread ends. After
-    that time, each new thread joins the line at its end. A handover between threads costs more than most of the work
-    under the lock.
+    A thread that finds the lock free acquires the lock immediately, until the patience of the first waiting thread
+    ends. After that time, each new thread joins the line at its end. A handover between threads costs more than most of
+    the work under the lock.
 
     Args:
         patience_s: time in seconds for which the first waiting thread lets other threads acquire the lock first.
@@ -86,7 +86,7 @@ class FairLock:
         except BaseException:
             self.let_go()
             raise
-        if not marked_here:  # no calls after this line: an interrupt could come before them
+        if not marked_here:  # no call may follow: an interrupt could precede the call
             self.marked = False
 
     def let_go(self) -> None:
@@ -97,7 +97,7 @@ class FairLock:
             return
 
     def take_if_free(self) -> bool:
-        """Acquire the lock unless another thread has it or waits; return whether this thread has acquired it."""
+        """Acquire the lock unless another thread has or awaits the lock; return whether this thread has acquired it."""
         return not self._gates and self._acquire(False)  # noqa: FBT003  see `__enter__`
 
     def _wait(self) -> None:
@@ -193,7 +193,7 @@ class ReadWriteLock:
                 if not may_change:
                     self._alone.let_go()
             raise
-        self._lock.marked = True  # no calls after this line: an interrupt could come before them
+        self._lock.marked = True  # no call may follow: an interrupt could precede the call
 
     def _begin_alone(self) -> None:
         if self._may_change():

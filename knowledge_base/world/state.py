@@ -47,7 +47,7 @@ class FactIndex:
         return listed if exact else _agreeing(listed, pattern)
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
-        """Return an upper bound of the number of facts that match `pattern`, without reading them."""
+        """Return an upper bound of the number of facts that match `pattern`, without reading the facts."""
         return len(self._listed(predicate, pattern))
 
     def _listed(self, predicate: str, pattern: tuple[Value | None, ...]) -> Collection[Args]:

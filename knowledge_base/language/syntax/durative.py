@@ -67,8 +67,9 @@ class DurativeParts:
     def precondition(self) -> Expression:
         """The condition before the action under which the action can start and end without other actions.
 
-        The result contains the condition at the start. From the other conditions, it contains the parts whose truth the
-        start effect does not decide. The effect decides a part with the same predicate and the same variables.
+        The result contains the condition at the start. From the other conditions, the result contains the parts whose
+        truth the start effect does not decide. The effect decides a part with the same predicate and the same
+        variables.
         """
         later = [_after(e, self.start_effect, frozenset()) for e in (self.over_all, self.end)]
         return _conjunction([part for e in (self.start, *later) for part in _conjuncts(e)])

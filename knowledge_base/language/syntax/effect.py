@@ -1,7 +1,7 @@
 """Effects as immutable values: the changes of an action (PDDL 2.1 effects with `forall` and `when`).
 
-The depth of values that Python code constructs is not limited. `check_depth` validates them without recursion, because
-all functions that walk through them are recursive.
+The depth of values that Python code constructs is not limited. `check_depth` checks the depth without recursion,
+because all functions that walk through such values are recursive.
 """
 
 from __future__ import annotations
