@@ -1,1 +1,1 @@
-"""Ready worlds, each with a PDDL domain, plots, components and a simulation."""
+"""Ready worlds; each consists of a PDDL domain, plots, components and a simulation."""

@@ -232,7 +232,7 @@ def _print(report: Report, *, as_json: bool) -> None:
 
 
 def main() -> None:
-    """The entry point: bad input becomes one message and exit status 2, never a traceback."""
+    """Run the command line; report bad input as one message with exit status 2, and never as a traceback."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # a terminal may not support every character
             stream.reconfigure(errors="backslashreplace")

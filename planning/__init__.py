@@ -1,4 +1,4 @@
-"""Planning: from a goal to a plan, from a plan to an action plot, and to a new plan when the world changes."""
+"""Planning: plans for goals, action plots for plans, and new plans when the world changes."""
 
 from knowledge_base._lazy import lazy_exports
 

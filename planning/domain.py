@@ -71,7 +71,7 @@ class PlanningDomain:
 
     `axioms` define derived predicates. `notes` list harmless irregularities of the files, with their places.
 
-    Methods that take a step and a world raise `UnknownNameError` if the domain lacks the step's action. They raise
+    Methods with a step as a parameter raise `UnknownNameError` if the domain lacks the step's action. They raise
     `InputError` for a wrong number of arguments.
     """
 
@@ -107,7 +107,7 @@ class PlanningDomain:
         Args:
             fragments: at least one domain, PDDL file (a `Path`, or a file name) or PDDL text.
             computed: predicates in the conditions that Python code computes. A `PlanningDomain` among the fragments
-                adds its own.
+                adds its own computed predicates.
 
         Raises:
             InputError: a fragment cannot be read or contains an error, or two fragments contradict each other; the

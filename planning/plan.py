@@ -84,7 +84,7 @@ class PlanFound:
         simulated_seconds: simulated time of the search; depends on the problem only.
         reproducible: whether equal problems lead to equal plans, because no limit in real time influenced the search.
         cost: the total cost of the plan's actions, by default their number; with a schedule, the makespan in seconds.
-        from_cache: whether the plan comes from a cache.
+        from_cache: whether a cache provided the plan.
         failures: the failures of other engines that received the same problem.
         translated: processor time of the translation into the engine's input, in seconds; a part of `seconds`.
     """

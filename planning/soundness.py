@@ -23,8 +23,8 @@ def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[
 
     A plot may implement an unknown action or have a parameter that its action lacks. An action may lack a plot.
 
-    All plots of one action must declare the same `effects`, either `observed` or `assumed`. A generated plot is made
-    before one of these plots is chosen, and might otherwise wait for effects that no skill reports.
+    All plots of one action must declare equal `effects`, either `observed` or `assumed`. A generated plot exists before
+    one of these plots is chosen. With different effects it might wait for effects that no skill reports.
 
     A domain without any implemented action is valid, because a program may use the domain without a planner.
     """

@@ -130,8 +130,8 @@ class Problem:
         init: the relevant facts that hold initially.
         goal: the facts that must hold at the end; empty if the goal already holds.
         actions: the ground actions that can contribute to the goal.
-        unreachable: goal facts, as text, that are unreachable even without deletes. If it is not empty, the problem is
-            proven unsolvable without an engine.
+        unreachable: goal facts, as text, that are unreachable even without deletes. If there are such facts, the
+            problem is proven unsolvable without an engine.
         unsliced: constructs `whole`; `None` if no object was removed.
         numbers: the initial values of the relevant numeric fluents.
         bounds: numeric conditions that must hold at the end.
@@ -208,12 +208,16 @@ class Problem:
         return self.taking(chosen)
 
     def taking(self, chosen: Iterable[int]) -> Plan:
-        """Return the steps of the actions with these indices, without bookkeeping."""
+        """Return the plan of the actions with these indices, without bookkeeping actions."""
         steps = (self.actions[index].step for index in chosen)
         return Plan(tuple(step for step in steps if step is not None))
 
     def scheduled(self, chosen: Sequence[tuple[int, float, float]]) -> Plan | str:
-        """Return the plan of actions (index, start and duration in seconds) at their times, or why it is invalid."""
+        """Return the plan with a schedule, or the reason why the plan is invalid.
+
+        Args:
+            chosen: index, start and duration of each action; times in seconds.
+        """
         chosen = sorted(chosen, key=itemgetter(1))
         acts = []
         for index, start, seconds in chosen:

@@ -1,7 +1,7 @@
 """Conversion between the problems of unified-planning and the problems of this project.
 
 Both conversions use PDDL text, so that the readers and writers of both projects check each other. The import of
-unified-planning takes a second, so other modules import this module only on use.
+unified-planning takes a second, so other modules import this module only when they need a conversion.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """The scenario: a YAML file with the items on the table at the start.
 
-By number, named cup1, cup2, …, can1, …, crisp_can1, …:
+The file lists items by their number; their names are then cup1, cup2, …, can1, …, crisp_can1, …:
 
     table: {cups: 4, cans: 3, crisp_cans: [small, large]}
 
-or by name, alone or with numbered ones:
+The file may also list items by name, with or without numbered items:
 
     table:
       items:
@@ -15,8 +15,8 @@ or by name, alone or with numbered ones:
     faults: 0.2         # optional: chance of a fault per skill call
     robot_at: operator  # optional: table, shelf, floor, sink, bin or operator
 
-Kinds are `cup`, `can` and `crisp_can`; a crisp can is `small` (takes one can) unless it is `large` (two). A name is a
-PDDL name in lower case. At most 200 items.
+Kinds are `cup`, `can` and `crisp_can`. A crisp can has the size `small` (the default, room for one can) or `large`
+(room for two cans). A name must be a PDDL name in lower case. A file must list at most 200 items.
 """
 
 from __future__ import annotations

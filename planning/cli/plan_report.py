@@ -95,7 +95,7 @@ def _text(answer: Mapping[str, Any]) -> str:
 
 
 def _plan_text(answer: Mapping[str, Any]) -> str:
-    """Return the plan as text, one step per line, by chains if they are given, with waits and purposes."""
+    """Return the plan as text, one step per line, with the chains, waits and purposes that the answer contains."""
     lanes = answer.get("lanes") or [range(1, len(answer["steps"]) + 1)]
     lines: list[str] = []
     for number, lane in enumerate(lanes, 1):

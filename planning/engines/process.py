@@ -118,7 +118,7 @@ class EngineProcess:
 
     def wake(self) -> None:
         """Wake the thread that waits for an answer, so that it checks its deadline again."""
-        with contextlib.suppress(BlockingIOError):  # the pipe is full, so the thread wakes anyway
+        with contextlib.suppress(BlockingIOError):  # the pipe is full, so the thread wakes in any case
             os.write(self._wake, b"!")
 
     def start(self, seconds: float) -> None:

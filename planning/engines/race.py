@@ -217,7 +217,7 @@ class CachingPlanner:
         self._known: OrderedDict[Hashable, PlanFound | ProvenUnsolvable] = OrderedDict()
 
     async def solve(self, problem: Problem, seconds: float) -> PlanningOutcome:
-        """Return the outcome; a cached plan has `from_cache` and its search takes no time."""
+        """Return the outcome; a cached plan has `from_cache`, and no search is needed."""
         async with aclosing(self.plans(problem, seconds)) as plans:
             return await anext(plans)
 

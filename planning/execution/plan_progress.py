@@ -98,7 +98,7 @@ def _possible(
 
 
 def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> float:
-    """Return the `(total-cost)` of the steps, executed from `world`; their number if it is not declared."""
+    """Return the `(total-cost)` of the steps from `world`; the number of steps if the domain lacks that function."""
     if TOTAL_COST.function not in domain.schema.functions:
         return len(steps)
     ahead = Overlay(world)
@@ -202,7 +202,7 @@ class PlanProgress:
         return self._needs.before(self.remaining)
 
     def needed_by(self, numbers: tuple[int, ...]) -> Mapping[Expression, int] | None:
-        """Return the same as `needed` if only the steps with these numbers remained, in this order."""
+        """Return the conditions of `needed` as if only the steps with these numbers remained, in this order."""
         return self._needs.before(numbers)
 
     def steps_of(self, numbers: Iterable[int]) -> tuple[PlanStep, ...]:
@@ -210,7 +210,7 @@ class PlanProgress:
         return tuple([self.steps[number - 1] for number in numbers])
 
     def needed_later(self) -> Mapping[Expression, int] | None:
-        """Return the same as `needed` if all running steps were done."""
+        """Return the conditions of `needed` as if all running steps were done."""
         return self._needs.before(self._after(self.running))
 
     def stands(self, world: World) -> bool:
@@ -248,7 +248,7 @@ class LocalRepair:
     def repaired(
         self, first: Plan, before: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression
     ) -> Plan | None:
-        """Return the plan of the solution `first` and the kept end; `None` if it is invalid or too long."""
+        """Return the plan of the solution `first` and the kept end; `None` if this plan is invalid or too long."""
         plan = Plan((*first.steps, *self.end))
         short = len(plan.steps) <= len(before) + MOST_LONGER
         return plan if short and validate(plan, domain, world, goal).valid else None
@@ -278,7 +278,10 @@ def local_repair(
         WorkLimitError: the limit has passed.
     """
     derived = derivation(domain)
-    closed, left = derived.world(world), before.remaining  # read once, since the plan may continue meanwhile
+    closed, left = (
+        derived.world(world),
+        before.remaining,
+    )  # read only once, since the plan may continue during the repair
     if derived.recursive:  # the conditions in `before` belong to another state of the world
         before = before.renewed(derived.domain, derived.expand(goal))
     ends = (left[first:] for first in range(min(_MOST_LEFT_OUT + 1, len(left))))

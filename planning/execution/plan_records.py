@@ -80,7 +80,7 @@ class PlanRecords:
         self._trace.record("plan.replaced", plot=new, after=old, kept=kept)
 
     def resumed(self, old: str, new: str, step: PlanStep, why: str, instead_of: str | None) -> None:
-        """Record that a plan resumes at a step; another candidate replaces `instead_of` if that is given."""
+        """Record that a plan resumes at a step; if `instead_of` is given, another candidate replaces it."""
         other = {} if instead_of is None else {"instead_of": instead_of}
         self._trace.record("plan.resumed", plot=new, after=old, step=str(step), why=why, **other)
 

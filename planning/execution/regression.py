@@ -122,7 +122,7 @@ def _leaves(effect: Effect, variables: tuple[TypedVariable, ...], condition: Exp
 
 
 def _atom(atom: Atom, changes: Sequence[Leaf]) -> Expression:
-    """Return the condition that the atom was added, or was true and not deleted; an addition precedes a deletion."""
+    """Return the condition that the atom was added, or was true and not deleted; an addition overrides a deletion."""
     added: list[Expression] = []
     deleted: list[Expression] = []
     for leaf in changes:
@@ -136,7 +136,7 @@ def _atom(atom: Atom, changes: Sequence[Leaf]) -> Expression:
 
 def _comparison(e: Comparison, changes: Sequence[Leaf]) -> Expression:
     if isinstance(e.left, Constant | Variable) and isinstance(e.right, Constant | Variable):
-        return _decided(e.operator, e.left, e.right) or e  # a shortcut with the same result as the general case
+        return _decided(e.operator, e.left, e.right) or e  # a shortcut with the result of the general case
     return disjunction(
         conjunction((before_left, before_right, _compared(e.operator, new_left, new_right)))
         for before_left, new_left in _values(e.left, changes)
@@ -338,7 +338,9 @@ def _plain(changes: Iterable[Leaf]) -> _Plain | None:
         if one.variables or one.condition != TRUE or isinstance(one.change, NumericEffect) or _is_open(one.change.atom):
             return None
         (adds if isinstance(one.change, Add) else deletes)[one.change.atom] = None
-    return _Plain(tuple(adds), tuple([atom for atom in deletes if atom not in adds]))  # an addition precedes a deletion
+    return _Plain(
+        tuple(adds), tuple([atom for atom in deletes if atom not in adds])
+    )  # an addition overrides a deletion
 
 
 def _is_open(e: Expression) -> bool:

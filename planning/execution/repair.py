@@ -98,7 +98,7 @@ class Plotting:
         Args:
             run: the plan in execution.
             plan: the steps, possibly with a schedule.
-            known: the partial order of the steps; computed if omitted.
+            known: the partial order of the steps; this method computes the order if `known` is omitted.
             instead_of: the candidate that the first step must try last.
         """
         order = self._order(plan, run.goal, known)

@@ -40,7 +40,7 @@ class Usage:
 
     Attributes:
         components: the names of the components that the plots call, configure or switch.
-        anything: whether the plots may use other components too, because they plan or use a plot given as a value.
+        anything: whether the plots may use other components too, since they plan or use a plot from a variable.
         seconds: the sum of the time limits of all skill calls, in seconds.
     """
 

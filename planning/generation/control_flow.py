@@ -3,11 +3,13 @@ r"""One control flow of a generated plot: a sequence of steps, some of which wai
         before_3 -> step_3 -> after_3 -> before_5 -> step_5 -> after_5 -> finished_1
                \-> replan_1, if a condition of a step does not hold
 
-- `after_n` waits until the step's effects are observed.
-- `before_n` waits for steps of other flows, which set the variables `done_n` and `begun_n`. It then checks the
-  conditions of the step, so that no step begins with a false precondition. Without such steps `after_n` does that too.
-- `held` is set when the planner's component announces other steps instead. No step begins after that.
-- `step_n_skipped` exists for a step that rules may skip: `after_n` without waiting for the step's effects.
+- `after_n` waits until the effects of step n are observed.
+- `before_n` waits for steps of other flows, which set the variables `done_m` and `begun_m`, and then tests the
+  conditions of step n. No step therefore begins with a false precondition. If step n need not wait for other flows,
+  the previous `after` state tests the conditions of step n.
+- The variable `held` becomes true when the planning component announces that other steps replace the plan. No step
+  begins after that.
+- The state `step_n_skipped` exists if rules may skip step n. It replaces `after_n` and does not wait for effects.
 """
 
 from __future__ import annotations

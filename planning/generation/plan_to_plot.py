@@ -1,10 +1,10 @@
-r"""From a plan to a plot: each step is a dynamic state over the plots that implement it (S0.12, S1.5, S2.7).
+r"""Generation of plots from plans; a step becomes a dynamic state whose candidates implement it (S0.12, S1.5, S2.7).
 
         before_1 -> step_1 -> after_1 -> step_2 -> after_2 -> ... -> finished
                \-> replan, if a condition of a step does not hold
 
-Independent steps are in parallel regions (`planning.generation.control_flow`). A region is a chain of the plan's
-partial order, mostly the steps of one robot. Outcomes without an inherited rule lead to `replan`.
+Independent steps are in parallel regions (`planning.generation.control_flow`). Each region contains a chain of the
+plan's partial order, usually the steps of one robot. An outcome without an inherited rule leads to `replan`.
 """
 
 from __future__ import annotations

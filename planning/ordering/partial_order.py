@@ -175,8 +175,8 @@ Kin = Callable[[int, int], bool]
 def chains(earlier: Mapping[int, frozenset[int]], kin: Kin) -> tuple[tuple[int, ...], ...]:
     """Return the fewest chains that together contain each step exactly once, ordered by their first steps.
 
-    In a chain, each step ends before the next step begins. Among the solutions with the fewest chains, the result
-    contains as many neighbours that satisfy `kin` as a maximum matching of such pairs.
+    In a chain, each step ends before the next step begins. The search first matches as many pairs that satisfy `kin` as
+    possible, and then extends this matching by other pairs.
 
     Args:
         earlier: for each step, in order, the steps that end before it begins.

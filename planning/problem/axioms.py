@@ -47,7 +47,7 @@ class Derivable:
 
     @staticmethod
     def of(domain: PlanningDomain) -> Derivable | None:
-        """Return the compiled domain; `None` if it is not needed, or if durative actions may falsify a derived fact."""
+        """Return the compiled domain; `None` if superfluous, or if durative actions may falsify a derived fact."""
         original = derivation(domain)
         predicates = frozenset(original.unsupported)
         plain = original.domain

@@ -235,7 +235,7 @@ TOTAL_COST = Call("total-cost")
 
 
 def metric_of(metric: Metric | None, schema: Vocabulary) -> Term | None:
-    """Return the term to minimize; by default `(total-cost)` if it is declared, otherwise `None`."""
+    """Return the term to minimize; by default `(total-cost)` if the schema declares that function, otherwise `None`."""
     if metric is not None:
         return metric.term if metric.direction == "minimize" else Arithmetic("-", (metric.term,))
     declared = schema.functions.get(TOTAL_COST.function)

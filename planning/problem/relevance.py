@@ -119,7 +119,7 @@ class Construct:
 
 
 def numeric_constructs(domain: PlanningDomain, goal: Expression) -> Iterator[Construct]:
-    """Yield the numeric conditions that are relevant to `goal`: first those of the goal, then those of actions."""
+    """Yield the numeric conditions relevant to `goal`: first conditions of the goal, then conditions of actions."""
     derived = derivation(domain)
     goal = derived.expand(goal)
     matters = relevant(goal, None, derived.domain.actions.values())
