@@ -1,9 +1,9 @@
 """Execution of skills whose body blocks, in a thread or in a new process.
 
-A cancellation and a deadline always take effect. While a body blocks, simulated time does not advance, so its deadline
-counts real seconds. Threads are daemons: a thread that ignores the stop request is abandoned after `STOPPING` seconds
-and does not keep the program alive. A process is ended, also when the program dies. So no body of the old program acts
-while another program resumes the run.
+A cancellation and a deadline always take effect. While a body blocks, simulated time does not advance, so the body's
+deadline counts real seconds. Threads are daemons: a thread that ignores the stop request is abandoned after `STOPPING`
+seconds and does not keep the program alive. A process is ended, also when the program dies. So no body of the old
+program acts while another program resumes the run.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class BlockingCall:
         """Wait for `seconds` of real time; with 0, only check for a stop request.
 
         Raises:
-            StoppedError: the skill was cancelled, or its deadline has passed.
+            StoppedError: the skill was cancelled, or the skill's deadline has passed.
         """
         if self.stopping.wait(seconds):
             raise StoppedError
@@ -130,7 +130,7 @@ async def _supervised(
     ended: asyncio.Future[Outcome] = loop.create_future()
 
     def post(tell: Callable[[Any], None], value: object) -> None:
-        with suppress(RuntimeError):  # the loop is closed: this work was abandoned
+        with suppress(RuntimeError):  # the loop is closed, as this work was abandoned
             loop.call_soon_threadsafe(lambda: None if ended.done() else tell(value))
 
     def run() -> None:
@@ -249,7 +249,7 @@ def _child(
     try:
         theirs.send(("ended", body(call, **arguments)))
     except BaseException as error:  # noqa: BLE001  # any error reaches the parent as text
-        with suppress(OSError):  # the parent has ended
+        with suppress(OSError):  # the parent process has ended
             theirs.send(("error", described(error)))
 
 

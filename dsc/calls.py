@@ -47,7 +47,7 @@ class SkillCall:
         clock: the only clock that a skill may use.
         report: posts an intermediate event while the skill continues (e.g. progress, a perception).
         deadline: second of run time at which the skill is cancelled.
-        give_up: reports a part of the skill that continues and cannot be stopped, as text.
+        give_up: reports, as text, that a part of the skill continues and cannot be stopped.
 
     After a crash, a resumed run may repeat a call with an equal id. The clock of the repeated call begins at the start
     of the action, and repeated reports are dropped. So a skill that acts only one time for each id executes the same
@@ -99,7 +99,8 @@ class Reports:
 
     The queue posts reports in order; at most `MOST_WAITING` posted reports wait for the sequencer. Further reports are
     conflated: the queue keeps the newest report of each event, and merges all their observations into one change. So no
-    observation is lost. The conflated reports are posted when half of the posted ones were consumed, or at the end.
+    observation is lost. The conflated reports are posted when the sequencer has handled half of the posted reports, or
+    at the end.
 
     Args:
         post: receives a report, and the number of older reports of its event that the report replaces.
@@ -127,7 +128,7 @@ class Reports:
                 self._observed = [_as_one(self._observed)]
 
     def taken(self) -> None:
-        """Count one posted report as consumed; post the conflated reports if few reports wait."""
+        """Count one posted report as handled; if few reports wait, post the conflated reports."""
         self._waiting -= 1
         if self._aside and self._waiting <= MOST_WAITING // 2:
             self.flush()

@@ -36,7 +36,7 @@ FAILURES = frozenset({SKILL_ERROR, TIMED_OUT})
 If no state of the skill's plot handles such an event, the states around the plot may handle it.
 """
 LED_AWAY = "then."
-"""Prefix of an outcome of a generated plot; the outcome leads to a state of the plot that has the goal."""
+"""Prefix of an outcome of a generated plot; such an outcome leads to a state of the plot that declares the goal."""
 ERRORS = frozenset({ERROR, EXECUTION_ERROR})
 
 TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
@@ -66,8 +66,8 @@ class Event(NamedTuple):
     Attributes:
         name: the label of transitions.
         attributes: data, read in charts as `?event.attribute`.
-        to: the activation (serial number of one entry into one state) that receives the event. Only that state and the
-            states around it in the same plot see the event. The event is dropped if that state is no longer active.
+        to: the activation (serial number of one entry into one state) that receives the event. Only that state, and the
+            states around it in its plot, receive the event. The event is dropped if that state is no longer active.
         exact: with `to`: only that state may handle the event.
         frame: the plot instance in which the event is visible. Without `to` and `frame`, it is visible everywhere.
         number: the index of the state's timeout or period.

@@ -17,10 +17,10 @@ class SkillMessage:
 
     Attributes:
         start: the start of the skill.
-        outcome: event, attributes and observed facts.
+        outcome: the skill's event with its attributes, and the observed facts.
         final: whether this message ends the skill.
-        goes_on: whether the skill still executes although it counts as ended; the sequencer then cancels it.
-        conflated: number of older reports of the same event that this message replaces, see `dsc.calls`.
+        goes_on: whether the skill still executes although it counts as ended; the sequencer then cancels the skill.
+        conflated: number of older reports of an equal event that this message replaces, see `dsc.calls`.
         declared: the declared types of the outcome's attributes; `None` if there are no types to validate.
     """
 

@@ -30,12 +30,12 @@ from knowledge_base.language.checking.inputs import shown
 AfterCrash = Literal["repeat", "same_id", "sense"]
 """The reaction to an action whose effect is unknown after a crash.
 
-`repeat` executes the action again, as it is idempotent. `same_id` executes it with its former id, for which the
-component acts only one time. `sense` observes the world first, without a repetition.
+`repeat` executes the action again; the action must be idempotent. `same_id` executes the action with its former id, for
+which the component acts only one time. `sense` observes the world first, without a repetition.
 """
 
 SkillBody = Callable[..., Any]
-"""The decorated function: a coroutine function or, if it blocks, a plain function; both return an `Outcome`."""
+"""The decorated function, which returns an `Outcome`: a coroutine function or, if the body blocks, a plain function."""
 _Body = TypeVar("_Body", bound=SkillBody)
 Pattern = Literal["skill", "query", "event"]
 """The communication pattern of a `trigger` (S1.1).

@@ -58,7 +58,7 @@ The function may store the record, which is immutable.
 
 
 class Trace:
-    """Source of numbered records for listeners; it stores no record.
+    """Source of numbered records for listeners; the trace itself stores no record.
 
     Args:
         now: returns the seconds of run time.

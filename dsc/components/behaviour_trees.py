@@ -54,8 +54,8 @@ def tree_skill(
     The observation of an action is asserted when the action ends, regardless of the skill's outcome.
 
     Args:
-        success: the outcome when the root succeeds.
-        failure: the outcome when the root fails.
+        success: the outcome if the root of the tree succeeds.
+        failure: the outcome if the root of the tree fails.
         outcomes: `success` and `failure`, both without attributes, and the outcomes that actions report.
         types: types of the parameters, as for `skill`.
         period: seconds of run time between two ticks.

@@ -64,8 +64,8 @@ class ComponentHooks:
     async def configure(self, parameter: str, value: object) -> None:
         """Set a named parameter, for the *param* port; override to react to the new value.
 
-        The value `None` resets a declared parameter. The parameters that depend on it are reset too, see
-        `Parameter.depends_on`.
+        The value `None` resets a declared parameter. The parameters that depend on the named parameter are reset too,
+        see `Parameter.depends_on`.
 
         Raises:
             UnknownNameError: the component declares parameters, and `parameter` is not among them.
@@ -90,7 +90,7 @@ class RestartHooks:
         return Status.UNKNOWN
 
     async def abandon(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Ended | None:  # noqa: ARG002
-        """Stop an action that was cancelled just before a crash, if it still runs.
+        """Stop an action that was cancelled just before a crash, if the action still runs.
 
         The cancellation may not have reached the robot. Override this hook if actions outlast this process.
 
@@ -125,7 +125,7 @@ class Component(ComponentHooks, RestartHooks):
     """
 
     _ports: ClassVar[Mapping[str, Push | Stream]] = {}
-    _functions: Mapping[str, SkillBody] = {}  # skills that are functions
+    _functions: Mapping[str, SkillBody] = {}  # skills that are functions, by name
 
     def __init_subclass__(cls, **named: Any) -> None:
         """Validate the declared parameters, and collect the ports; raise `InputError` for an invalid declaration."""
@@ -209,7 +209,7 @@ class Component(ComponentHooks, RestartHooks):
                 await self.configure(parameter, value)
 
     async def change_mode(self, mode: str) -> None:
-        """Execute a chart's `switch`: enter a mode, restart (`init`) or shut down (`shutdown`).
+        """Execute a chart's `switch`: enter a mode, restart (mode `init`) or shut down (mode `shutdown`).
 
         Raises:
             UnknownNameError: the component declares its modes, and `mode` is not among them.

@@ -113,7 +113,7 @@ def encoded(value: Any) -> bytes:
 
 @dataclass(slots=True)
 class _Peer:
-    """One sender between its start and its end; a restarted sender is another peer.
+    """State about one sender, from the sender's start to its end; a restarted sender is another peer.
 
     Attributes:
         answers: encoded answers by the call's number; `None` while the call runs.

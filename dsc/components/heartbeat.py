@@ -35,7 +35,7 @@ class Heartbeat:
         self._needs = needs
         self._changed = changed
         self._root = root
-        self._activators: dict[str, float] = {}  # with the second of the last heartbeat
+        self._activators: dict[str, float] = {}  # by name, the loop time of the last heartbeat
         self._stirred = asyncio.Event()
         self.active = False
         endpoint.hear("heartbeat", self._heard)

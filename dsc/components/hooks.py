@@ -1,4 +1,4 @@
-"""Calls of hooks, which a robot's builder wrote: each hook returns a value or raises an `Exception`.
+"""Containment of hooks, which a robot's builder wrote: each hook returns a value or raises an `Exception`.
 
 Otherwise, `sys.exit` in a hook would end the program with the hook's task. So would an exception whose class does not
 derive from `Exception`.
@@ -18,7 +18,7 @@ from typing import Any
 from knowledge_base.errors import described
 
 
-class contained:  # noqa: N801  # a context manager, as `suppress`
+class contained:  # noqa: N801  # a context manager, named like `suppress`
     """Context manager in which a hook runs: an exception that is not an `Exception` becomes a `RuntimeError`.
 
     A cancellation by another task, the closing of the coroutine, and Ctrl-C pass unchanged.
@@ -49,7 +49,7 @@ def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:
     kind = type(error)  # `isinstance` would read the exception's `__class__`, which may fail
     if issubclass(kind, asyncio.CancelledError):
         return task is not None and task.cancelling() == 0
-    if issubclass(kind, GeneratorExit):  # a coroutine is closed by others, never by the task that runs it
+    if issubclass(kind, GeneratorExit):  # other code closes a coroutine, never the task that runs it
         return task is running_task()
     return not (issubclass(kind, KeyboardInterrupt) and _from_keyboard(error))
 

@@ -119,7 +119,7 @@ _NO_REPORT = {"report": outcome_form(Outcome(OBSERVED))}
 
 @dataclass(slots=True)
 class _Action:
-    """An action of a client, with its reports and its end as messages."""
+    """An action of a client, with the action's reports and end as messages."""
 
     client: str
     task: asyncio.Task[None] | None = None
@@ -133,7 +133,7 @@ class _Action:
         return self.task is None or self.task.done()
 
     def take(self, received: int) -> None:
-        """Record that the client has received the first `received` messages.
+        """Store that the client has received the first `received` messages.
 
         The component may then post further reports; empty reports replace old ones.
         """

@@ -131,7 +131,7 @@ class LifeCycle(Announcer):
             activator: the activator's number.
             activate: the component's hook, called for the first added and for the last removed activator. Its error
                 leads to FatalError.
-            active: whether the activator needs the component from now on, or no longer.
+            active: `True` if the activator needs the component from now on, `False` if no longer.
         """
         others = self._activators - {activator}
         again = activator in self._activators

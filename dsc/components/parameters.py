@@ -36,7 +36,7 @@ class Parameter:
         most: the largest permitted number.
         among: the permitted values; empty permits any value.
         changed_by: the role that may change the value: `nobody`; a `profile`, before a run; an `operator`, during a
-            run; the `rules` of plots, after a failure; `plots` anywhere. Each role includes those before it.
+            run; the `rules` of plots, after a failure; `plots` anywhere. Each role includes the roles listed before it.
         follows: instead of a default, a term over other parameters, e.g. `(* 0.5 ?cycle)`.
         depends_on: parameters that the value depends on, besides those in `follows`. A new value of such a parameter
             resets this parameter to its default, to the value of its term, or to no value.

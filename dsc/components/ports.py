@@ -63,8 +63,8 @@ def event(attributes: Mapping[str, str | None], types: Mapping[str, str] | None 
 
     Args:
         attributes: the event's attributes, with types.
-        types: types of the activation's parameters. In the method, these follow the parameters for values, and have
-            defaults.
+        types: types of the activation's parameters. In the method, the activation's parameters follow those for values,
+            and have defaults.
     """
     require_names(attributes, "the attributes of an event", "@event({'level': 'number'})")
 

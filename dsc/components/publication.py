@@ -1,7 +1,8 @@
 """Push ports over a transport: one component publishes values, and each subscriber receives the newest (S1.1).
 
 A subscriber renews its subscription periodically. So the subscriber receives the newest value also after a lost push. A
-publisher that starts late, or restarts, learns its subscribers. The publisher forgets subscribers that do not renew.
+publisher that starts late, or restarts, is found by its subscribers. The publisher forgets subscribers that do not
+renew.
 """
 
 from __future__ import annotations
@@ -130,7 +131,7 @@ class Subscription:
             self.take(newest)
 
     def take(self, newest: Any) -> None:
-        """Store a received `Publisher.newest`, unless it is older than the known one.
+        """Store a received `Publisher.newest`, unless it is older than the known value.
 
         Raises:
             InputError: `newest` is malformed; the known value is unchanged.

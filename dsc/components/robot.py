@@ -51,11 +51,11 @@ def robot_of(named: str) -> tuple[Component, ...]:
     """Return the components at `module:name`, or those that the function at `module:name` returns.
 
     Args:
-        named: `module:name`. The module is found like with `python -m`, also in the present folder, and is executed. A
-            function must have no parameters.
+        named: `module:name`. The module is imported and executed; like with `python -m`, the present folder is searched
+            too. A function must have no parameters.
 
     Raises:
-        InputError: the module or the name does not exist, or its value is not components.
+        InputError: the module or the name does not exist, or the value of the name is not components.
     """
     module_name, colon, name = named.partition(":")
     if not (module_name and colon and name):
@@ -66,7 +66,7 @@ def robot_of(named: str) -> tuple[Component, ...]:
     try:
         with contained():
             module = import_module(module_name)
-    except Exception as error:  # any error of a user's module
+    except Exception as error:  # a user's module may raise any error
         raise InputError(f"the module '{module_name}' cannot be imported: {described(error)}") from error
     if not hasattr(module, name):
         valid = [one for one in vars(module) if not one.startswith("_")]

@@ -67,7 +67,7 @@ class StepRow:
         serials: the last serial number that the run has used.
         message: the handled message, as from `encoding.message_form`; empty for the start and the end of the run.
         configuration: paths of the active states after the macrostep.
-        records: trace records since the macrostep before.
+        records: trace records since the previous macrostep.
     """
 
     number: int

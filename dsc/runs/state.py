@@ -98,7 +98,8 @@ class RunState:
         serial = None if state.root is None else state.root.serial
         # Most events change none of these values; the list of outcome events only grows.
         settings = reactor.settings.values()
-        typed = tuple([(one, type(one.value)) for one in settings]) if settings else ()  # 1 and 1.0 are equal
+        # The types distinguish 1 and 1.0, which are equal.
+        typed = tuple([(one, type(one.value)) for one in settings]) if settings else ()
         remembered = (
             serial, state.finished, len(reactor.emitted), frozenset(reactor.in_vain), reactor.problem, typed,
         )  # fmt: skip
@@ -128,7 +129,7 @@ class RunState:
     def take(self, message: Message) -> None:
         """Remove the pending item that the message ends, or count a report of it."""
         match message:
-            case Event():  # no pending item waits for it
+            case Event():  # no pending item waits for an event
                 pass
             case SkillMessage(start=start, final=False, conflated=conflated):
                 for place in self._places.get(_key(start), ()):

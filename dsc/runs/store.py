@@ -25,7 +25,7 @@ from knowledge_base.journal.integrity import NOTHING, Tip, link, put_ends
 from knowledge_base.store import KnowledgeBase
 
 WHOLE_EVERY = 256
-"""Number of macrosteps between two that write the whole state; a restart reads at most this number."""
+"""Number of macrosteps from one that writes the whole state to the next; a restart reads at most this number."""
 _RIGHT = "SELECT 1 FROM fence WHERE epoch = ?"
 _STEP = "INSERT INTO steps SELECT NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM fence WHERE epoch = ?"
 _LAST = """SELECT run, number, time, before, version, serials, message, configuration, change, records, knowledge,
@@ -295,7 +295,7 @@ class RunStore:
             StoreError: there is no unfinished run, or it cannot be read.
             ChangedError: the plots or the domain differ from those with which the run began.
         """
-        with archive(self.path, again=True) as runs:  # the knowledge was opened before
+        with archive(self.path, again=True) as runs:  # opening the knowledge has checked the pages
             run = unfinished(runs)
             require_unchanged(runs, run, library, self._domain)
             kept = read(runs, run, library)

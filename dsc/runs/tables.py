@@ -4,7 +4,7 @@ Table `runs` has a row for each run. Table `steps` has a row for each macrostep:
 its trace records. Table `forms` has plots by hash, and table `fence` has the writer's epoch. A commit writes whole
 pages, so a macrostep is one row of one table, without an index.
 
-Runs and macrosteps form one chain of digests (`journal.integrity`). A run's row follows the end of the run before
+Runs and macrosteps form one chain of digests (`journal.integrity`). A run's row follows the end of the previous run
 (`seal`), and its macrosteps follow the row. Its end follows the last macrostep, whose place is in column `steps`. A
 macrostep's `knowledge` is the digest of the version after it, so that runs and knowledge of two stores never match.
 

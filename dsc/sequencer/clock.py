@@ -47,7 +47,7 @@ class LoopClock:
         await asyncio.sleep(seconds)
 
     async def sleep_until(self, due: float) -> None:
-        """Wait until second `due` of run time; return immediately if it is past."""
+        """Wait until second `due` of run time; return immediately if `due` is past."""
         passed = asyncio.Event()
         handle = self.call_at(due, passed.set)
         try:
@@ -56,7 +56,7 @@ class LoopClock:
             handle.cancel()
 
     def call_at(self, due: float, call: Callable[[], object]) -> asyncio.TimerHandle:
-        """Schedule a call for second `due` of run time, or for the next loop iteration if that is past."""
+        """Schedule a call for second `due` of run time, or for the next loop iteration if `due` is past."""
         return asyncio.get_running_loop().call_at(due + self._start, call)
 
     def timeout_at(self, due: float) -> asyncio.Timeout:

@@ -47,7 +47,7 @@ class Dispatcher:
     Args:
         components: the owners of the skills.
         clock: run time.
-        post: receives the answers, in the order of their arrival.
+        post: receives skills' answers and timers' messages, in the order of their arrival.
         part_of: a prefix of the action ids that components receive.
 
     Attributes:
@@ -224,7 +224,7 @@ class Dispatcher:
         """Cancel skills and timers, and wait until skills have stopped and components have received their outputs.
 
         Returns:
-            Errors of deliveries that failed without failing a skill, and the faults of the run.
+            Errors of deliveries that made no skill fail, and the faults of the run.
         """
         for activation in {start.activation for start in self.started()}:
             self._cancel(activation)
@@ -274,7 +274,7 @@ class Dispatcher:
         interrupted: InterruptedSkill | None,
     ) -> Outcome:
         start, signature = running.start, running.signature
-        taken = 0  # reports from before the restart that the skill repeats
+        taken = 0  # number of reports from before the restart that the skill repeats
 
         def report(outcome: Outcome) -> None:
             nonlocal taken
@@ -312,5 +312,5 @@ class Dispatcher:
 
 
 async def _forgotten(component: Component, action_id: str) -> None:
-    with suppress(Exception), contained():  # the action is over: an error now must not end the run
+    with suppress(Exception), contained():  # the action has ended: a later error must not end the run
         await component.forget(action_id)

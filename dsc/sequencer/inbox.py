@@ -23,7 +23,7 @@ _SHOWN = 8
 class Inbox:
     """Messages in the order of their arrival, for one reader.
 
-    An `asyncio.Queue` has more functions (several readers, a bound, `join`), and takes twice the time.
+    An `asyncio.Queue` has more functions (several readers, a bound, `join`), but needs twice the time.
 
     Attributes:
         waiting: the messages; the reader removes the first one.

@@ -106,7 +106,7 @@ class Outbox:
         return self.untaken.values()
 
     def failures(self) -> Iterator[str]:
-        """Yield the reasons of failed deliveries that failed no skill."""
+        """Yield the reasons of failed deliveries that made no skill fail."""
         for name, task in self.untaken.items():
             why = failure(task) if task.done() else None
             if why is not None or task.cancelled() or not task.done():

@@ -42,7 +42,7 @@ class RunningSkill:
         start: the start of the skill.
         signature: the skill's signature.
         within: maximum duration, in seconds.
-        due: second of run time at which the duration is over; `math.inf` means never.
+        due: second of run time of the deadline; `math.inf` means no deadline.
         clock: run time.
         post: receives the messages of the skill.
         fault: receives a fault of the run.
@@ -127,7 +127,7 @@ class RunningSkill:
     def is_late(self) -> bool:
         """Whether the deadline has passed.
 
-        In real time, a task that blocks the loop is late although no timer could fire.
+        In real time, a task that blocks the loop counts as late too, although the loop could not execute its timer.
         """
         return self._expired or (not self._clock.simulated and self._clock.now() > self.due)
 

@@ -62,7 +62,7 @@ class Sequencer:
         trace: receives all records; by default a new one.
         open_ended: whether the run waits for events from outside while no skill, timer or event is pending. Otherwise,
             such a run ends with a problem.
-        store: keeps the run, so that it can resume after a crash; it must belong to `knowledge`.
+        store: keeps the run, so that the run can resume after a crash; the store must belong to `knowledge`.
         part_of: a prefix of the action ids that components receive: an id from the run of which this run is a part.
 
     Attributes:

@@ -26,7 +26,7 @@ class StepTracer:
         self._trace = trace
         self.known_plots: set[str] = set()
         self._frames: dict[str, FrameState] = {}
-        self._at_work: dict[int, dict[str, str]] = {}  # activation -> action id -> skill
+        self._at_work: dict[int, dict[str, str]] = {}  # skills by activation and action id
 
     def world(self, knowledge: KnowledgeBase) -> None:
         """Record the world at the start, unless the trace has no listener; later records are changes of this world."""

@@ -90,7 +90,7 @@ class ComponentActivation(Announcer):
         self.changed(name)
 
     async def close(self) -> None:
-        """Release all supervisors, and wait until they have ended, for `2 * GRACE` seconds at most."""
+        """Release all supervisors, and wait at most `2 * GRACE` seconds until they have ended."""
         self._closed = True
         for component in self.registry.components.values():
             component.life.leave(self.look)
@@ -111,7 +111,9 @@ class ComponentActivation(Announcer):
         return self._supervisors[component.name]
 
     def supervisors_of(self, component: Component) -> Iterator[Supervisor]:
-        """Yield the supervisors of the components that `component` needs in its mode, dependencies first; then its own.
+        """Yield the supervisors of the components that `component` needs in its mode, then its own supervisor.
+
+        A supervisor follows the supervisors of its component's dependencies.
 
         Raises:
             InputError: components need each other in a cycle, or the hook `needed` of a component fails.
@@ -195,7 +197,7 @@ class Supervisor:
 
     Attributes:
         name: the component's name.
-        task: runs until the component is inactive again.
+        task: the task of the supervisor, which runs until the component is inactive again.
         failures: the number of failed attempts to start or activate the component.
         problem: the error in the search for the component, or in its hook `needed`; else `None`.
     """

@@ -86,7 +86,7 @@ class Crashes(Generic[_Result]):
         """Execute `live` repeatedly until the run ends, and return the final result.
 
         Args:
-            live: starts the run in its argument, a folder, or resumes the run in it, and runs it to its end. Data that
+            live: starts or resumes the run in the folder that it receives, and executes the run to its end. Data that
                 outlast the program, e.g. a simulated world, must be in files of that folder.
 
         Raises:
@@ -169,7 +169,7 @@ class Crashes(Generic[_Result]):
         self._heir = _Heir(self._store, self._live, self.folder)
 
     def _leave_behind(self) -> None:
-        """Copy the files for the next program execution; the present one has no further crashes."""
+        """Copy the files for the next program execution; the present execution has no further crashes."""
         self._calm = True
         _copy(self.folder, self._root / f"life{self.life + 1}")
 

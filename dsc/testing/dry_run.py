@@ -102,7 +102,7 @@ class DryRun:
         """End a running skill with an outcome, and return the step.
 
         Args:
-            skill: `component.skill`; of several running executions, the first started one ends.
+            skill: `component.skill`; of several running executions of the skill, the one that started first ends.
             event: the outcome, by the skill's own name for it.
             attributes: the event's attributes.
             observed: the outcome's observations: a change, or a PDDL effect. In an effect, `?name` is the value of an

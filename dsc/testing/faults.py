@@ -60,7 +60,7 @@ class Fault(StrEnum):
 
 
 USUAL = frozenset(Fault) - {Fault.ANSWER_LOST}
-"""Faults after which the plot can determine the effect: the action had no effect, or its answer finally arrives."""
+"""Faults after which the plot can determine the action's effect: either no effect, or the effect in a late answer."""
 _OF_SKILLS = (
     Fault.SKILL_FAILS, Fault.SKILL_HANGS, Fault.COMPONENT_DIES, Fault.ANSWER_LATE, Fault.ANSWER_TWICE,
     Fault.ANSWER_LOST,

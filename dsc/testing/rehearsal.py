@@ -93,7 +93,7 @@ def rehearse(
         events: events from outside, each with its second; a name alone has no attributes.
         changes: changes of the knowledge by others, each with its second. A change is a `Delta`, or a PDDL effect on
             the world at the start.
-        until: seconds after which the run is ended with a problem.
+        until: seconds after which the rehearsal ends the run with a problem.
 
     Raises:
         InputError: the plot is unknown, an argument is wrong, or an event or change is invalid. Or the script does not

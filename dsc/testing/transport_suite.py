@@ -258,7 +258,7 @@ class TransportSuite:
 
     @in_loop
     async def test_a_timed_push_comes_again_and_its_silence_is_noticed(self) -> None:
-        """*Push timed*, from one component to another."""
+        """Values of a *push timed* port arrive periodically at another component."""
         transport, laser, mapper = self.transport(), Laser(), Mapper()
         host, other = Host(laser, transport, LoopClock()), Host(mapper, transport, LoopClock())
         laser.heat.put(celsius=20)
@@ -268,7 +268,7 @@ class TransportSuite:
             assert mapper.heat.age < 2.0
         assert mapper.scan.value is None
         await host.close()
-        await asyncio.sleep(2.0)  # messages in transit
+        await asyncio.sleep(2.0)  # messages may still be in transit
         with pytest.raises(NoAnswerError, match=r"nothing has come from 'laser\.heat' within 4 s"):
             await mapper.heat.next(4.0)
         assert mapper.heat.age > 3.0
@@ -343,14 +343,14 @@ class TransportSuite:
 
     @in_loop
     async def test_a_skill_that_fails_there_fails_here(self) -> None:
-        """The failure has the reason."""
+        """The error has the reason of the failure at the host."""
         async with self._robot() as (_, remote, __):
             with pytest.raises(RefusedError, match=r"RuntimeError: a2\.0 fell"):
                 await remote.execute("fall", SkillCall("a2.0", LoopClock(), lambda _: None), {})
 
     @in_loop
     async def test_a_cancellation_arrives(self) -> None:
-        """The cancellation has arrived before the caller continues."""
+        """The component is cancelled before the caller continues."""
         async with self._robot() as (robot, remote, _):
             call = SkillCall("a3.0", LoopClock(), lambda _: None)
             task = asyncio.ensure_future(remote.execute("go", call, {"to": "kitchen", "steps": 1000}))
@@ -384,7 +384,7 @@ class TransportSuite:
 
     @in_loop
     async def test_what_a_component_is_told_arrives_once_in_order(self) -> None:
-        """*Param* and *send*, in sequence."""
+        """Calls of the ports *param* and *send* arrive in sequence."""
         async with self._robot() as (robot, remote, _):
             for n in range(10):
                 await remote.configure("speed", n)
@@ -403,7 +403,8 @@ class TransportSuite:
             assert remote.needed() == ()
             await remote.change_mode("scanning")
             assert remote.needed() == ("power", "light")
-            await remote.life.become_active(1, remote.activate, active=True)  # otherwise the component is not watched
+            # A client only watches the host of an active component.
+            await remote.life.become_active(1, remote.activate, active=True)
             robot.mode = "resting"
             await until(lambda: remote.mode == "resting")
             assert remote.needed() == ()
@@ -510,7 +511,7 @@ class TransportSuite:
 
     @in_loop
     async def test_a_silent_death_frees_what_the_dead_one_needed(self) -> None:
-        """The dead component sends no last message."""
+        """Case: the dead component sends no last message."""
         transport, told = self.transport(), []
 
         async def ignore(_: bool) -> None:  # noqa: FBT001

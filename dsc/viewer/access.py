@@ -84,7 +84,8 @@ class PageAddress:
 class Keys:
     """The keys of one page: a token for people and programs, a code for one browser, a cookie for every browser.
 
-    The code exists because every user of a machine can read command lines, and a browser receives its address in one.
+    The code exists because every user of a machine can read command lines, and a browser receives the page's address in
+    its command line.
 
     Args:
         token: opens the page any number of times.
@@ -92,7 +93,7 @@ class Keys:
         now: returns the seconds of a monotonic clock.
 
     Attributes:
-        cookie: the value of the cookie, which differs from the token; it opens the page any number of times.
+        cookie: the value of the cookie, which differs from the token; the cookie opens the page any number of times.
     """
 
     def __init__(self, token: str, code: str | None, now: Callable[[], float] = time.monotonic) -> None:

@@ -71,7 +71,7 @@ class BrowserStream:
             await self._socket.send_text(text)
 
     def _sent(self, sending: asyncio.Task[None]) -> None:
-        if not sending.cancelled() and sending.exception() is None:  # else the browser has left, and `serve` ends
+        if not sending.cancelled() and sending.exception() is None:  # otherwise the browser has left, and `serve` ends
             self._sending = None
             self._rounds.wake()
 

@@ -76,7 +76,7 @@ class Control:
         self._numbers = 0
         self._steps: int | None = None  # remaining macrosteps before a pause; `None` without a count
         self._was_true: set[int] = set()
-        self._plan_steps: dict[str, str] = {}  # path of a generated plot's state -> its plan step
+        self._plan_steps: dict[str, str] = {}  # plan steps by the path of a generated plot's state
         self._dropped: list[str] = []
         self.paused: str | None = None
         """The reason of a pause, or `None`."""
@@ -106,7 +106,7 @@ class Control:
         result = {"ok": True, "breaks": [{"number": n, "on": str(b)} for n, b in self._breaks.items()]}
         return {**result, "dropped": list(self._dropped)} if self._dropped else result
 
-    # --- in the page's thread
+    # --- methods for the page's thread
 
     def _event(self, command: Mapping[str, Any]) -> None:
         event = Event(str(command.get("name")), dict(command.get("attributes") or {}))
@@ -185,7 +185,7 @@ class Control:
         except TimeoutError:
             raise InputError(f"the run did not listen for {MOST_SECONDS} seconds") from None
 
-    # --- in the run's thread
+    # --- methods for the run's thread
 
     def _release(self) -> None:
         if self._go is not None:

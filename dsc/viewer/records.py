@@ -37,7 +37,7 @@ class RecordLog:
 
     Attributes:
         header: the first line of the trace, as data.
-        complaints: the damages found in the file, one line for each.
+        complaints: descriptions of the damaged records in the file, one line for each.
     """
 
     def __init__(
