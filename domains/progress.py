@@ -51,7 +51,7 @@ class Tally:
         self.seconds = 0.0
 
     def __call__(self, record: Record) -> None:
-        """Count one record."""
+        """Update the counts for one record."""
         self.seconds = record.t
         if record.type == "event" and "." in record.data["source"]:
             self.outcomes[record.data["name"]] += 1
@@ -88,7 +88,7 @@ class PlainProgress:
         self._stages: set[str] = set()
 
     def __call__(self, record: Record) -> None:
-        """Write the lines of one record."""
+        """Write the lines of text for one record, if there are any."""
         if record.type == "plot":
             self._learn_steps(record.data["plot"])
         for line in self.lines(record):
@@ -128,7 +128,7 @@ class LiveProgress(PlainProgress):
     replans.
 
     Args:
-        console: the terminal.
+        console: the console of the terminal.
         left: returns the number of items that are left.
         tally: the counts of the run; it must receive each record before this listener does.
     """
@@ -150,7 +150,7 @@ class LiveProgress(PlainProgress):
         self._live.stop()
 
     def __call__(self, record: Record) -> None:
-        """Write the lines of one record, and update the status line."""
+        """Write the lines of text for one record, and update the status line."""
         super().__call__(record)
         if record.type == "plan.asked":
             self._doing = "planning"

@@ -57,7 +57,7 @@ class GroundStep:
     Attributes:
         condition: the precondition, without conditions about the types of the arguments.
         typed: the conditions about types and the precondition, as one conjunction.
-        effect: the effect.
+        effect: the effect of the step.
     """
 
     condition: Expression

@@ -47,7 +47,7 @@ _BUDGET = Budget()
 
 
 class Executive:
-    """A robot program, ready to run.
+    """A robot program that can run plots and achieve goals.
 
     Args:
         domain: the planning domain, or its PDDL file. Components may add fragments. The schema of the knowledge base
@@ -158,7 +158,7 @@ class Executive:
         """Run a plot to its end, and return how the run ended.
 
         Args:
-            plot: the plot's name.
+            plot: the name of the plot.
             arguments: values of the plot's parameters.
             simulated: whether the run uses simulated time, which jumps from event to event, instead of real time.
             open_ended: whether an idle run waits for events from outside, e.g. from an operator. Otherwise an idle run
@@ -168,7 +168,7 @@ class Executive:
 
         Raises:
             InputError: the plot is unknown, or a parameter is missing or unknown.
-            StoreError: the store cannot be written, or has an unfinished run.
+            StoreError: the store cannot be written, or contains an unfinished run.
         """
         runner = run_simulated if simulated else run_real
         return runner(self.execute(plot, arguments, open_ended=open_ended, prepare=prepare, header=header))
@@ -315,7 +315,7 @@ class Executive:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Call `close`."""
+        """Close the executive, see `close`."""
         self.close()
 
 

@@ -13,7 +13,7 @@ from knowledge_base.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class PlanStep:
-    """A planning action with its arguments, in the order of the action's parameters."""
+    """A planning action with arguments, which are in the order of the action's parameters."""
 
     action: str
     args: tuple[str, ...] = ()

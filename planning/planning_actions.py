@@ -24,7 +24,7 @@ class PlanningAction:
     """A PDDL action. A planning action with arguments is a `PlanStep`.
 
     Attributes:
-        name, parameters: as declared.
+        name, parameters: name and parameters, as in the declaration.
         precondition: the condition before the action; of a durative action, the condition for its execution alone.
         effect: the changes after the action; of a durative action, the changes by its execution alone.
         place: the place of the declaration in the source file.

@@ -1,4 +1,4 @@
-"""Clean up a table: cups nest and go to the sink, cans go into crisp cans and into the bin."""
+"""The ready world clean-up-table: the robot brings cups to the sink, and cans and crisp cans to the bin."""
 
 from knowledge_base._lazy import lazy_exports
 

@@ -3,8 +3,8 @@
 A skill first waits for its duration, and then acts on the world in one call, so that a cancelled call changes nothing.
 Its outcome contains the robot's observations, and never the true state of the world.
 
-The second robot has a base on tracks, a suction arm, and a camera that looks twice. Its skills have the names and
-outcomes that the plots expect, with other implementations; only `vent` is additional.
+The second robot has a base on tracks, a suction arm, and a camera that repeats a recognition without a result. Its
+skills have the names and outcomes that the plots expect, with other implementations; only `vent` is additional.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ class Camera(TablePart):
 
 
 class Voice(TablePart):
-    """The loudspeaker."""
+    """The loudspeaker, which speaks texts to the operator."""
 
     name = "voice"
     declares: ClassVar[Mapping[str, Parameter]] = {

@@ -63,7 +63,7 @@ class CleanUpTable:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Call `close`."""
+        """Close the deployment, see `close`."""
         self.close()
 
     def close(self) -> None:

@@ -113,7 +113,7 @@ class DurableWorld(TableWorld):
         self._file.execute("COMMIT")
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file of the world, if there is one."""
         if self._file is not None:
             self._file.close()
 

@@ -154,7 +154,7 @@ def new_item(kind: str, name: str, *, surface: str = "table", size: str = "small
 
 
 class Inventory:
-    """All items, in the order in which they were added.
+    """All items of the room, in the order in which they were added.
 
     Raises:
         InputError: two items have equal names, an item is behind a missing item, or items hide each other in a cycle.

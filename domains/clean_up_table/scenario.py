@@ -10,8 +10,8 @@ The file may also list items by name, with or without numbered items:
       items:
         red_cup: cup
         pringles: {kind: crisp_can, size: large}
-        coke: {kind: can, behind: pringles}      # hidden while pringles is on the table too
-    seed: 7             # optional: of the faults; the command line wins
+        coke: {kind: can, behind: pringles}      # pringles hides coke while both are on the table
+    seed: 7             # optional: seed of the faults; the command line overrides it
     faults: 0.2         # optional: chance of a fault per skill call
     robot_at: operator  # optional: table, shelf, floor, sink, bin or operator
 
@@ -83,7 +83,7 @@ class Table(_ScenarioForm):
 
 
 class Scenario(_ScenarioForm):
-    """The start of a run: the items on the table, the robot's place, and the faults."""
+    """The start of a run: the items on the table, the robot's place, and the seed and chance of faults."""
 
     table: Table
     seed: Annotated[int, Field(strict=True)] | None = None

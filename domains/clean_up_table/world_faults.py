@@ -47,7 +47,7 @@ PER_RUN = {ITEM_MOVED: 3, ITEM_ADDED: 2}
 
 @dataclass(frozen=True, slots=True)
 class FiredFault:
-    """A fault that happened.
+    """A fault that has happened in a run.
 
     Attributes:
         kind: one of `KINDS`.

@@ -1,1 +1,1 @@
-"""Planning engines and their worker processes; the only package that runs unified-planning's engines."""
+"""Planning engines and their worker processes; no other package runs engines of unified-planning."""

@@ -96,7 +96,7 @@ class PlannerRace:
     async def _raced(
         self, engines: Sequence[Engine], problem: Problem, seconds: float
     ) -> AsyncGenerator[PlanningOutcome, None]:
-        """Yield the outcomes of these engines for one form of a problem."""
+        """Yield the outcomes of a race of `engines` for one form of a problem, e.g. its temporal form."""
         if not engines:
             yield nobody(problem)
             return

@@ -28,7 +28,7 @@ class PlanRecords:
         self._trace = trace
 
     def asked(self, goal: str, version: int) -> None:
-        """Record the start of a search."""
+        """Record that a search for a plan begins, with the goal and the version of the knowledge base."""
         self._trace.record("plan.asked", goal=goal, version=version)
 
     def found(self, answer: PlanFound, name: str) -> None:

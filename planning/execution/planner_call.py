@@ -128,7 +128,7 @@ class Improvements:
         return await bounded(anext(self._better), math.inf, self._name)
 
     async def aclose(self) -> None:
-        """Stop the planner."""
+        """End the search for better plans; a fault of the planner is reported and raises no error."""
         try:
             await bounded(self._better.aclose(), STOPPING, self._name)
         except LateError:  # `bounded` has already reported a planner that ignores its cancellation

@@ -1,4 +1,4 @@
-r"""One control flow of a generated plot: a sequence of steps, some of which wait for steps of other flows.
+r"""Control flows of a generated plot: sequences of steps, some of which wait for steps of other flows.
 
         before_3 -> step_3 -> after_3 -> before_5 -> step_5 -> after_5 -> finished_1
                \-> replan_1, if a condition of a step does not hold

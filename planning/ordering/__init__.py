@@ -1,1 +1,1 @@
-"""Causal links between the steps of a plan, and the partial order of the steps."""
+"""Ordering of plan steps: causal links between steps, and the partial order of the steps."""

@@ -103,7 +103,7 @@ class CausalTrace:
     def _take_in_world(
         self, number: int, step: PlanStep, action: PlanningAction, domain: PlanningDomain, effect: Effect
     ) -> None:
-        """Add the changes of a step that depend on the world."""
+        """Add those changes of a step that depend on the simulated world, and apply them to that world."""
         doing = _doing(action, step, effect, domain, self._world)
         for condition in dict.fromkeys(doing.conditions):
             if holds(condition, self._world, {}):  # otherwise the step's own start makes it true
@@ -269,7 +269,7 @@ class _Records(dict[Fact, _Record]):
 
 @dataclass(slots=True)
 class _Number:
-    """The history of a number.
+    """The history of a numeric fluent.
 
     Attributes:
         users, adders, assigners: the steps that read the number, only add to it, or change it in other ways, as bits.

@@ -1,1 +1,1 @@
-"""Problem construction: from a domain, a world and a goal to a relevant, ground, positive problem for an engine."""
+"""Problem construction: the ground problem of reaching a goal from a world, with only the parts that matter."""

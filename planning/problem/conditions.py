@@ -140,7 +140,7 @@ def is_so(fact: Fact, world: World) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Grounder:
-    """Partial evaluation of conditions and effects on a world.
+    """Evaluator that partially evaluates conditions and effects on a world.
 
     Attributes:
         world: the present world.

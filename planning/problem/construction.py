@@ -239,7 +239,7 @@ class ProblemBuilder:
 
 
 def _priced(task: Task, metric: Term | None) -> tuple[Task, tuple[str, ...]]:
-    """Return the task with action costs; with equal costs and a note if the metric is not an action cost."""
+    """Return the task with action costs; if the metric is not an action cost, with equal costs and a note."""
     if metric is None or all(way.cost is not None for way in (task.left or {}).values()):
         return task, ()
     return _evenly_priced(task), (ignored(metric),)

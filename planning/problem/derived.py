@@ -197,7 +197,7 @@ class Settled:
         return replace(domain, actions=actions)
 
     def condition(self, e: Expression) -> Expression:
-        """Return the condition without derived predicates."""
+        """Return the condition with derived predicates replaced."""
         expanded = self.derivation.expand(e)
         return self._replaced(expanded) if self.predicates else expanded
 

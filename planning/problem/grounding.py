@@ -171,7 +171,7 @@ class JoinRule:
 
     Attributes:
         action: the planning action.
-        atoms: the positive conjuncts of its precondition.
+        atoms: the positive conjuncts of the action's precondition.
         allowed: the objects that each parameter may have as its value.
     """
 
@@ -181,7 +181,7 @@ class JoinRule:
 
     @staticmethod
     def of(action: PlanningAction, grounder: Grounder) -> JoinRule:
-        """Return the rule for an action."""
+        """Return the join rule of an action, with the objects of the grounder's world."""
         atoms = joined_atoms(action, grounder.world.schema)
         return JoinRule(action, atoms, {p.name: grounder.objects(p) for p in action.parameters})
 

@@ -61,7 +61,7 @@ class Consulted:
 
     @property
     def schema(self) -> Vocabulary:
-        """The vocabulary of the world."""
+        """The vocabulary of the current world."""
         return self._world.schema
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
@@ -231,7 +231,7 @@ def _quantified(e: Expression | Term) -> bool:
 
 
 TOTAL_COST = Call("total-cost")
-"""The sum of action costs in PDDL; the default metric of a domain that declares it."""
+"""The PDDL function for the sum of action costs; the default metric of a domain that declares this function."""
 
 
 def metric_of(metric: Metric | None, schema: Vocabulary) -> Term | None:
