@@ -1,4 +1,4 @@
-"""Drawings of plots: `drawing.draw` lays out neutral boxes and edges (`layout`) and writes them as SVG (`svg`)."""
+"""Drawings of plots: `drawing` computes boxes and edges (`layout`), and `svg` writes these values as SVG."""
 
 from dsc.drawing.drawing import draw, lay_out
 

@@ -1,4 +1,4 @@
-"""Texts of plots: their interface, rules and handlers, and captions of edges and states in short and in full."""
+"""Texts in drawings: interface, rules and handlers of plots, and short and full captions of edges and states."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from knowledge_base.language.syntax.text import to_text
 from knowledge_base.spelling import value_text
 
 WIDTH = 190.0
-"""Width of one caption line at an edge."""
+"""Largest width of a caption line at an edge, in pixels."""
 ALWAYS = "always"
 COUNTER_PREFIX = "tries_"
-"""Prefix of the variables by which expanded rules count their answers."""
+"""Prefix of the variables in which expanded rules count their responses."""
 
 
 @dataclass(frozen=True, slots=True)
 class Caption:
-    """One or more triggers with the same guard and actions: short lines, and the full text on one line."""
+    """Caption of one or more triggers with equal guard and actions: short lines, and the full text on one line."""
 
     lines: tuple[str, ...]
     full: str
@@ -47,13 +47,13 @@ class Caption:
 
     @property
     def style(self) -> TextStyle:
-        """The style of its text."""
+        """The style of the caption's text."""
         return TextStyle.RULE if self.rule else TextStyle.LABEL
 
 
 @dataclass(frozen=True, slots=True)
 class Labelled:
-    """A transition, its trigger in words, and whether another one with the same trigger is tried before."""
+    """A transition, its trigger in words, and whether a transition with an equal trigger is tried before it."""
 
     trigger: str
     transition: Transition
@@ -71,7 +71,10 @@ def labelled(source: TransitionSource) -> list[Labelled]:
 
 
 def labelled_by_value(source: TransitionSource) -> list[Labelled]:
-    """As `labelled`, with only the values of a selection's cases, for a box that shows the selection."""
+    """Return the transitions as `labelled` does; a case of a `select` shows only its value.
+
+    The connector's box shows the selected term.
+    """
     if not isinstance(source, SelectState):
         return labelled(source)
     cases = [Labelled(value_text(case_value(key)), case, otherwise=False) for key, case in source.cases.items()]
@@ -85,7 +88,7 @@ def _trigger(event: str, transition: Transition) -> str:
 
 
 def seconds_text(seconds: Term) -> str:
-    """Return a duration as text: `0.5 s`, `(* 2 ?n) s`."""
+    """Return a duration in seconds as text, e.g. `0.5 s` or `(* 2 ?n) s`."""
     match seconds:
         case Constant(int() | float() as value):
             return f"{value:g} s"
@@ -96,7 +99,7 @@ def seconds_text(seconds: Term) -> str:
 def captions(transitions: Iterable[Labelled], *, terse: bool = False) -> list[Caption]:
     """Return the captions of one edge; triggers with equal guards and actions share a caption.
 
-    If `terse`, assignments and `[else]` are only in the full text, as suits generated plots.
+    If `terse`, only the full text contains assignments and `[else]`; generated plots have many of them.
     """
     groups: dict[tuple[object, ...], list[Labelled]] = {}
     for one in transitions:
@@ -105,7 +108,7 @@ def captions(transitions: Iterable[Labelled], *, terse: bool = False) -> list[Ca
 
 
 def _rest(one: Labelled, *, terse: bool) -> tuple[object, ...]:
-    """Return the parts of a caption besides the trigger, as a key."""
+    """Return all parts of a caption except the trigger, as the key of a shared caption."""
     return _guard(one, terse=terse), one.transition.rule, one.transition.internal, _brief(one.transition, terse=terse)
 
 
@@ -122,7 +125,7 @@ def _brief(transition: Transition, *, terse: bool) -> tuple[str, ...]:
 
 
 def _handed(transition: Transition, *, brief: bool = False) -> list[str]:
-    """Return the arguments that a transition passes to its target's plot, and the histories it clears."""
+    """Return texts of the arguments that a transition passes to its target's plot, and of the histories it clears."""
     passed = ", ".join(name if brief else f"{name} = {to_text(value)}" for name, value in transition.passed.items())
     cleared = ", ".join(transition.clear)
     return [f"{word} {what}" for word, what in (("pass", passed), ("clear", cleared)) if what]
@@ -143,7 +146,7 @@ def _caption(group: list[Labelled], *, terse: bool) -> Caption:
 
 
 def full_text(one: Labelled, *, trigger: bool = True) -> str:
-    """Return a transition with all its parts; `trigger=False` omits the trigger."""
+    """Return the full text of a transition; `trigger=False` omits the trigger."""
     effects = "; ".join([*map(action_text, one.transition.effect), *_handed(one.transition)])
     rule = one.transition.rule
     parts = [
@@ -168,7 +171,7 @@ def _enumerated(words: Sequence[str], separator: str = ",", before: str = "") ->
 
 
 def _rule_guard(guard: Expression | None) -> str:
-    """Return a rule's guard with its counter in words."""
+    """Return the text of a rule's guard, with the limit of its counter in words."""
     parts = guard.parts if isinstance(guard, And) else () if guard is None else (guard,)
     words: list[str] = []
     for part in parts:
@@ -181,15 +184,15 @@ def _rule_guard(guard: Expression | None) -> str:
 
 
 def block_texts(state: State) -> list[str]:
-    """Return the actions of a state, one a line: `entry / arm.grasp(?item)`."""
+    """Return a line for each action of a state, e.g. `entry / arm.grasp(?item)`."""
     words = {"entry": "entry", "exit": "exit", "on_break": "break"}
     return [f"{words[key]} / {action_text(action)}" for key, actions in state.blocks() for action in actions]
 
 
 def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> str:  # noqa: PLR0911  # a table by kind
-    """Return an action in the notation of state charts: `^event`, `name := value`, `component.skill(…)`.
+    """Return an action in the notation of state charts, e.g. `^event`, `name := value` or `component.skill(…)`.
 
-    If `brief`, omit the attributes of fired events.
+    If `brief`, the attributes of fired events are omitted.
     """
     match action:
         case Emit(emit=event, arguments=arguments):
@@ -223,17 +226,17 @@ def _values(arguments: Mapping[str, Term]) -> str:
 
 
 def content_text(use: str, arguments: Mapping[str, Term]) -> str:
-    """Return a used plot with its arguments as text."""
+    """Return the name of a used plot with its arguments as text."""
     return use + (_values(arguments) if arguments else "")
 
 
 def signature(plot: ActionPlot) -> str:
-    """Return the plot's name and parameters."""
+    """Return the plot's name and parameters as text."""
     return f"{plot.name}({_declared(plot.parameters)})" if plot.parameters else plot.name
 
 
 def facts(plot: ActionPlot) -> list[str]:
-    """Return the rest of the interface, one fact a line."""
+    """Return the plot's interface except name and parameters, one line for each fact."""
     return [
         f"{what}: {text}"
         for what, text in (
@@ -259,7 +262,7 @@ def _events(declared: Mapping[str, Mapping[str, str] | None]) -> str:
 
 
 def rule_text(rule: Rule) -> str:
-    """Return a rule on one line."""
+    """Return a rule as one line of text."""
     response = rule.do
     steps = [content_text(response.use, response.arguments)] if response.use else []
     steps = [*(action_text(command) for command in response.command), *steps]
@@ -273,7 +276,7 @@ def rule_text(rule: Rule) -> str:
 
 
 def handler_text(handler: Handler) -> str:
-    """Return a handler on one line."""
+    """Return a handler as one line of text."""
     do = handler.do
     steps = [action_text(command) for command in do.command]
     steps += [content_text(do.use, do.arguments)] if do.use else []

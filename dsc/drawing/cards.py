@@ -1,4 +1,4 @@
-"""Cards: one state as a box with its name and actions, a plot's header, a list of rules; texts determine the size."""
+"""Cards: boxes of one state, a plot's header or a list of rules; the texts determine the size of a card."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ from knowledge_base.language.syntax.text import to_text
 
 DETAIL_WIDTH = 260.0
 SIDE = 12.0
-"""Free space left and right of texts."""
+"""Free space left and right of texts, in pixels."""
 NAME_HEIGHT = 30.0
 MARK = 24.0
-"""Room next to the name for the mark of submachine and dynamic states."""
+"""Width next to the name for the mark of submachine and dynamic states, in pixels."""
 LEAST_WIDTH = 76.0
 FINAL_SIZE = 20.0
 DIAMOND_HEIGHT = 44.0
-"""Height of a diamond with one line."""
+"""Height of a diamond with one line of text, in pixels."""
 DOT_SIZE = 14.0
 HEADER_SIDE = 16.0
 HEADER_WIDTH = 340.0
-"""Least width for the lines of a header."""
+"""Least width for the lines of a header, in pixels."""
 CIRCLE_SIZE = 24.0
 
 
 @dataclass(frozen=True, slots=True)
 class CardRow:
-    """A line of text in a box, and its full text."""
+    """A line of text in a box, and the full text of this line for the tooltip."""
 
     text: str
     style: TextStyle = TextStyle.DETAIL
@@ -54,7 +54,7 @@ def _column(rows: Iterable[CardRow | Text], x: float, y: float, *, centred: bool
 
 
 def header(plot: ActionPlot, width: float) -> Box:
-    """Return name, parameters, purpose and interface of a plot as the top of a frame of about that width."""
+    """Return the top of a plot's frame with name, parameters, purpose and interface; `width` is approximate."""
     room = max(width, HEADER_WIDTH)
     known, name = facts(plot), signature(plot)
     lines = [(line, TextStyle.ABOUT) for line in pack((plot.about or "").split(), TextStyle.ABOUT, room)]
@@ -67,7 +67,7 @@ def header(plot: ActionPlot, width: float) -> Box:
 
 
 def rules_note(rows: Sequence[str], about: str) -> Box:
-    """Return a box that lists rules and handlers without an edge."""
+    """Return a box that lists the rules and handlers that the drawing does not show as edges."""
     listed = column([(shorten(row, TextStyle.RULE, 480.0), TextStyle.RULE) for row in rows], 12.0, 37.0)
     texts = (Text(12.0, 20.0, about, TextStyle.ABOUT), *listed)
     width = max(text_width(text.text, text.style) for text in texts) + 24
@@ -83,7 +83,7 @@ def dot() -> Box:
 def card(
     kind: BoxKind, name: str, rows: Sequence[CardRow], *, about: str = "", rule: bool = False, mark: bool = False
 ) -> Box:
-    """Return a box with a name and rows of text."""
+    """Return the box of a state with its name and rows of text."""
     title_room = text_width(name, TextStyle.NAME) + 2 * SIDE + 2 * MARK * mark
     width = max(LEAST_WIDTH, title_room, *(text_width(row.text, row.style) + 2 * SIDE for row in rows))
     texts = (Text(width / 2, 20.0, name, TextStyle.NAME, centred=True), *_column(rows, SIDE, 47.0))
@@ -94,7 +94,7 @@ def card(
 
 
 def final_card(name: str, state: FinalState) -> Box:
-    """Return the box of a final state: the bullseye, with its name and its outcome event below."""
+    """Return the box of a final state: the bullseye, with name and outcome event below it."""
     rows = [(name, TextStyle.NAME)]
     if state.emit is not None:
         rows.append((f"^{state.emit}", TextStyle.DETAIL))
@@ -108,7 +108,7 @@ def final_card(name: str, state: FinalState) -> Box:
 
 
 def history_card(name: str, state: HistoryState) -> Box:
-    """Return the box of a history: a circle with H or H*, as in UML, next to its name and default actions."""
+    """Return the box of a history: a circle with H or H*, as in UML, next to the name and default actions."""
     done = "; ".join(map(action_text, state.do))
     rows = [CardRow(name, TextStyle.NAME, name), *([_row(f"/ {done}")] if done else [])]
     aside = CIRCLE_SIZE / 2 + 7
@@ -120,13 +120,13 @@ def history_card(name: str, state: HistoryState) -> Box:
     letter = Text(CIRCLE_SIZE / 2, CIRCLE_SIZE / 2 + 4, mark, TextStyle.DETAIL, centred=True)
     circle = Box(BoxKind.CIRCLE, "", 0, 0, CIRCLE_SIZE, CIRCLE_SIZE, (letter,))
     title = "\n".join(filter(None, [name, state.about, *(row.full for row in rows[1:])]))
-    # Edges end at the middle of the box, so the circle is there.
+    # The circle is in the middle of the box, because edges end there.
     circle = circle.moved(half - CIRCLE_SIZE / 2, (height - CIRCLE_SIZE) / 2)
     return Box(BoxKind.HISTORY, name, 0, 0, 2 * half, height, texts, title=title, boxes=(circle,))
 
 
 def name_below(history: Box) -> Box:
-    """Return a history with its texts below the circle, for edges that come from the left."""
+    """Return a history's box with its texts below the circle, for edges that arrive from the left."""
     width = max(CIRCLE_SIZE, *(text_width(text.text, text.style) for text in history.texts))
     below = LINE_HEIGHT * len(history.texts)
     texts = _column(history.texts, width / 2, below + CIRCLE_SIZE + 12, centred=True)
@@ -136,13 +136,13 @@ def name_below(history: Box) -> Box:
 
 
 def diamond(name: str, connector: Connector) -> Box:
-    """Return the box of a choice or selection: a flat diamond around its name and the selecting value."""
+    """Return the box of a `choice` or `select` connector: a flat diamond around the name and the selected term."""
     rows = [CardRow(name, TextStyle.NAME, name)]
     if isinstance(connector, SelectState):
         rows.append(_row(to_text(connector.select)))
     block = LINE_HEIGHT * len(rows)
     height = DIAMOND_HEIGHT + 2 * LINE_HEIGHT * (len(rows) - 1)
-    # A text fits if its share of the width and the lines' share of the height sum to at most 1.
+    # A text fits if text width / diamond width + text height / diamond height is at most 1.
     width = (max(text_width(row.text, row.style) for row in rows) + SIDE) / (1 - block / height)
     first = (height - block) / 2 + 11.5
     texts = _column(rows, width / 2, first, centred=True)
@@ -151,7 +151,7 @@ def diamond(name: str, connector: Connector) -> Box:
 
 
 def name_beside(final: Box) -> Box:
-    """Return a final state with its texts right of the bullseye, for edges that come from the left."""
+    """Return a final state's box with its texts right of the bullseye, for edges that arrive from the left."""
     height = max(FINAL_SIZE, LINE_HEIGHT * len(final.texts))
     top = (height - LINE_HEIGHT * len(final.texts)) / 2
     texts = _column(final.texts, FINAL_SIZE + 7, top + 12)
@@ -164,11 +164,11 @@ def leaf_card(name: str, state: State, library: Library | None, *, rule: bool, t
     """Return the box of a state without inner states: simple, submachine or dynamic.
 
     Args:
-        name: its name.
+        name: name of the state.
         state: the state.
-        library: for details of the plots it uses.
-        rule: whether a rule added it.
-        told: whether to write its purpose in the box; otherwise only the tooltip has it.
+        library: provider of the plots that the state uses, for details of their interface; may be `None`.
+        rule: whether a rule added the state.
+        told: whether the box contains the state's purpose; otherwise only the tooltip does.
     """
     rows = [_row(state.about, TextStyle.ABOUT)] if told and state.about and not rule else []
     kind, about = BoxKind.SIMPLE, [state.about or ""]
@@ -185,7 +185,7 @@ def leaf_card(name: str, state: State, library: Library | None, *, rule: bool, t
 
 
 def action_rows(state: State) -> list[CardRow]:
-    """Return a state's least duration, and its actions on entry, on exit and on events without an exit."""
+    """Return rows with a state's least duration, its actions, and its reactions that do not exit the state."""
     rows = [] if state.at_least is None else [_row(f"≥ {seconds_text(state.at_least)}")]
     rows += [_row(text) for text in block_texts(state)]
     for caption in captions(one for one in labelled(state) if one.transition.target is None):
@@ -206,7 +206,7 @@ def _choices(state: DynamicState, library: Library | None) -> list[CardRow]:
 
 
 def _taken(state: DynamicState, plot: ActionPlot | None) -> dict[str, Term]:
-    """Return the arguments that a candidate takes; all for an unknown candidate."""
+    """Return the state's arguments that are parameters of a candidate; all arguments for an unknown candidate."""
     return {k: v for k, v in state.arguments.items() if plot is None or k in plot.parameters}
 
 

@@ -1,4 +1,4 @@
-"""Edges across borders: their continuation from the border of an outer box to a state inside it."""
+"""Edges across borders: continuations of edges from the border of an outer box to a state inside the box."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from dsc.drawing.layout import Area, Box, BoxKind, DrawnEdge, Point, Text, text_
 from dsc.drawing.maze import Maze
 
 ROUND = frozenset({BoxKind.FINAL, BoxKind.HISTORY})
-"""Cards with a circle inside; edges end at the circle."""
+"""Kinds of boxes that contain a circle, at which edges end."""
 TRACKS = (5.0, 11.0)
-"""Distances of parallel lines from boxes and texts."""
+"""Distances of parallel lines from boxes and texts, in pixels."""
 CLEAR = 3.0
-"""Least distance of a line from boxes and texts."""
+"""Least distance of a line from boxes and texts, in pixels."""
 ARRIVAL = 11.0
-"""Straight end of a line at a state, with room for an arrowhead."""
+"""Length of the straight end of a line at a state, enough for an arrowhead, in pixels."""
 LEAST = 2.5
-"""Least distance between candidate tracks, to bound their number in large drawings."""
+"""Least distance between possible tracks in pixels; it bounds their number in large drawings."""
 PORT_GAP = 14.0
 CORNER = 11.0
-"""Free space at a state's corners."""
+"""Length at a state's corners where no line ends, in pixels."""
 
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """A place at a border, the direction out of the box there, and its cost."""
+    """A place at a box's border where a line may end, the direction out of the box, and the cost of the place."""
 
     place: Point
     out: Point
@@ -36,13 +36,13 @@ class Port:
 
     @property
     def before(self) -> Point:
-        """The beginning of the straight end of a line."""
+        """The point where the straight end of a line begins."""
         return _shifted(self.place, self.out, ARRIVAL)
 
 
 @dataclass(slots=True)
 class _Ground:
-    """The contents of a box: obstacles, lines, and tracks for new lines."""
+    """The area of a box for new lines: obstacles, existing lines and possible tracks."""
 
     solid: list[Area] = field(default_factory=list)
     lines: list[tuple[Point, Point]] = field(default_factory=list)
@@ -56,7 +56,7 @@ class _Ground:
         self.ys += [place for track in TRACKS for place in (y - track, y + height + track)]
 
     def enclose(self, box: Box) -> None:
-        """Add a box that lines may cross, but not follow along its border."""
+        """Add a box whose border lines may cross but must not follow."""
         right, low = box.x + box.width, box.y + box.height
         corners = [(box.x, box.y), (right, box.y), (right, low), (box.x, low), (box.x, box.y)]
         self.lines += pairwise(corners)
@@ -68,14 +68,14 @@ class _Ground:
 def prolonged(
     edge: DrawnEdge, start: Box, end: Box, also: Iterable[str], drawn: Sequence[DrawnEdge]
 ) -> list[DrawnEdge]:
-    """Return an edge between two boxes, prolonged from its source inside `start` to its target inside `end`.
+    """Return an edge between two boxes, prolonged to its source state inside `start` and its target inside `end`.
 
     Args:
-        edge: ends at the borders of the boxes.
-        start: the box of the source, or the source itself.
-        end: the box of the target, or the target itself.
-        also: more targets in `end`; the edges to them share the line to its border.
-        drawn: existing edges; crossings with them cost extra.
+        edge: an edge that ends at the borders of both boxes.
+        start: the box that contains the source, or the source's box.
+        end: the box that contains the target, or the target's box.
+        also: further targets in `end`; the edges to all targets share the line to the border of `end`.
+        drawn: existing edges; each crossing with an existing edge has an additional cost.
     """
     first, second, *_ = edge.points
     before, last = edge.points[-2:]
@@ -90,7 +90,7 @@ def prolonged(
 
 
 def join(box: Box, source: str, target: str) -> DrawnEdge:
-    """Return the edge from a history among regions to a state in one of them."""
+    """Return the edge from a history of an orthogonal state to a state in one of its regions."""
     circle = way_to(box, source)[-1].boxes[0]
     port = (circle.x + circle.width / 2, circle.y + circle.height)
     points = _inwards(way_to(box, target), ((port[0], circle.y), port), ())
@@ -98,7 +98,10 @@ def join(box: Box, source: str, target: str) -> DrawnEdge:
 
 
 def way_to(box: Box, name: str) -> tuple[Box, ...]:
-    """Return the boxes from `box` to the state `name` in it; empty if missing. Region names have a separate scope."""
+    """Return the boxes on the path from `box` to the state `name` inside it; empty if `box` lacks the state.
+
+    A region of that name is not a result, because names of regions are separate from names of states.
+    """
     if box.name == name and box.kind is not BoxKind.REGION:
         return (box,)
     for inner in box.boxes:
@@ -117,7 +120,7 @@ def _led_on(box: Box, name: str, last: tuple[Point, Point], drawn: Sequence[Draw
 
 
 def _inwards(way: Sequence[Box], last: tuple[Point, Point], drawn: Sequence[DrawnEdge]) -> list[Point]:
-    """Return the line from the border of the first box of the path to the border of the last one."""
+    """Return the line from the border of the first box on the path `way` to the border of the last box."""
     box, ports = way[0], _ports(way[-1])
     vertical = abs(last[0][0] - last[1][0]) < abs(last[0][1] - last[1][1])
     start = _shifted(last[1], _direction(*last), TRACKS[0])
@@ -137,7 +140,7 @@ def _inwards(way: Sequence[Box], last: tuple[Point, Point], drawn: Sequence[Draw
 
 
 def _places(needed: Iterable[float], useful: Iterable[float], bounds: tuple[float, float]) -> list[float]:
-    """Return the tracks for lines: all needed ones, and useful ones without another track close by."""
+    """Return the positions of tracks: all in `needed`, and those in `useful` that are not close to another track."""
     fixed = [(place, 0) for place in needed]
     free = [(place, 1) for place in useful if bounds[0] < place < bounds[1]]
     places: list[float] = []
@@ -158,7 +161,7 @@ def _ground(way: Sequence[Box], drawn: Sequence[DrawnEdge]) -> _Ground:
 
 
 def _survey(box: Box, way: Sequence[Box], ground: _Ground) -> None:
-    """Treat regions and the boxes on the path as open, all others as obstacles."""
+    """Add the content of `box` to `ground`: regions and boxes on the path are open, all other boxes are obstacles."""
     ground.enclose(box)
     for area in _writing(box):
         ground.keep_clear(area)
@@ -178,7 +181,7 @@ def _area(box: Box) -> Area:
 
 
 def _writing(box: Box) -> Iterator[Area]:
-    """Yield the areas of all texts in a box and at its edges."""
+    """Yield the areas of all texts in a box and at the edges inside it."""
     for text in box.texts:
         yield _text_area(text)
     for edge in box.edges:
@@ -192,7 +195,7 @@ def _text_area(text: Text) -> Area:
 
 
 def _ports(box: Box) -> list[Port]:
-    """Return the places where lines may meet a state."""
+    """Return the places at a state's border where lines may end."""
     shape = box.boxes[0] if box.kind in ROUND else box
     x, y = shape.x + shape.width / 2, shape.y + shape.height / 2
     beside, above = _spread(shape.height), _spread(shape.width)
@@ -212,7 +215,7 @@ def _spread(length: float) -> list[float]:
 
 
 def _taken(port: Port, words: Iterable[Area], lines: Iterable[tuple[Point, Point]]) -> float:
-    """Return the cost of words or other lines at the port."""
+    """Return the additional cost of a port because of texts or other lines at its place."""
     near = sum(1 for ends in lines if any(_distance(end, port.place) < PORT_GAP / 2 for end in ends))
     return 60.0 * near + 500.0 * any(_holds(area, port.before) for area in words)
 

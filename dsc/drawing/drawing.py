@@ -1,4 +1,4 @@
-"""Drawing of a plot: each state is a box, each scope a layered drawing inside the box of its state."""
+"""Drawing of a plot: each state is a box, and each scope is a layered drawing inside its state's box."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ HULLS = frozenset({BoxKind.COMPOSITE, BoxKind.ORTHOGONAL})
 
 
 def _notes(plot: ActionPlot, *, shown: bool) -> Box | None:
-    """Return a list of the rules without an edge: unexpanded ones, and those for steps of future plans."""
+    """Return a list of the rules that no edge shows: unexpanded rules, and rules for steps of future plans."""
     planned = any(is_planned(state) for _, state, _ in plot.walk())
     rows = [rule_text(rule) for rule in plot.rules] if planned or not shown else []
     rows += [handler_text(handler) for handler in plot.handlers] if not shown else []
@@ -61,7 +61,7 @@ class _Builder:
         self._bundles = self._by_scope()
 
     def _by_scope(self) -> dict[Path, list[EdgeBundle]]:
-        """Assign each edge of the plot to the innermost scope that holds all its ends."""
+        """Return the edges of the plot by the path of the innermost scope that contains all ends of the edge."""
         states = {name: state for name, state, _ in self._plot.walk()}
         paths = {name: path for name, _, path in self._plot.walk()}
         among_regions = {name for name, path in paths.items() if path[-2] == "connectors"}
@@ -75,7 +75,7 @@ class _Builder:
         return scopes
 
     def scope(self, scope: Scope, path: Path) -> Box:
-        """Return the layout of a scope's states with their edges."""
+        """Return a box with the layout of a scope's states and edges."""
         initial = initial_of(scope)
         self._known(initial, self._nesting.inside(path), (*path, "initial"))
         boxes = {"": dot(), **{name: self._state(name, state, path) for name, state in scope.states.items()}}
@@ -83,12 +83,12 @@ class _Builder:
         spans = [span for one in edges for span in self._spans(path, one)]
         if not any(box.kind in HULLS for box in boxes.values()):
             return arranged(boxes, spans, sideways=self._sideways).finished()
-        # Large boxes read better if the whole is closer to a square.
+        # A large box is easier to read if it is close to a square, so both directions are tried.
         both = [arranged(boxes, spans, sideways=sideways) for sideways in (self._sideways, not self._sideways)]
         return min(both, key=lambda draft: max(draft.width, draft.height)).finished()
 
     def _spans(self, scope: Path, bundle: EdgeBundle) -> Iterator[ScopeSpan]:
-        """Yield one span for all targets; an invalid plot, with targets in several states, gets several."""
+        """Yield one span for all targets of an edge; an invalid plot, with targets in several states, needs several."""
         holder = self._nesting.holder
         start, end = holder(scope, bundle.source), holder(scope, bundle.target)
         also = tuple(target for target in bundle.also if holder(scope, target) == end)
@@ -122,7 +122,7 @@ class _Builder:
         return leaf_card(name, state, self._library, rule=name in self._added, told=self._plot.generated)
 
     def _hull(self, kind: BoxKind, name: str, state: State, inside: Box) -> Box:
-        """Return a state's box around its content; regions reach up to its border, states do not."""
+        """Return a state's box around its content; regions touch the box's border, states have a margin."""
         pad = 0.0 if kind is BoxKind.ORTHOGONAL else PAD
         head = card(kind, name, action_rows(state), about=state.about or "")
         width = max(head.width, inside.width + 2 * pad)
@@ -143,7 +143,7 @@ class _Builder:
 
 
 def _side_by_side(regions: list[Box]) -> Box:
-    """Return regions in a row or in a column, as is closer to a square; all reach from border to border."""
+    """Return the regions in a row or in a column, so that the result is closer to a square; no region leaves a gap."""
     widths, heights = [one.width for one in regions], [one.height for one in regions]
     in_row = max(sum(widths), *heights) <= max(*widths, sum(heights))
     width = sum(widths) if in_row else max(widths)
@@ -157,7 +157,7 @@ def _side_by_side(regions: list[Box]) -> Box:
 
 
 def _below(histories: Sequence[Box], regions: Box) -> Box:
-    """Return regions placed below the histories of the orthogonal state."""
+    """Return a box with the histories of an orthogonal state, and its regions below the histories."""
     if not histories:
         return regions
     boxes, x = [], PAD
@@ -181,18 +181,18 @@ def draw(
     direction: Direction = "down",
     marks: Mapping[str, str] = NO_MARKS,
 ) -> str:
-    """Return the plot as SVG; the same plot gives the same text.
+    """Return the plot as SVG; equal arguments give equal text.
 
     Args:
-        plot: the plot.
-        library: provider of the plots it uses. With it, rules are drawn as their expanded states and transitions, and
-            dynamic states show each candidate's condition.
-        rules: `False` only lists the rules.
-        direction: the direction of the flow.
+        plot: the plot to draw.
+        library: provider of the plots to which `plot` refers. With a library, rules are drawn as their expanded states
+            and transitions, and dynamic states show each candidate's condition.
+        rules: whether to draw rules in expanded form; `False` lists the rules as text.
+        direction: direction of the flow of control.
         marks: marks of states by name: `active`, `added`, `removed`, `changed`.
 
     Raises:
-        UnknownNameError: a transition names a missing state, or a rule or state names a missing plot.
+        UnknownNameError: a transition refers to a missing state, or a rule or state to a missing plot.
     """
     return to_svg(lay_out(plot, library, rules=rules, direction=direction), marks)
 
@@ -200,7 +200,7 @@ def draw(
 def lay_out(
     plot: ActionPlot, library: Library | None = None, *, rules: bool = True, direction: Direction = "down"
 ) -> Box:
-    """Return the drawing as values, for other renderers; arguments and errors as for `draw`."""
+    """Return the drawing as nested boxes, for renderers other than SVG; arguments and errors as for `draw`."""
     expanded = library.expanded(plot) if library is not None and rules else plot
     added = {name for name, _, _ in expanded.walk()} - {name for name, _, _ in plot.walk()}
     builder = _Builder(expanded, library, frozenset(added), sideways=direction == "right")

@@ -1,7 +1,7 @@
-"""Layout of a drawing as values: nested boxes, edges as polylines, placed texts. Renderers need no other input.
+"""Layout of a drawing as values: nested boxes, edges as polylines, and placed texts; a renderer needs no other input.
 
-Lengths are pixels, y grows downwards, all places are absolute. Widths of texts are upper bounds, measured without a
-font in DejaVu Sans, the widest of the usual sans-serif fonts.
+Lengths are in pixels, y grows downwards, and all coordinates are absolute. Widths of texts are upper bounds: they are
+computed from the widths in DejaVu Sans, the widest of the usual sans-serif fonts.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from unicodedata import east_asian_width
 
 Point = tuple[float, float]
 Area = tuple[float, float, float, float]
-"""x, y, width, height."""
+"""A rectangle: x, y, width and height."""
 
 
 class TextStyle(StrEnum):
@@ -28,7 +28,7 @@ class TextStyle(StrEnum):
 
 
 class BoxKind(StrEnum):
-    """The kind of a box, which determines its looks."""
+    """The kind of a box, which determines its shape and colours."""
 
     PLOT = "plot"
     GENERATED = "generated"
@@ -49,7 +49,7 @@ class BoxKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A line of text: `x` is its left end, or its middle if `centred`; `y` is the baseline."""
+    """A line of text; `x` is the text's left end, or its middle if `centred`, and `y` is the baseline."""
 
     x: float
     y: float
@@ -59,20 +59,20 @@ class Text:
 
 
 def column(rows: Iterable[tuple[str, TextStyle]], x: float, y: float, *, centred: bool = False) -> tuple[Text, ...]:
-    """Return small texts below each other; `y` is the first baseline."""
+    """Return small texts in a column; `y` is the baseline of the first text."""
     return tuple(Text(x, y + LINE_HEIGHT * number, text, style, centred) for number, (text, style) in enumerate(rows))
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnEdge:
-    """One or more transitions between two states, which may be inside the boxes of the scope.
+    """An edge: one or more transitions between two states, which may be inside the boxes of the edge's scope.
 
     Attributes:
-        source, target: names of the states; the initial pseudostate has the name `""`.
-        points: from the source's border to the target's.
-        label: its texts, on the line in the rectangle `area` (x, y, width, height).
-        title: the full form of shortened labels.
-        rule: whether contingency rules added it.
+        source, target: names of both states; the initial pseudostate has the name `""`.
+        points: corners of the polyline, from the source's border to the target's border.
+        label: texts of the edge, inside the rectangle `area` (x, y, width, height).
+        title: full text of the label, for a tooltip.
+        rule: whether contingency rules added the edge.
     """
 
     source: str
@@ -86,16 +86,17 @@ class DrawnEdge:
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A rectangle with texts and contents.
+    """A rectangle with texts, inner boxes and inner edges.
 
     Attributes:
-        kind, name: kind and name of its state, region or plot.
-        x, y, width, height: its place and size.
-        texts: its own texts.
-        lines: heights of its dividing lines.
-        title: the full form of shortened texts.
-        rule: whether a contingency rule added it.
-        boxes, edges: its contents.
+        kind, name: kind and name of the state, region or plot that the box represents.
+        x, y: coordinates of the upper left corner.
+        width, height: size of the box.
+        texts: texts of the box itself.
+        lines: y coordinates of the horizontal dividing lines.
+        title: full form of shortened texts, for a tooltip.
+        rule: whether a contingency rule added the element.
+        boxes, edges: inner boxes and inner edges.
     """
 
     kind: BoxKind
@@ -112,7 +113,7 @@ class Box:
     edges: tuple[DrawnEdge, ...] = ()
 
     def moved(self, dx: float, dy: float) -> Box:
-        """Return the box and its contents at another place."""
+        """Return the box and its content, moved by `dx` and `dy`."""
         return replace(
             self,
             x=self.x + dx,
@@ -125,7 +126,7 @@ class Box:
 
 
 def moved_texts(texts: tuple[Text, ...], dx: float, dy: float) -> tuple[Text, ...]:
-    """Return the texts at another place."""
+    """Return the texts, moved by `dx` and `dy`."""
     return tuple(replace(text, x=text.x + dx, y=text.y + dy) for text in texts)
 
 
@@ -144,7 +145,7 @@ FONT_SIZES = {
     TextStyle.RULE: 11.5,
 }
 LINE_HEIGHT = 15.0
-"""From one baseline of a small text to the next."""
+"""Distance between the baselines of successive small texts."""
 BOLD = frozenset({TextStyle.TITLE, TextStyle.NAME})
 _BOLDER = 1.12
 
@@ -169,7 +170,7 @@ ELLIPSIS = "…"
 
 
 def text_width(text: str, style: TextStyle) -> float:
-    """Return an upper bound of a text's width."""
+    """Return an upper bound of a text's width in pixels."""
     ems = sum(_EM.get(character) or _unknown(character) for character in text)
     return ems * FONT_SIZES[style] * (_BOLDER if style in BOLD else 1.0)
 
@@ -179,7 +180,7 @@ def _unknown(character: str) -> float:
 
 
 def shorten(text: str, style: TextStyle, width: float) -> str:
-    """Return the text, shortened with an ellipsis if it does not fit."""
+    """Return the text; a text wider than `width` is shortened and ends in an ellipsis."""
     if text_width(text, style) <= width:
         return text
     low, high = 0, len(text)
@@ -193,7 +194,7 @@ def shorten(text: str, style: TextStyle, width: float) -> str:
 
 
 def pack(words: list[str], style: TextStyle, width: float) -> list[str]:
-    """Return the words on the necessary number of lines; shorten a word that is too long for a line."""
+    """Return lines of words, each at most `width` wide; a word that is wider than a line is shortened."""
     lines: list[str] = []
     for word in words:
         if lines and text_width(f"{lines[-1]} {word}", style) <= width:

@@ -1,4 +1,4 @@
-"""Maze search: the cheapest path along a grid of horizontal and vertical lines around obstacles."""
+"""Maze search: finds the cheapest path along a grid of horizontal and vertical lines around obstacles."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from math import inf
 from dsc.drawing.layout import Area, Point
 
 BEND = 25.0
-"""Additional length that saving one bend justifies."""
+"""Price of one bend, in pixels of additional length."""
 CROSSED = 15.0
-"""Additional length that avoiding one crossing justifies."""
+"""Price of one crossing, in pixels of additional length."""
 COVERED = 5.0
-"""Additional price per pixel on top of another line."""
+"""Additional price for each pixel on top of another line."""
 THROUGH = 60.0
-"""Additional price per pixel through an obstacle: the last resort."""
+"""Additional price for each pixel through an obstacle; only a path without any alternative crosses obstacles."""
 NEAR = 3.5
-"""Lines closer than this run on top of each other."""
+"""Distance in pixels below which one line counts as being on top of another."""
 
 Node = tuple[int, int, bool]
-"""Column, row, and whether it was reached vertically."""
+"""A node of the search: column, row, and whether the last step was vertical."""
 
 
 class Maze:
-    """A grid with prices.
+    """A grid of tracks with a price for each step between neighbouring grid points.
 
     Args:
-        xs, ys: tracks for lines.
-        solid: obstacles.
-        lines: horizontal or vertical lines; crossing or covering them costs extra.
+        xs, ys: positions of the vertical and of the horizontal tracks.
+        solid: areas of the obstacles.
+        lines: existing horizontal or vertical lines; a path that crosses or covers one has an additional price.
     """
 
     def __init__(
@@ -53,17 +53,17 @@ class Maze:
                 _cut(self._across, self._xs, self._ys, x, (low[1], high[1]))
 
     def way(self, start: Point, goals: Mapping[tuple[Point, bool], float], *, vertical: bool) -> list[Point]:
-        """Return the cheapest path from a grid point to one of the goals, reduced to its bends.
+        """Return the cheapest path from a grid point to one of the goals: start, bends and goal.
 
         Args:
-            start: its first point.
-            goals: grid points with the direction after them (vertical or not) -> an additional price.
-            vertical: the direction before the start.
+            start: first point of the path.
+            goals: additional price of each goal, a grid point with the direction after the path (vertical or not).
+            vertical: whether the line before the start is vertical.
         """
         (left, right), (top, low) = (_span(place[axis] for place, _ in goals) for axis in (0, 1))
 
         def least(node: Node) -> float:
-            """Return a lower bound of the remaining price."""
+            """Return a lower bound of the price from a node to the nearest goal."""
             x, y = self._xs[node[0]], self._ys[node[1]]
             return max(left - x, x - right, 0.0) + max(top - y, y - low, 0.0)
 
@@ -119,7 +119,7 @@ def _span(places: Iterable[float]) -> tuple[float, float]:
 
 
 def _lengths(places: Sequence[float], count: int) -> list[list[float]]:
-    """Return the prices of the steps along `count` free lines."""
+    """Return the prices of the steps between `places`, for each of `count` lines without obstacles."""
     steps = [after - before for before, after in pairwise(places)]
     return [steps.copy() for _ in range(count)]
 
@@ -132,7 +132,7 @@ def _spoil(
     width: tuple[float, float],
     factor: float,
 ) -> None:
-    """Raise the prices of the steps in a rectangle, which is given along and across them."""
+    """Increase the prices of the steps inside a rectangle, which is given along and across the steps."""
     first, last = max(bisect_right(along, reach[0]) - 1, 0), min(bisect_left(along, reach[1]), len(along) - 1)
     for line in range(bisect_right(across, width[0]), bisect_left(across, width[1])):
         for step in range(first, last):
@@ -142,7 +142,7 @@ def _spoil(
 def _cut(
     prices: list[list[float]], along: Sequence[float], across: Sequence[float], at: float, reach: tuple[float, float]
 ) -> None:
-    """Raise the prices of the steps that cross a line at `at`."""
+    """Increase the prices of the steps that cross a line at the position `at`."""
     step = bisect_right(along, at) - 1
     if 0 <= step < len(along) - 1:
         for line in range(bisect_left(across, reach[0]), bisect_right(across, reach[1])):

@@ -1,6 +1,6 @@
-"""Scopes of a drawing: the scopes around each state, and the layout of one scope with its edges.
+"""Scopes of a drawing: the scopes that contain each state, and the layout of one scope with its edges.
 
-An edge bundles the transitions with the same ends. Loops are next to their state.
+Transitions with equal ends share an edge. Loops are placed next to their state.
 """
 
 from __future__ import annotations
@@ -20,30 +20,30 @@ from dsc.model.transitions import TransitionSource
 
 
 class ScopeNesting:
-    """The scopes around each state of a plot, by their paths; the plot itself is the scope `()`."""
+    """The scopes that contain each state of a plot, by path; the plot itself is the scope `()`."""
 
     def __init__(self, plot: ActionPlot) -> None:
         self._holders = {name: dict(_holders(path)) for name, _, path in plot.walk()}
 
     def inside(self, scope: Path) -> list[str]:
-        """Return all states in a scope, at any depth."""
+        """Return the names of all states in a scope, at any depth."""
         return [name for name, holders in self._holders.items() if scope in holders]
 
     def holder(self, scope: Path, name: str) -> str:
-        """Return the state of the scope that is or holds the state `name`; for the initial pseudostate, `""`."""
+        """Return the name of the scope's direct state that is or contains the state `name`; `""` for the name `""`."""
         return self._holders[name][scope] if name else ""
 
     def common_scope(self, names: Iterable[str]) -> Path:
-        """Return the innermost scope that holds all these states; regions are scopes, orthogonal states are not.
+        """Return the innermost scope that contains all these states; regions are scopes, orthogonal states are not.
 
-        SCXML calls it the least common compound ancestor (appendix D, `findLCCA`).
+        This scope is SCXML's least common compound ancestor (appendix D, `findLCCA`).
         """
         first, *others = (self._holders[name] for name in names)
         return [scope for scope in first if all(scope in other for other in others)][-1]
 
 
 def _holders(path: Path) -> Iterator[tuple[Path, str]]:
-    """Yield the scopes around the state at `path`, outermost first, each with its state that is or holds that one."""
+    """Yield each scope that contains the state at `path`, outermost first, with the name of its state on the path."""
     for place in range(0, len(path), 2):
         if path[place] == "states":
             yield path[:place], str(path[place + 1])
@@ -51,7 +51,7 @@ def _holders(path: Path) -> Iterator[tuple[Path, str]]:
 
 @dataclass(frozen=True, slots=True)
 class ScopeSpan:
-    """The transitions of an edge, and the boxes of the scope that are, or hold, its source and its target."""
+    """The transitions of an edge, and the scope's boxes that represent or contain the edge's source and target."""
 
     bundle: EdgeBundle
     start: str
@@ -59,13 +59,13 @@ class ScopeSpan:
 
 
 def contents(width: float, height: float, boxes: Iterable[Box], edges: Iterable[DrawnEdge] = ()) -> Box:
-    """Return the contents of a scope, in a rectangle that begins at (0, 0)."""
+    """Return a box with the content of a scope; its upper left corner is (0, 0)."""
     return Box(BoxKind.REGION, "", 0, 0, width, height, boxes=tuple(boxes), edges=tuple(edges))
 
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """A scope with its edges up to the borders of its boxes, in a rectangle that begins at (0, 0)."""
+    """Layout of a scope whose edges end at the borders of the scope's boxes; the upper left corner is (0, 0)."""
 
     width: float
     height: float
@@ -73,7 +73,7 @@ class Draft:
     edges: tuple[tuple[ScopeSpan, DrawnEdge], ...]
 
     def finished(self) -> Box:
-        """Return the scope with all edges prolonged to their states."""
+        """Return the scope as a box, with each edge prolonged to the states inside the boxes."""
         boxes = {box.name: box for box in self.boxes}
         edges: list[DrawnEdge] = []
         for span, edge in self.edges:
@@ -82,7 +82,7 @@ class Draft:
 
 
 def arranged(boxes: Mapping[str, Box], spans: Sequence[ScopeSpan], *, sideways: bool) -> Draft:
-    """Place the boxes of a scope and its edges, with room for all labels."""
+    """Return the layout of a scope: its boxes and edges, with space for all labels."""
     own: dict[str, list[ScopeSpan]] = {}
     for span in spans:
         if span.start == span.end:
@@ -108,12 +108,12 @@ def arranged(boxes: Mapping[str, Box], spans: Sequence[ScopeSpan], *, sideways: 
 def _link(source: int, target: int, span: ScopeSpan) -> LayerLink:
     bundle = span.bundle
     meant = "" if bundle.target == span.end else bundle.target
-    # Edges of the regular flow are straight; edges of rules, for failures, bend around them.
+    # Straight lines matter more for the regular flow than for the edges of rules, which handle failures.
     return LayerLink(source, target, bundle.width, bundle.height, weight=0.1 if bundle.rule else 1.0, meant=meant)
 
 
 def _written_aside(box: Box) -> Box:
-    """Return the box with its texts away from horizontal edges."""
+    """Return a box whose texts do not cover horizontal edges; only final states and histories change."""
     return name_beside(box) if box.kind is BoxKind.FINAL else name_below(box) if box.kind is BoxKind.HISTORY else box
 
 
@@ -125,29 +125,32 @@ def _node(box: Box, own: Sequence[ScopeSpan], *, sideways: bool) -> LayerNode:
 
 
 def _roomy(box: Box, own: Sequence[ScopeSpan], *, sideways: bool) -> Box:
-    """Return a box at least as large as the labels of its loops, so that they do not touch other boxes."""
+    """Return a box at least as large as the labels of its loops, so that the labels do not touch other boxes."""
     room = room_along_loops([span.bundle for span in own], sideways=sideways)
     width, height = (room, 0.0) if sideways else (0.0, room)
     return widened(box, max(box.width, width), max(box.height, height))
 
 
 def widened(box: Box, width: float, height: float) -> Box:
-    """Return a box of another size with its texts in the middle."""
+    """Return the box with another size, and with its texts in the middle."""
     texts = tuple(replace(text, x=text.x + (width - box.width) / 2) if text.centred else text for text in box.texts)
     return replace(box, width=width, height=height, texts=texts)
 
 
 LOOP = 18.0
-"""Reach of a loop from its state."""
+"""Distance between a state and the far side of a loop, in pixels."""
 LOOP_HALF = 8.0
 LOOP_GAP = 8.0
-"""Space between loops of one state."""
+"""Space between the loops of one state, in pixels."""
 CAPTION_GAP = 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeBundle:
-    """All transitions from one state to another (`also`: and more), with the size of their common label."""
+    """All transitions with equal source and targets, with the size of their common label.
+
+    `also` contains the names of further targets.
+    """
 
     source: str
     target: str
@@ -159,16 +162,16 @@ class EdgeBundle:
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """All states it leads to."""
+        """Names of all target states."""
         return (self.target, *self.also)
 
     @property
     def title(self) -> str:
-        """All captions in full."""
+        """Full text of all captions, one line for each caption."""
         return "\n".join(caption.full for caption in self.captions)
 
     def texts(self, middle: Point) -> tuple[Text, ...]:
-        """Return the label, centred on a point."""
+        """Return the texts of the label, centred on the point `middle`."""
         x, y = middle[0], middle[1] - self.height / 2 + 11.5
         texts = []
         for caption in self.captions:
@@ -179,7 +182,7 @@ class EdgeBundle:
         return tuple(texts)
 
     def edge(self, points: tuple[Point, ...], middle: Point) -> DrawnEdge:
-        """Return the edge along `points` with its label around `middle`."""
+        """Return the edge along `points`, with its label centred on `middle`."""
         edge = DrawnEdge(self.source, self.target, points, title=self.title, rule=self.rule)
         if not self.height:
             return edge
@@ -187,21 +190,23 @@ class EdgeBundle:
         return replace(edge, label=self.texts(middle), area=area)
 
     def along(self, route: Route) -> DrawnEdge:
-        """Return the edge along a route."""
+        """Return the edge along the route of a link."""
         return self.edge(route.points, route.label)
 
 
 def bundles(states: Mapping[str, AnyState], recoveries: frozenset[str], *, terse: bool) -> list[EdgeBundle]:
-    """Merge the transitions of states and the defaults of histories by their ends, in the order of the states.
+    """Return one bundle for each combination of source and targets, in the order of the states.
+
+    The transitions of states and connectors, and the defaults of histories, are bundled.
 
     Args:
-        states: by name.
+        states: states of a plot by name.
         recoveries: names of states that rules added.
         terse: see `captions`.
     """
     groups: dict[tuple[str, tuple[str, ...]], list[Labelled]] = {}
     for name, state in states.items():
-        if isinstance(state, HistoryState):  # the history's card shows the default's actions
+        if isinstance(state, HistoryState):  # the history's box shows the actions of its default
             groups[name, (state.target,)] = []
         for one in labelled_by_value(state) if isinstance(state, TransitionSource) else ():
             if one.transition.target is not None:
@@ -223,23 +228,23 @@ def _bundle(
 
 
 def _gap(said: tuple[Caption, ...]) -> float:
-    """Return the space between captions that separates their lines."""
+    """Return the space between captions in pixels; captions of one line need no space."""
     return CAPTION_GAP if any(len(caption.lines) > 1 for caption in said) else 0.0
 
 
 def initial_bundle(target: str) -> EdgeBundle:
-    """Return the edge from the initial pseudostate, which has an empty name, to the first state."""
+    """Return the edge from the initial pseudostate, whose name is empty, to the initial state `target`."""
     return EdgeBundle("", target, (), rule=False)
 
 
 def room_for_loops(bundles: Sequence[EdgeBundle], *, sideways: bool) -> float:
-    """Return the space for loops with their labels right of their state (below it if `sideways`)."""
+    """Return the space for the loops of a state with their labels, right of the state (below if `sideways`)."""
     return max((LOOP + 6 + (one.height if sideways else one.width) for one in bundles), default=0.0)
 
 
 def room_along_loops(bundles: Sequence[EdgeBundle], *, sideways: bool) -> float:
-    """Return the height (width if `sideways`) of a state for the labels of its loops."""
-    if len(bundles) < 2:  # a single one may reach beyond its state
+    """Return the height (width if `sideways`) that a state needs for the labels of its loops."""
+    if len(bundles) < 2:  # the label of a single loop may be larger than the state
         return sum(one.width if sideways else one.height for one in bundles)
     return sum(_extent(one, sideways=sideways) + LOOP_GAP for one in bundles)
 
@@ -249,7 +254,7 @@ def _extent(bundle: EdgeBundle, *, sideways: bool) -> float:
 
 
 def loops(bundles: Sequence[EdgeBundle], box: Box, *, sideways: bool) -> list[DrawnEdge]:
-    """Return edges in parallel for transitions from a state to itself or into it."""
+    """Return the loops of a state: parallel edges for transitions from the state to itself or to an inner state."""
     extents = [_extent(one, sideways=sideways) + LOOP_GAP for one in bundles]
     first = -sum(extents) / 2
     offsets = [first + sum(extents[:number]) + extent / 2 for number, extent in enumerate(extents)]

@@ -1,4 +1,4 @@
-"""SVG of a drawing. The colours suit readers with red-green colour blindness (Okabe and Ito 2008)."""
+"""Writer of drawings as SVG; the colours suit readers with red-green colour blindness (Okabe and Ito 2008)."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ _LOOKS: dict[BoxKind, tuple[str, str]] = {
     BoxKind.CHOICE: ("#eef2f7", "#475569"),
     BoxKind.NOTE: ("#fdf1f6", "#e3b5cb"),
 }
-"""Fill and border of each kind."""
+"""Colours of fill and border, by kind of box."""
 MARKS = {"active": "#d55e00", "added": "#0072b2", "removed": "#a3195b", "changed": "#b8860b"}
-"""Marks of states, each with its colour."""
+"""Colour of each mark of a state."""
 
 
 def to_svg(root: Box, marks: Mapping[str, str] = NO_MARKS) -> str:
-    """Return the drawing as one SVG document with a background; `marks` are by names of states."""
+    """Return the drawing as one SVG document with a background; `marks` contains the marks by state name."""
     moved = root.moved(MARGIN, MARGIN)
     body = (*_box(moved, "#ffffff"), *_marked(moved, marks))
     return svg.document(root.name, root.width + 2 * MARGIN, root.height + 2 * MARGIN, _css(), body)
 
 
 def above(upper: str, lower: str) -> str:
-    """Return two drawings as one, one above the other."""
+    """Return one SVG document with the drawing `upper` above the drawing `lower`."""
     sizes = [tuple(map(float, _SIZE.search(drawn).groups())) for drawn in (upper, lower)]  # type: ignore[union-attr]
     width, height = max(w for w, _ in sizes), sizes[0][1] + MARGIN + sizes[1][1]
     moved = lower.replace("<svg ", f'<svg y="{svg.number(sizes[0][1] + MARGIN)}" ', 1)
@@ -64,7 +64,7 @@ def _css() -> str:
 
 
 def _box(box: Box, around: str) -> Iterator[str]:
-    """Yield a box and its contents, from the back to the front."""
+    """Yield the elements of a box and its content, from back to front."""
     fill, stroke = svg.PINK if box.rule else _LOOKS.get(box.kind, (around, svg.SOFT))
     yield f'<g class="{box.kind}">'
     if box.title:
@@ -76,14 +76,14 @@ def _box(box: Box, around: str) -> Iterator[str]:
     names = {inner.name for inner in box.boxes}
     flat = [edge for edge in box.edges if names.issuperset((edge.source, edge.target))]
     over = [edge for edge in box.edges if not names.issuperset((edge.source, edge.target))]
-    # All lines are below all labels; where lines of rules cover others, the others stay visible.
+    # Lines are below labels, and lines of rules are below all other lines, which therefore stay visible.
     for edge in sorted(flat, key=lambda one: not one.rule):
         yield from _edge(edge)
     for edge in flat:
         yield from _label(edge, fill)
     for inner in box.boxes:
         yield from _box(inner, fill)
-    # Edges into inner boxes are above these.
+    # Edges into inner boxes are above the inner boxes.
     for edge in over:
         yield from _edge(edge)
     for edge in over:
@@ -91,7 +91,7 @@ def _box(box: Box, around: str) -> Iterator[str]:
 
 
 def _marked(box: Box, marks: Mapping[str, str]) -> Iterator[str]:
-    """Yield a thick border around each marked state, above all other elements."""
+    """Yield a thick border for each marked state; these borders are above all other elements."""
     for inner in box.boxes:
         mark = marks.get(inner.name)
         if mark is not None:
@@ -141,7 +141,7 @@ def _across(box: Box, y: float, stroke: str) -> str:
 
 
 def _mark(box: Box, stroke: str) -> Iterator[str]:
-    """Yield two linked states for a submachine state; a branching path for a dynamic state."""
+    """Yield the symbol of a submachine state (two linked states) or a dynamic state (a branching path)."""
     x, y = box.x + box.width - 30, box.y + 15
     style = f'fill="none" stroke="{stroke}" stroke-width="1.4"'
     if box.kind is BoxKind.SUBMACHINE:
@@ -154,7 +154,7 @@ def _mark(box: Box, stroke: str) -> Iterator[str]:
 
 
 def _separators(boxes: Iterable[Box], stroke: str) -> Iterator[str]:
-    """Yield dashed lines between regions."""
+    """Yield the dashed lines between neighbouring regions."""
     regions = [box for box in boxes if box.kind is BoxKind.REGION]
     for one, other in pairwise(regions):
         end = (other.x, other.y + other.height) if other.x > one.x else (other.x + other.width, other.y)
@@ -186,7 +186,7 @@ def _label(edge: DrawnEdge, fill: str) -> Iterator[str]:
 
 
 def _path(points: list[svg.Point]) -> str:
-    """Return a polyline with round corners."""
+    """Return the SVG path of a polyline with round corners."""
     path = [f"M{svg.point(points[0])}"]
     for (x0, y0), (x1, y1), (x2, y2) in zip(points, points[1:], points[2:], strict=False):
         before, after = hypot(x1 - x0, y1 - y0), hypot(x2 - x1, y2 - y1)

@@ -1,4 +1,4 @@
-"""A plot as a tree for the terminal: states with their kinds, actions and transitions."""
+"""Tree of a plot for the terminal: states with their kinds, actions and transitions."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _SOFT, _RULE = "dim", "magenta"
 
 
 def plot_tree(plot: ActionPlot) -> Tree:
-    """Return the plot as a tree; lines that are too long for the terminal end in an ellipsis."""
+    """Return the plot as a tree of text; a line that is too long for the terminal ends in an ellipsis."""
     tree = Tree(_line((signature(plot), "bold"), (plot.about or "", "italic dim")))
     for fact in facts(plot):
         tree.add(_line((fact, _SOFT)))
@@ -109,7 +109,7 @@ def _kind(state: AnyState) -> str:  # noqa: PLR0911  # a table by kind
 
 
 def _line(*parts: tuple[str, str]) -> Text:
-    """Return parts with their styles, two spaces apart, cut off at the terminal's edge."""
+    """Return one line of styled parts with two spaces between them; the terminal's edge truncates the line."""
     line = Text(no_wrap=True, overflow="ellipsis")
     for text, style in parts:
         if text:

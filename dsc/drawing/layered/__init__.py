@@ -1,1 +1,1 @@
-"""Layered drawing of directed graphs (Sugiyama, Tagawa, Toda 1981): from boxes and links to places and routes."""
+"""Layered drawing of directed graphs (Sugiyama, Tagawa, Toda 1981): computes places of boxes and routes of links."""

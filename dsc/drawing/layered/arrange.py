@@ -1,4 +1,4 @@
-"""Arrangement of nodes and links: layers, order, columns, tracks."""
+"""Arrangement of nodes and links in four stages: layers, order within layers, columns, and tracks of lines."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from dsc.drawing.layered.graph import (
 
 TRACK_GAP = 10.0
 AT_NODES = 13.0
-"""Straight end of a line at a node, with room for an arrowhead."""
+"""Length of the straight end of a line at a node, enough for an arrowhead, in pixels."""
 AT_LABELS = 4.0
 
 
 def arrange(nodes: Sequence[LayerNode], links: Sequence[LayerLink], *, sideways: bool = False) -> Arrangement:
-    """Draw a graph in layers from top to bottom, or from left to right if `sideways`.
+    """Return the layered drawing of a graph, from top to bottom, or from left to right if `sideways`.
 
-    Earlier nodes are further up; links from later to earlier ones lead upwards. No node or label overlaps another. The
-    same input gives the same output.
+    Layers follow the order of `nodes`, so that a link from a later to an earlier node leads upwards. No node or label
+    overlaps another. Equal arguments give equal drawings.
     """
     if sideways:
         turned = [replace(node, width=node.height, height=node.width) for node in nodes]
@@ -54,7 +54,7 @@ def _turned(drawing: Arrangement) -> Arrangement:
 
 
 class _Levels:
-    """Heights of the layers and of the tracks between them."""
+    """Heights of the layers and of the tracks between the layers."""
 
     def __init__(self, nodes: Sequence[LayerNode], grid: Grid, axes: list[float], ports: Ports) -> None:
         self._nodes = nodes
@@ -71,7 +71,7 @@ class _Levels:
         self.height = y
 
     def _gap(self, upper: int, top: float) -> float:
-        """Lay the tracks below a layer; return their height."""
+        """Assign the tracks below the layer `upper`, which ends at the height `top`; return the tracks' total height."""
         above, below = (AT_NODES, AT_LABELS) if upper % 2 == 0 else (AT_LABELS, AT_NODES)
         members = self._nets(self._grid.layers[upper])
         nets = [
@@ -87,7 +87,7 @@ class _Levels:
         return above + max(tracks, default=0) * TRACK_GAP + below
 
     def _nets(self, layer: list[int]) -> list[list[tuple[int, int]]]:
-        """Return the connections below a layer, grouped if they share a trunk."""
+        """Return the connections below a layer in groups; the connections of a group share a horizontal line."""
         cells = self._grid.cells
         nets: dict[tuple[int, int], list[tuple[int, int]]] = {}
         for upper in layer:
@@ -102,7 +102,7 @@ class _Levels:
         return list(nets.values())
 
     def arrangement(self, links: Sequence[LayerLink]) -> Arrangement:
-        """Return the finished drawing."""
+        """Return the drawing with the places of all nodes and the routes of all links."""
         cells, axes = self._grid.cells, self._axes
         nodes = [(axes[n], cell) for n, cell in enumerate(cells) if cell.is_node]
         corners = [(axis - cell.left, self._middles[cell.layer] - cell.height / 2) for axis, cell in nodes]
@@ -130,7 +130,7 @@ class _Levels:
 
 
 def without_detours(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Return the points without those on a straight line between their neighbours."""
+    """Return the polyline without the points that lie on the straight line between their neighbours."""
     kept: list[Point] = []
     for point in points:
         if kept and point == kept[-1]:
@@ -143,38 +143,38 @@ def without_detours(points: Sequence[Point]) -> tuple[Point, ...]:
 
 
 CLOSE = 8.0
-"""Lines nearer than this to each other look like one."""
+"""Distance in pixels below which two lines look like one line."""
 MANY = 40
-"""Number of lines from which tracks are shared first, without counting crossings."""
+"""Number of lines above which tracks are assigned by first fit, without a count of crossings."""
 SAME_LINE = 100
-"""Number of crossings that weigh as much as two lines on top of each other."""
+"""Cost of two lines on top of each other, in crossings."""
 
 
 @dataclass(frozen=True, slots=True)
 class Net:
-    """Lines with a common horizontal part, their positions above it and below it."""
+    """Lines with a common horizontal part: the x coordinates at which they reach this part from above and below."""
 
     tops: tuple[float, ...]
     bottoms: tuple[float, ...]
 
     @property
     def low(self) -> float:
-        """Its left end."""
+        """The left end of the horizontal part."""
         return min(*self.tops, *self.bottoms)
 
     @property
     def high(self) -> float:
-        """Its right end."""
+        """The right end of the horizontal part."""
         return max(*self.tops, *self.bottoms)
 
     @property
     def straight(self) -> bool:
-        """Whether it needs no track."""
+        """Whether the horizontal part has the length 0, so that the net needs no track."""
         return self.high == self.low
 
 
 def assign_tracks(nets: Sequence[Net]) -> list[int]:
-    """Return the track of every net, counted from the top; nets that overlap never share one."""
+    """Return the number of each net's track, counted from the top; overlapping nets have different tracks."""
     bent = [number for number, net in enumerate(nets) if not net.straight]
     order = sorted(bent, key=lambda number: (nets[number].low, nets[number].high))
     tracks = [0] * len(nets)
@@ -198,7 +198,7 @@ def _first_fit(nets: Sequence[Net], order: Iterable[int], tracks: list[int]) -> 
 
 
 def _least_crossing(nets: Sequence[Net], order: list[int]) -> list[int]:
-    """Greedy: the next net is the one with the largest gain above all remaining ones."""
+    """Return the nets from top to bottom: each next net has the largest gain above all remaining nets (greedy)."""
     gain = {(a, b): _cost(nets[b], nets[a]) - _cost(nets[a], nets[b]) for a in order for b in order}
     score = {a: sum(gain[a, b] for b in order) for a in order}
     result = []
@@ -212,7 +212,7 @@ def _least_crossing(nets: Sequence[Net], order: list[int]) -> list[int]:
 
 
 def _cost(above: Net, below: Net) -> int:
-    """Return the cost of one net above another."""
+    """Return the cost in crossings if the net `above` is above the net `below`."""
     cost = sum(below.low < x < below.high for x in above.bottoms)
     cost += sum(above.low < x < above.high for x in below.tops)
     shared = any(abs(x - other) < CLOSE / 2 for x in above.bottoms for other in below.tops)

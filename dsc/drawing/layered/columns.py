@@ -1,4 +1,4 @@
-"""Columns of a layered drawing: straight lines first, then short ones, within the least distances."""
+"""Columns of a layered drawing: straight lines have priority over short lines; least distances are kept."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from statistics import median
 from dsc.drawing.layered.graph import Cell, Grid, LayerNode, effort
 
 Wish = tuple[float, float]
-"""A wanted position and its weight."""
+"""A wanted position and the weight of a deviation from this position."""
 
 
 def fit(wishes: Sequence[Sequence[Wish]], distances: Sequence[float]) -> list[float]:
-    """Return positions that minimise the weighted absolute deviations, by pooling adjacent violators.
+    """Return the positions that minimise the weighted absolute deviations from `wishes` (pool adjacent violators).
 
     Args:
-        wishes: at least one for each position.
-        distances: the least distance from each position to the next; one fewer than positions.
+        wishes: wishes for each position, at least one.
+        distances: least distance from each position to the next, so one fewer than `wishes`.
     """
     offsets = list(accumulate(distances, initial=0.0))
     blocks: list[tuple[float, int, list[Wish], float]] = []
@@ -35,7 +35,7 @@ def fit(wishes: Sequence[Sequence[Wish]], distances: Sequence[float]) -> list[fl
 
 
 def _median(pool: Sequence[Wish], total: float) -> float:
-    """Return the weighted median; the middle of the possible ones if there are several."""
+    """Return the weighted median; the middle of the interval if several medians are possible."""
     half = total / 2
     reached = 0.0
     for index, (value, weight) in enumerate(pool):
@@ -50,11 +50,11 @@ def _median(pool: Sequence[Wish], total: float) -> float:
 NODE_GAP = 36.0
 LINE_GAP = 14.0
 STAY = 0.01
-"""Weight of the present position: it only decides between positions that are otherwise equal."""
+"""Weight of the current position, small enough to decide only between otherwise equal positions."""
 
 
 def place_cells(grid: Grid) -> list[float]:
-    """Return the axis of every cell, by its number."""
+    """Return the axis of each cell, a position across the drawing, in the order of the cells."""
     axes = [0.0] * len(grid.cells)
     for layer in grid.layers:
         _place(grid, layer, axes, [[(0.0, 1.0)]] * len(layer))
@@ -67,7 +67,7 @@ def place_cells(grid: Grid) -> list[float]:
 
 
 def _sweep(grid: Grid, axes: list[float], *, above: bool, below: bool) -> None:
-    """Move every cell to its neighbours in the layers above, below, or both; cells without any to the middle."""
+    """Move every cell towards its connected cells above, below or both; cells without connection move to the middle."""
     middle = median(axes) if axes else 0.0
     for layer in grid.layers if above else reversed(grid.layers):
         wishes = []
@@ -80,12 +80,12 @@ def _sweep(grid: Grid, axes: list[float], *, above: bool, below: bool) -> None:
 
 
 def straighten(grid: Grid, axes: list[float], ends: Mapping[tuple[int, int], float]) -> None:
-    """Move cells so that connections off a node's axis are straight, if there is room.
+    """Move cells so that connections that end off a node's axis become straight, if there is space.
 
     Args:
         grid: the cells.
-        axes: is changed.
-        ends: (cell, neighbour) -> position at which the connection meets the cell.
+        axes: axes of the cells, which are changed.
+        ends: position at which a connection ends at a cell, by the pair of this cell and the connected cell.
     """
     off = {pair: end - axes[pair[0]] for pair, end in ends.items()}
 
@@ -107,26 +107,26 @@ def _place(grid: Grid, layer: list[int], axes: list[float], wishes: list[list[Wi
 
 
 def distance(left: Cell, right: Cell) -> float:
-    """Return the least distance between the axes of two neighbouring cells."""
+    """Return the least distance between the axes of two cells that are neighbours in a layer."""
     return left.right + right.left + (NODE_GAP if left.is_node and right.is_node else LINE_GAP)
 
 
 PORT_GAP = 14.0
 TIGHT = 8.0
-"""The distance of ports if they would not fit otherwise."""
+"""Distance of ports in pixels if the usual distance exceeds the node's width."""
 CORNER = 11.0
-"""Free space at a node's corners."""
+"""Length at a node's corners where no link ends, in pixels."""
 BESIDE = 12.0
-"""Distance from a diamond's corner to links next to it."""
+"""Distance between a diamond's corner and links that end next to this corner, in pixels."""
 STRAIGHT = 16.0
-"""Weight of a connection that can be straight, relative to one that cannot."""
+"""Weight of a connection that can be straight; a connection that cannot has the weight 1."""
 
 Ports = dict[tuple[int, int], float]
-"""(cell, neighbour) -> position, across the drawing, at which the connection meets the cell."""
+"""Position across the drawing at which a connection ends at a cell, by the pair of this and the connected cell."""
 
 
 def assign_ports(nodes: Sequence[LayerNode], grid: Grid, axes: Sequence[float]) -> Ports:
-    """Return the ends of all connections between cells; lines and labels are met on their axis."""
+    """Return the ends of all connections between cells; at lines and labels, connections end on the axis."""
     ports: Ports = {}
     against = _against_the_order(grid)
     for number, cell in enumerate(grid.cells):
@@ -147,13 +147,16 @@ def assign_ports(nodes: Sequence[LayerNode], grid: Grid, axes: Sequence[float]) 
 
 
 def _against_the_order(grid: Grid) -> set[tuple[int, int]]:
-    """Return the connections of links that leave a node upwards or reach it from below."""
+    """Return the connections with which links leave their source upwards or reach their target from below."""
     ends = {(chain[0], chain[1]) for chain in grid.chains if chain[1] in grid.cells[chain[0]].up}
     return ends | {(chain[-1], chain[-2]) for chain in grid.chains if chain[-2] in grid.cells[chain[-1]].down}
 
 
 def _at_corner(axis: float, width: float, turning: Sequence[float | None]) -> list[float]:
-    """Place links at the corner; those against the order are next to it, on their side, if both kinds meet."""
+    """Return the ends of links at a diamond's corner.
+
+    If both kinds of links meet there, the links against the order end next to the corner, on their side.
+    """
     if None not in turning:
         return [axis] * len(turning)
     aside = min(BESIDE, width / 4)
@@ -175,7 +178,7 @@ def _spread(axis: float, width: float, wanted: Sequence[float]) -> list[float]:
 
 
 def _capped(places: Sequence[float], limit: float, tight: float) -> list[float]:
-    """Return the places, with the fewest possible moved down so that none is above the limit."""
+    """Return the places, of which as few as possible are reduced so that no place exceeds the limit."""
     result: list[float] = []
     for place in reversed(places):
         result.append(min(place, limit))

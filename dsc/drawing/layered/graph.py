@@ -1,4 +1,7 @@
-"""Graph and grid of a layered drawing: nodes in layers, links in cells; lengths in pixels, y grows down."""
+"""Graph and grid of a layered drawing: nodes in layers, and links as chains of cells.
+
+Lengths are in pixels, and y grows downwards.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +15,15 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class LayerNode:
-    """A box to be placed.
+    """A box to place in the drawing.
 
     Attributes:
-        width, height: its size.
-        beside: room to keep free on its right, e.g. for a loop.
-        pointed: all links meet it in the middle of its side, instead of spread along it.
-        diamond: it is pointed and only its corners reach its sides; links against the order end next to the corners.
-        last: no link may lead upwards to it.
+        width, height: size of the box.
+        beside: width of the free space right of the box, e.g. for a loop.
+        pointed: whether all links end in the middle of a side, instead of along the side.
+        diamond: whether the box is pointed and has the shape of a diamond, where links against the order end next to
+            the corners.
+        last: whether the box must be below all its sources, so that no link leads upwards to it.
     """
 
     width: float
@@ -35,10 +39,10 @@ class LayerLink:
     """An edge between two different nodes.
 
     Attributes:
-        source, target: positions of the nodes in the input.
-        width, height: size of its label; 0 without a label.
-        weight: importance of a straight line.
-        meant: the element inside the target that it leads to; links to the same element share a line.
+        source, target: indices of the nodes in the input.
+        width, height: size of the label; 0 without a label.
+        weight: importance of a straight line, relative to other links.
+        meant: name of the element inside the target at which the link ends; links to an equal element share a line.
     """
 
     source: int
@@ -51,7 +55,7 @@ class LayerLink:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """The line of a link from its source to its target, and the middle of its label."""
+    """The points of a link's line, from source to target, and the middle of the link's label."""
 
     points: tuple[Point, ...]
     label: Point
@@ -59,7 +63,7 @@ class Route:
 
 @dataclass(frozen=True, slots=True)
 class Arrangement:
-    """A finished drawing: the nodes' upper left corners and the links' routes, in the order of the input."""
+    """A finished drawing: upper left corners of the nodes and routes of the links, in the order of the input."""
 
     width: float
     height: float
@@ -68,22 +72,23 @@ class Arrangement:
 
 
 LABEL_GAP = 4.0
-"""Free space around a label's text."""
+"""Free space around a label's text, in pixels."""
 
 _Trunk = tuple[int, str, int, int]
-"""Key of links that share a line in a layer: target, element inside it, direction, layer."""
+"""Key of links that share a line in a layer: target, element inside the target, direction, layer."""
 
 
 @dataclass(slots=True)
 class Cell:
-    """An element with a place in a layer: a node, a label, or a line that passes.
+    """An element with a place in a layer: a node, a label, or a line that passes through the layer.
 
     Attributes:
-        layer: its layer, counted from the top.
-        left, right: its extents from its axis.
-        height: its height.
-        is_node, bend: a node; or only a line.
-        up, down: the connected cells in the layers above and below, with the weight of a straight connection.
+        layer: number of the layer, counted from the top.
+        left, right: extents to the left and right of the cell's axis.
+        height: height of the cell.
+        is_node: whether the cell is a node.
+        bend: whether the cell is only a line.
+        up, down: weight of a straight connection, by the index of the connected cell in the layer above or below.
     """
 
     layer: int
@@ -98,7 +103,7 @@ class Cell:
 
 @dataclass(slots=True)
 class Grid:
-    """The cells (the nodes come first), the chain of cells of each link, and the order in each layer."""
+    """The cells (nodes first), the chain of cells for each link, and the order of cells in each layer."""
 
     cells: list[Cell]
     chains: list[list[int]]
@@ -106,13 +111,13 @@ class Grid:
 
 
 def effort(grid: Grid) -> int:
-    """Return the number of improvement rounds for a drawing of that size, to bound the time to seconds."""
+    """Return the number of improvement rounds for a grid; large grids have few rounds, to bound the time to seconds."""
     size = len(grid.cells)
     return 8 if size < 3_000 else 4 if size < 20_000 else 1
 
 
 def build_grid(nodes: Sequence[LayerNode], links: Sequence[LayerLink]) -> Grid:
-    """Put nodes into layers and break links into chains of cells."""
+    """Return the grid of a graph: nodes are assigned to layers, and links are divided into chains of cells."""
     rank = {node: place for place, node in enumerate(sorted(range(len(nodes)), key=lambda i: nodes[i].last))}
     layers = _layers(rank, links)
     cells = [
@@ -125,7 +130,10 @@ def build_grid(nodes: Sequence[LayerNode], links: Sequence[LayerLink]) -> Grid:
 
 
 def _layers(rank: dict[int, int], links: Sequence[LayerLink]) -> list[int]:
-    """Place every node as high as its links allow, then down if this shortens its links; unconnected ones last."""
+    """Return the layer of each node.
+
+    Each node is as high as its links allow, then moves down if this shortens its links. Nodes without links are last.
+    """
     above: dict[int, set[int]] = {node: set() for node in rank}
     below: dict[int, set[int]] = {node: set() for node in rank}
     for link in links:
@@ -179,7 +187,7 @@ def _connect(cells: list[Cell], one: int, other: int, step: int, weight: float) 
 
 
 def _in_order_of_visit(cells: list[Cell]) -> list[list[int]]:
-    """Return the layers in the order in which a walk along the connections, from the first node on, meets the cells."""
+    """Return each layer's cells in the order in which a walk along connections, from the first node, reaches them."""
     layers: list[list[int]] = [[] for _ in range(1 + max((cell.layer for cell in cells), default=-1))]
     seen: set[int] = set()
     for root in range(len(cells)):
@@ -194,11 +202,11 @@ def _in_order_of_visit(cells: list[Cell]) -> list[list[int]]:
 
 
 SMALL = 400
-"""Number of cells up to which drawings get the more thorough treatment."""
+"""Largest number of cells for which the slower, more thorough methods are used."""
 
 
 def order_cells(grid: Grid) -> None:
-    """Reorder every layer of the grid; keep the best order found, the first of equal ones."""
+    """Reorder the layers of the grid to reduce crossings; the best order is kept, and the first of equal orders."""
     rounds = effort(grid) + 4 * (len(grid.cells) <= SMALL)
     best, fewest = [list(layer) for layer in grid.layers], _crossings(grid)
     for number in range(2 * rounds):
@@ -235,7 +243,7 @@ def _positions(layers: Iterable[list[int]]) -> dict[int, int]:
 
 
 def _exchange(grid: Grid) -> None:
-    """Exchange neighbours in a layer while that removes crossings."""
+    """Exchange neighbouring cells in a layer while an exchange reduces the number of crossings."""
     position = _positions(grid.layers)
     for layer in grid.layers:
         for place in range(len(layer) - 1):
@@ -246,7 +254,7 @@ def _exchange(grid: Grid) -> None:
 
 
 def _between(grid: Grid, left: int, right: int, position: dict[int, int]) -> int:
-    """Return the number of crossings of two cells' connections if `left` is left of `right`."""
+    """Return the number of crossings between the connections of two cells if `left` is left of `right`."""
     count = 0
     for downwards in (True, False):
         others = [position[n] for n in _neighbours(grid.cells[right], downwards=downwards)]
@@ -261,7 +269,7 @@ def _crossings(grid: Grid) -> int:
 
 
 def _inversions(grid: Grid, layer: list[int], position: dict[int, int]) -> int:
-    """Return the crossings below a layer: pairs of connections whose lower ends are in the opposite order."""
+    """Return the number of crossings below a layer: pairs of connections whose lower ends are in opposite order."""
     count = 0
     before: list[int] = []
     for end in (end for cell in layer for end in sorted(position[n] for n in grid.cells[cell].down)):
