@@ -166,7 +166,7 @@ def _carried_over(error: BaseException) -> Exception:
     """Return a thread's error in a form that a future accepts.
 
     A future rejects `StopIteration`. An error that is not an `Exception`, e.g. `SystemExit`, would end the program. The
-    function replaces both by a `RuntimeError`.
+    function replaces both kinds of error by a `RuntimeError`.
     """
     with suppress(BaseException):  # an exception may fail while its class is inspected
         if isinstance(error, Exception) and not isinstance(error, StopIteration | type):

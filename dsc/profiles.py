@@ -22,8 +22,9 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
 
     Raises:
         UnknownNameError: a component or parameter of the profile does not exist.
-        SchemaError: a value has another type, is out of range, or may not be set by a profile. Or a relation between
-            parameters is violated, or a parameter has no value. The message has the place and the range.
+        SchemaError: a value has another type, is out of range, or may not be set by a profile. The error is also raised
+            if a relation between parameters is violated, or a parameter has no value. The message has the place and the
+            range.
     """
     by_name = {component.name: component for component in components}
     settings = {} if profile is None else profile.components

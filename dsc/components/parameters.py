@@ -224,8 +224,9 @@ def check_declarations(
         module: the module of the class, for messages.
 
     Raises:
-        InputError: a type, role or name is unknown, a range is empty, or a default is outside its range. Or a relation
-            is not a condition. The message has the file, the parameter, the value found and the nearest name.
+        InputError: a type, role or name is unknown, a range is empty, or a default is outside its range. The error is
+            also raised if a relation is not a condition. The message has the file, the parameter, the value found and
+            the nearest name.
     """
     try:
         for name, parameter in declares.items():

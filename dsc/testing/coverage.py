@@ -33,7 +33,7 @@ class Coverage:
         wanted = [self._library.plot(name) for name in only] or list(self._library)
         self._items = {plot.name: {item.key: item for item in items_of(plot)} for plot in wanted}
         self._reached: set[tuple[str, Key]] = set()
-        self._inside: dict[str, str | None] = {}  # path of the host state -> plot; None if the plot is not covered
+        self._inside: dict[str, str | None] = {}  # plots by path of the host state; None for a plot that is not covered
         self._seen: dict[int, tuple[ActionPlot, bool]] = {}
 
     def add(self, *steps: Step) -> None:

@@ -1,7 +1,7 @@
 """Crashes of runs with a store at critical points, and their recovery until the run ends.
 
-`kill -9` leaves the files in their present state. A simulated crash therefore copies the files at that point and
-abandons the old program; a new program resumes the run from the copy.
+`kill -9` leaves the files in their present state. A simulated crash therefore copies the files and abandons the old
+program; a new program resumes the run from the copy.
 """
 
 from __future__ import annotations

@@ -96,8 +96,8 @@ def rehearse(
         until: seconds after which the rehearsal ends the run with a problem.
 
     Raises:
-        InputError: the plot is unknown, an argument is wrong, or an event or change is invalid. Or the script does not
-            match: a called skill has no answer, or the skill does not declare the answer.
+        InputError: the plot is unknown, an argument is wrong, or an event or change is invalid. The error is also
+            raised if a called skill has no scripted answer, or does not declare the answer.
         Exception: an exception of a function of the script, e.g. a failed assertion about its call.
     """
     known = knowledge if knowledge is not None else world()

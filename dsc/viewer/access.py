@@ -77,7 +77,7 @@ class PageAddress:
 
     @property
     def one_time_url(self) -> str:
-        """The address for a browser's command line, which other users can read; it is valid one time."""
+        """The address for a browser's command line, which other users can read; the address is valid one time."""
         return f"http://127.0.0.1:{self.port}/?code={self.code}"
 
 

@@ -140,7 +140,7 @@ class Broadcast:
                 self._going = None
 
     def wake(self) -> None:
-        """Start a round, as there are new records, or a socket can send again."""
+        """Start a round after new records, or after a socket has finished sending."""
         self._more.set()
 
     async def _go_on(self) -> None:

@@ -2,7 +2,7 @@
 
 Lines on standard input are records as in a trace, or messages:
 
-- `begin` is the first message, with the `socket` to serve, its keys `token` and `code`, and whether there is `control`.
+- `begin` is the first message, with the `socket` to serve, its keys `token` and `code`, and the truth value `control`.
 - Later messages are `paused`, an `answer` to a command, and `end`.
 
 Lines on standard output are the page's commands, each with a number. The end of the input ends the page.
