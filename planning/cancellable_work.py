@@ -110,7 +110,7 @@ async def aside(work: Callable[[], T], patience: WorkLimit | None = None) -> T:
     def run() -> None:
         try:
             done = work()
-        except BaseException as error:  # noqa: BLE001  passed to the waiting task
+        except BaseException as error:  # noqa: BLE001  the waiting task receives the error
             failed(error if isinstance(error, Exception) else RuntimeError(described(error)))
         else:
             answered(done)

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from knowledge_base.world.computation import Computed
     from planning.plan import PlanStep
 
-_MOST_GROUND = 1024  # steps; a plan for 50 items has about 130
+_MOST_GROUND = 1024  # steps; a plan for 50 items has about 130 steps
 
 __all__ = ["Axiom", "Duration", "PlanningAction", "PlanningDomain"]
 

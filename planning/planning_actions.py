@@ -63,7 +63,7 @@ def checked(action: ActionText, schema: Schema) -> PlanningAction:
     """
     for parameter in action.parameters:
         for one in parameter.types:
-            schema.require_type(one, parameter.place)  # an argument is an object
+            schema.require_type(one, parameter.place)  # each argument is an object
     variables = check_parameters(action.parameters, schema)
     # An unknown constant is an error, because a domain does not contain the objects of a problem.
     timed = action.timed or DurativeParts(start=action.precondition, end_effect=action.effect)

@@ -84,7 +84,7 @@ def _as_scheduled(plan: Plan, derived: Derivation, world: World) -> Overlay | Va
             return Validation(valid=False, failing_step=index, why=str(error))
 
     def after(state: Overlay, changes: Changes) -> Overlay:
-        ahead = Overlay(world)  # not an overlay on `state`: a plan with many events would stack as many overlays
+        ahead = Overlay(world)  # an overlay on `state` would lead to one overlay per event
         ahead.apply(state.delta)
         ahead.apply(_delta(changes, world.schema))
         return ahead

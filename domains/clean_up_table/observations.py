@@ -225,7 +225,7 @@ def _sighted(notes: _Notes, sighting: Sighting) -> None:
     else:
         for surface in SURFACES:
             notes.holds_not("lies-at", item, surface)
-        # The plots decide whether the item is tidy there: an item in a carrier that cannot be grasped is not.
+        # The plots decide whether the item is tidy, because an item in a carrier that cannot be grasped is not tidy.
         notes.holds("inside", item, sighting.where)
     if sighting.new:
         notes.holds("goes-to", item, DESTINATION_OF[sighting.kind])

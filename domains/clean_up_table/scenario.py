@@ -152,7 +152,7 @@ class Scenario(_ScenarioForm):
     def _items(self) -> list[Item]:
         table = self.table
         items = Inventory()
-        # A numbered item, which is added later, may hide a named one. The attribute `behind` is therefore set last.
+        # A numbered item, which is added later, may hide a named item. The attribute `behind` is therefore set last.
         for name, named in table.items.items():
             items.add(new_item(_KINDS[named.kind], name, size=named.size or _DEFAULT_SIZE))
         for kind, sizes in (

@@ -164,7 +164,9 @@ class PlannerProcess:
                     yield replace(outcome, reproducible=not cut_short) if isinstance(outcome, PlanFound) else outcome
                 else:
                     return
-            seconds -= min(time.monotonic() - started, seconds / 2)  # the restart of a process does not count
+            seconds -= min(
+                time.monotonic() - started, seconds / 2
+            )  # the restart of a process does not count as planning time
         async with aclosing(self._attempt(last(), seconds)) as outcomes:
             async for outcome in outcomes:
                 yield replace(outcome, reproducible=not cut_short) if isinstance(outcome, PlanFound) else outcome

@@ -78,7 +78,7 @@ class EngineProcess:
         weakref.finalize(self, _close, (self._to, self._from, self._woken, self._wake))
         folder = tempfile.mkdtemp(prefix="engine-")
         try:
-            popen = subprocess.Popen(  # noqa: S603  the command is fixed, or a test's
+            popen = subprocess.Popen(  # noqa: S603  the command is fixed, or belongs to a test
                 command,
                 stdin=its_input,
                 stdout=its_output,
@@ -175,7 +175,7 @@ class EngineProcess:
         except OutOfTimeError:
             self._abandon()
             raise
-        except (OSError, ValueError, RecursionError) as error:  # a broken pipe, or no JSON
+        except (OSError, ValueError, RecursionError) as error:  # a broken pipe, or output that is not JSON
             self.kill()
             raise EngineStoppedError(str(error)) from error
 
@@ -250,7 +250,7 @@ def _environment(folder: str) -> dict[str, str]:
 
 
 def _runs(pid: int) -> bool:
-    """Return whether a child process is running; its process id stays reserved because it is not reaped here."""
+    """Return whether a child process is running; the test does not reap it, so its id stays reserved."""
     try:
         return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
     except ChildProcessError:
@@ -290,7 +290,7 @@ async def answers(process: EngineProcess, request: bytes, seconds: float) -> Asy
     def ask() -> None:
         try:
             process.ask(request, deadline, tell)
-        except Exception as error:  # noqa: BLE001  passed to the waiting task
+        except Exception as error:  # noqa: BLE001  the waiting task receives the error
             tell(error)
         else:
             tell(None)

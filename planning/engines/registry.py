@@ -224,7 +224,7 @@ def _dependencies() -> list[str]:
     """Return the distributions that every installation of this project requires."""
     try:
         needed = requires(DISTRIBUTION) or []
-    except PackageNotFoundError:  # run from a checkout that is not installed
+    except PackageNotFoundError:  # the project is not installed, e.g. in a plain checkout
         return []
     return [re.split(r"[^\w.-]", one, maxsplit=1)[0] for one in needed if "extra ==" not in one]
 

@@ -94,7 +94,7 @@ def _loaded(name: str) -> Search:
         one = engine(name)
         driver = import_module(f"planning.engines.{one.driver}")
         searching: Search = driver.searching(one)
-    except Exception as error:  # noqa: BLE001  a broken installation is an answer, too
+    except Exception as error:  # noqa: BLE001  each request then receives the import error
         failure = error
 
         def failing(request: Request) -> Answers:  # noqa: ARG001

@@ -198,7 +198,7 @@ class Monitor:
             return
         world = self._knowledge.snapshot()  # reads of a snapshot need no lock
         if later:
-            # Effects of the running step do not matter: the plan is shortened if a later step can be the next one.
+            # Effects of the running step do not matter here, because a later step may become the next step.
             if shortest_end(progress.coming(), self._domain, world, progress.goal) is None:
                 self._hear(self._broken(author, firing.version, e))
         elif not progress.stands(world):  # the change breaks the running step

@@ -221,7 +221,7 @@ class Monitoring:
         return (step, *end)
 
     def _shorten(self, steps: tuple[PlanStep, ...]) -> Outcome | None:
-        """Omit steps; the running step continues if it is the first step of the shorter plan."""
+        """Omit steps; the running step continues if the shorter plan begins with an equal step."""
         run, why = self._run, "fewer steps lead to the goal"
         skipped = [step for step in run.progress.remaining_steps if step not in steps]
         self._records.skipped(run.name, skipped, why)

@@ -325,5 +325,7 @@ def _true(condition: Expression, world: World) -> bool:
     if isinstance(condition, Atom) and condition.predicate in world.schema.predicates:
         args = [term.value for term in condition.args if isinstance(term, Constant)]
         if len(args) == len(condition.args) and condition.predicate not in world.schema.computed:
-            return world.holds(condition.predicate, tuple(args))  # the most frequent case
+            return world.holds(
+                condition.predicate, tuple(args)
+            )  # a shortcut for ground facts, the most frequent conditions
     return is_true(condition, world)

@@ -265,12 +265,12 @@ class CausalNeeds:
         Both are usually few; all other needs stay unchanged.
         """
         plain, changed_here = step.plain, step.changed
-        if plain is None:  # its changes depend on the world, so it may change each condition with one of its predicates
+        if plain is None:  # changes that depend on the world may affect each condition with one of their predicates
             return [], [one for one in after.needed if not changed_here.isdisjoint(self._about(one))]
         touched = [one for one in after.open if not changed_here.isdisjoint(self._about(one))]
         if not after.needed.keys().isdisjoint(plain.deletes):
             hit = {*plain.deletes, *touched}
-            touched = [one for one in after.needed if one in hit]  # in their order
+            touched = [one for one in after.needed if one in hit]  # in the order of the needs
         return [atom for atom in plain.adds if atom in after.needed], touched
 
     def _about(self, condition: Expression) -> frozenset[str]:

@@ -106,7 +106,7 @@ class CausalTrace:
         """Add those changes of a step that depend on the simulated world, and apply them to that world."""
         doing = _doing(action, step, effect, domain, self._world)
         for condition in dict.fromkeys(doing.conditions):
-            if holds(condition, self._world, {}):  # otherwise the step's own start makes it true
+            if holds(condition, self._world, {}):  # otherwise the start of the step itself makes the condition true
                 self._need_support(number, condition, step)
         for fluent in doing.reads:
             self._rely(number, fluent)

@@ -42,7 +42,7 @@ from planning.strips import Problem, UnsupportedActionError, UnsupportedGoalErro
 # Names with blanks differ from every declared name.
 _ACTING, _FINISHED = Literal(Fact("still acting")), Literal(Fact("finished acting"))
 _ONE_OF = "one of"
-_MOST_KEPT = 8  # kinds of goals, each with its ground actions
+_MOST_KEPT = 8  # sets of ground actions, one for each kind of goal
 
 
 def build_problem(
@@ -228,7 +228,7 @@ class ProblemBuilder:
         slice_ = pruned(task, _only(left.keys() - set(gone), len(task.ways.all)))
         if notes:
             slice_ = _evenly_priced(slice_)
-        if task.numbering.fluents:  # numeric fluents have the values of this version
+        if task.numbering.fluents:  # numeric fluents must have the values of this version
             now = problem(task, world)
             return replace(problem(slice_, world), unsliced=lambda: now)
         return replace(problem(slice_, None), unsliced=whole)

@@ -144,7 +144,7 @@ def spared(task: Task) -> list[int]:
     last: dict[str, str] = task.ways.known("replaced", dict)
     gone: set[int] = set()
     for name, listed in mentions.items():
-        # The object that replaced it in the last problem mostly replaces it again.
+        # The object that replaced `name` in the last problem can usually replace it again.
         for other in [last[name], *stand_ins] if last.get(name) in stand_ins else stand_ins:
             exchange = exchanges.get((name, other))
             if exchange is None:

@@ -248,7 +248,7 @@ class Task:
     settled: frozenset[int] = frozenset()
 
 
-_MOST_KEPT = 20_000  # ground actions; a problem of 50 items has 3,000
+_MOST_KEPT = 20_000  # ground actions; a problem of 50 items has 3,000 ground actions
 
 
 class Assembly:

@@ -63,7 +63,7 @@ def build_temporal_problem(
     """
     matters = _relevant(domain, goal)
     actions = {action.name: domain.actions[action.name] for action in matters.actions}
-    # The bounds of durations read functions too.
+    # Functions in the bounds of durations are relevant too.
     changing = matters.changing.union(*(changed(action.effect) for action in matters.actions))
     try:
         wanted = _literals(Grounder(world, matters.changing, keep_false=True, patience=patience).residual(goal, {}))
