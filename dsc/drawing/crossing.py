@@ -120,7 +120,7 @@ def _led_on(box: Box, name: str, last: tuple[Point, Point], drawn: Sequence[Draw
 
 
 def _inwards(way: Sequence[Box], last: tuple[Point, Point], drawn: Sequence[DrawnEdge]) -> list[Point]:
-    """Return the line from the border of the first box on the path `way` to the border of the last box."""
+    """Return the line from the border of the first box on the path to the border of the last box."""
     box, ports = way[0], _ports(way[-1])
     vertical = abs(last[0][0] - last[1][0]) < abs(last[0][1] - last[1][1])
     start = _shifted(last[1], _direction(*last), TRACKS[0])

@@ -5,9 +5,9 @@ back. All other handlers expand into regions parallel to the whole plot, one reg
 
     active { plot: ... ended_reached | low_bat: awaited <-> handled }  --> ended
 
-The orthogonal state executes each handler's `listen` only on its own entry. A second activation would repeat the
-event while its cause persists. The orthogonal state fires each received event again, under a separate name, for the
-states inside.
+The orthogonal state executes the handlers' `listen` actions on its entry and never again. A second activation would
+repeat the event while the event's cause persists. For its inner states, the orthogonal state fires each received event
+again, under a separate name.
 """
 
 from __future__ import annotations

@@ -207,8 +207,8 @@ class Macrostep:
         try:
             return self._performer.holds(frame, condition)
         except InputError as error:
-            # A guard's error is reported once in a macrostep: guards without trigger are evaluated after every
-            # microstep. In SCXML a guard with a trigger fails for each event (SCXML 5.9.1).
+            # A guard's error is reported only once in a macrostep, because guards without trigger are evaluated after
+            # every microstep. In SCXML the error of a guard with a trigger is reported for each event (SCXML 5.9.1).
             each = frame.compiled.scxml and edge.place[0] == "on"
             broken = (frame.serial, edge, self._turn if each else 0)
             if broken not in self._broken_guards:

@@ -1,4 +1,4 @@
-"""Steps and their outputs: immutable values; tests, trace and replay read the same record."""
+"""Steps and their outputs: immutable values, which tests, trace and replay read."""
 
 from __future__ import annotations
 

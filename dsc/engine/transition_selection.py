@@ -83,7 +83,7 @@ def select(root: Frame, trigger: Trigger, guard: Guard) -> tuple[list[Enabled], 
     """Select the transitions that a trigger enables in a frame and all its inner frames.
 
     Returns:
-        A pair of lists: the transitions to take, without conflicts, and those whose source's least time has not passed.
+        Two lists: the transitions to take, without conflicts; transitions whose source's least time has not passed.
     """
     found = (_first_enabled(frame, leaf, trigger, guard) for frame, leaf in _leaves(root))
     enabled = dict.fromkeys(one for one in found if one is not None)

@@ -32,7 +32,7 @@ class State(TransitionSource):
 
     Attributes:
         entry: external actions on entry; in dialect `scxml` also internal ones.
-        exit: actions on exit, of the same kinds.
+        exit: external actions on exit; in dialect `scxml` also internal ones.
         on_break: actions on interruption, an exit by the transition of another state (S2.3). They replace `exit`; if
             `on_break` is empty, `exit` is executed.
         at_least: seconds after entry before the state's own transitions are enabled (S3.1). An event for these

@@ -71,7 +71,7 @@ class _Levels:
         self.height = y
 
     def _gap(self, upper: int, top: float) -> float:
-        """Assign the tracks below the layer `upper`, which ends at the height `top`; return the tracks' total height."""
+        """Assign the tracks below the layer `upper`, which ends at the height `top`; return their total height."""
         above, below = (AT_NODES, AT_LABELS) if upper % 2 == 0 else (AT_LABELS, AT_NODES)
         members = self._nets(self._grid.layers[upper])
         nets = [
