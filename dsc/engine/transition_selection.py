@@ -75,7 +75,7 @@ class Enabled:
         return self.is_inside(other) and bool(self.left() & other.left())
 
     def has_to_wait(self) -> bool:
-        """Return whether the transition leads to a target but its source's least time has not passed."""
+        """Return whether the transition must wait: it has a target, and its source's least time has not passed."""
         return self.edge.source in self.frame.configuration.waiting and bool(self.edge.targets)
 
 
