@@ -262,7 +262,7 @@ class MachineState(NamedTuple):
         return self.root is not None and any(serial in one.activations.values() for one in self.root.frames())
 
     def activations_inside(self, serial: int) -> frozenset[int]:
-        """Return `serial` and the serial numbers of all activations inside its state; empty if the state is not active."""
+        """Return `serial` and the serial numbers of activations inside its state; empty if the state is not active."""
         for frame in self.root.frames() if self.root else ():
             for name, own in frame.activations.items():
                 if own == serial:

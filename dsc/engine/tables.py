@@ -69,8 +69,8 @@ _TABLES = frozenset({"edges", "timeouts", "cycles", "always"})
 class StateNode:
     """Node of a compiled plot: a state, a region or, at index 0, the plot itself.
 
-    The tables of transitions are built on first use, because a run may reach only the beginning of a long plot, e.g. of
-    a plot made from a plan.
+    The tables of transitions are built on first use, because a run may reach only the beginning of a long plot. Plots
+    made from plans are often long.
 
     Attributes:
         index: position of the node in document order.
