@@ -49,6 +49,7 @@ check: $(VENV)/.test   ## ruff, mypy strict, import contracts, prose
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
+	$(BIN)/mypy --config-file tests/mypy.toml tests
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/python tests/prose.py
 

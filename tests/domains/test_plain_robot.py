@@ -66,7 +66,9 @@ def grasp(robot: Robot, skill: str, **where: str) -> bool:
             return put_away(robot) if skill == "take_out" else True
         if event not in {"grasp_failed", "no_ik"}:
             return False
-        if robot.values[fact("failures", item)] > 3:
+        failures = robot.values[fact("failures", item)]
+        assert isinstance(failures, int | float)
+        if failures > 3:
             robot.facts.discard(fact("graspable", item))
     return False
 
@@ -90,7 +92,9 @@ def go(robot: Robot, place: str) -> bool:
         event = robot.do("drive", to=place).event
         if event != "no_path":
             return event == "arrived"
-        if robot.values[fact("detours", place)] > 3:
+        detours = robot.values[fact("detours", place)]
+        assert isinstance(detours, int | float)
+        if detours > 3:
             robot.facts.discard(fact("passable", place))
     return False
 
