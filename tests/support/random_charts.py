@@ -12,11 +12,15 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
 
-from dsc_charts import marked
+from dsc_charts import Run, activations, marked
 from hypothesis import strategies as st
 
+from dsc.engine.steps import StartTimer
+from dsc.errors import RunawayError
+from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.model.transitions import as_tuple
+from knowledge_base.facts import Fact
 
 EVENTS = ("e", "f", "g")
 GUARDS = ("(p)", "(not (p))", "(q)", "(and (p) (not (q)))", "(< ?v 2)", "(= ?v 2)", "(> ?event.n 1)")
@@ -389,3 +393,50 @@ def some_happenings(pick, scxml=False):
     kinds = (*events, *events, "leave", "to", "time", "time")
     attributes: tuple[dict[str, int], ...] = ({}, {"n": 1}, {"n": 2})
     return [(pick(kinds), pick(range(8)), pick(attributes)) for _ in range(pick(range(4, 11)))]
+
+
+class Played(Run):
+    """A run to which random things happen.
+
+    Timers go off in the order in which they were asked for; a chart that goes round ends the play.
+    """
+
+    def __init__(self, *plots):
+        super().__init__(*plots)
+        self.timers = []
+
+    def steps(self, happened):
+        try:
+            yield self.after(self.start())
+            for what, which, attributes in happened:
+                event = self.event(what, which, attributes)
+                if event is not None:
+                    yield self.after(self._commit(self.machine.send(event, self.situation())))
+        except RunawayError:
+            return
+
+    def event(self, what, which, attributes):
+        if what == "time":
+            return self.timer(which)
+        if what == "to":
+            root = self.machine.state.root
+            serials = [serial for _, serial in activations(root) if serial] if root else []
+            return Event("e", attributes, to=serials[which % len(serials)]) if serials else None
+        if what in ("p", "q"):
+            self.facts ^= {Fact(what)}
+            return None
+        return self.made(what, attributes)
+
+    def made(self, what, attributes):
+        return Event(what, attributes)
+
+    def timer(self, which):
+        if not self.timers:
+            return None
+        timer = self.timers.pop(which % len(self.timers))
+        return Event(timer.event, to=timer.activation, exact=True, number=timer.index)
+
+    def after(self, step):
+        self.timers += [one for one in step.output if isinstance(one, StartTimer)]
+        self.timers = [one for one in self.timers if step.state.has_activation(one.activation)]
+        return step

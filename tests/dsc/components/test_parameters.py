@@ -7,6 +7,7 @@ import re
 from typing import ClassVar
 
 import pytest
+from dsc_base import Base
 
 from dsc import Component, Library, Outcome, Sequencer, parse_plot, skill, validate_plot
 from dsc.components.parameters import Parameter
@@ -16,19 +17,6 @@ from dsc.sequencer.sequencer import RunEnd
 from dsc.text.profiles import parse_profile
 from knowledge_base import InputError, KnowledgeBase
 from knowledge_base.world.schema import Schema
-
-
-class Base(Component):
-    name = "base"
-    declares: ClassVar = {
-        "speed": Parameter("number", default=0.5, least=0.1, most=1.5),
-        "mode": Parameter("text", default="calm", among=("calm", "brisk")),
-        "port": Parameter("text", changed_by="profile"),
-        "wheels": Parameter("number", default=4, changed_by="nobody"),
-        "light": Parameter("boolean", default=False, changed_by="rules"),
-        "cycle": Parameter("number", default=2.0, least=0),
-    }
-    relations = ("(<= ?speed (* 0.5 ?cycle))",)
 
 
 def test_each_instance_begins_with_what_its_builder_says_and_has_values_of_its_own():

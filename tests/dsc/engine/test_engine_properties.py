@@ -6,18 +6,15 @@ import json
 import random
 
 import pytest
-from dsc_charts import PROPERTY, Run, activations, modes
+from dsc_charts import PROPERTY, modes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from legality import check_legal, check_serials
-from random_charts import Grower, happenings, in_place, libraries
+from random_charts import Grower, Played, happenings, in_place, libraries
 
 from dsc.engine import machine_state, macrostep, reaction, reaction_choice
 from dsc.engine.machine_state import MachineState
-from dsc.engine.steps import StartTimer
-from dsc.errors import RunawayError
 from dsc.events import Event
-from knowledge_base.facts import Fact
 
 SMALL = {"depth": 2}
 EVERY_KIND = st.one_of(libraries(**SMALL), libraries(scxml=True, **SMALL))
@@ -31,53 +28,6 @@ def _goes_round_soon():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(macrostep, "MAX_MICROSTEPS", 60)
         yield
-
-
-class Played(Run):
-    """A run to which random things happen.
-
-    Timers go off in the order in which they were asked for; a chart that goes round ends the play.
-    """
-
-    def __init__(self, *plots):
-        super().__init__(*plots)
-        self.timers = []
-
-    def steps(self, happened):
-        try:
-            yield self.after(self.start())
-            for what, which, attributes in happened:
-                event = self.event(what, which, attributes)
-                if event is not None:
-                    yield self.after(self._commit(self.machine.send(event, self.situation())))
-        except RunawayError:
-            return
-
-    def event(self, what, which, attributes):
-        if what == "time":
-            return self.timer(which)
-        if what == "to":
-            root = self.machine.state.root
-            serials = [serial for _, serial in activations(root) if serial] if root else []
-            return Event("e", attributes, to=serials[which % len(serials)]) if serials else None
-        if what in ("p", "q"):
-            self.facts ^= {Fact(what)}
-            return None
-        return self.made(what, attributes)
-
-    def made(self, what, attributes):
-        return Event(what, attributes)
-
-    def timer(self, which):
-        if not self.timers:
-            return None
-        timer = self.timers.pop(which % len(self.timers))
-        return Event(timer.event, to=timer.activation, exact=True, number=timer.index)
-
-    def after(self, step):
-        self.timers += [one for one in step.output if isinstance(one, StartTimer)]
-        self.timers = [one for one in self.timers if step.state.has_activation(one.activation)]
-        return step
 
 
 @SOME

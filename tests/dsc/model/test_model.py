@@ -6,7 +6,7 @@ import functools
 import json
 
 import pytest
-from dsc_charts import PROPERTY, plot
+from dsc_charts import EVERYTHING, PROPERTY, plot
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -37,58 +37,6 @@ from knowledge_base.language.syntax.expression import (
     Not,
     Variable,
 )
-
-EVERYTHING = plot("""
-    plot: everything
-    about: "one of each kind: a # in it"
-    parameters: {item: item, to: {type: place, default: table}}
-    variables: {n: {type: number, initial: 0}, found: item}
-    outputs: {where: place, tries: {type: number, initial: 0}}
-    receives: {stop: , moved: {who: item}}
-    emits: {failed: {reason: text}, lost: }
-    when: (and (on ?item table) (not (gone ?item)))
-    implements: pick-up
-    effects: assumed
-    confirm: 2.5
-    initial: second
-    states:
-      first:
-        entry:
-          - {set: arm.approach, to: side}
-          - {trigger: arm.pick, with: {item: ?item, speed: 0.5}, as: {picked: taken}, within: 3}
-        exit: {switch: arm, to: neutral}
-        on_break: {switch: arm, to: "off"}
-        at_least: 0.5
-        every: {seconds: 2, when: (p), assign: {n: 0}}
-        on:
-          taken: {to: second, pass: {a: ?event.item}, clear: [box, "both*"]}
-          failed: {emit: failed, with: {reason: ?event.reason}, to: over}
-          retry:
-            - {to: first, when: (< ?n 3), assign: {n: (+ ?n 1)}, tell: (and (tried ?item) (not (fresh ?item)))}
-            - over
-          here: {do: [{assign: {n: 1}}, {tell: (p)}, {emit: local, with: {a: 1}}]}
-        after: [{seconds: 5, to: over}, {seconds: (* 2 ?n), to: second}]
-        always: [{to: second, when: (done)}]
-      second: {use: other, with: {a: ?item, text: "two words"}, on: {done: third}}
-      third:
-        dynamic: [one, two]
-        with: {item: ?item}
-        goal: (forall (?i - item) (tidy ?i))
-        budget: {replans: 1, seconds: 2}
-        on: {done: box, no_plan: over, gave_up: over}
-      box: {states: {in_a: {on: {e: in_b}}, in_b: {final: true}}, initial: in_a, on: {done: both}}
-      both:
-        regions:
-          left: {states: {l: {}}, initial: l}
-          right: {states: {r: {}}}
-        on: {stop: over}
-      either: {choice: [{when: (p), to: first, assign: {n: 1}}, second]}
-      which: {select: ?item, cases: {cup: first, 3: {to: second, when: (p)}, "true": third, '"4"': box}, else: over}
-      over: {final: true, emit: lost}
-    rules:
-      - {on: failed, when: (< (failures ?event.item) 4), of: [second], do: {use: other, with: {a: 1}, then: retry, limit: 2}}
-      - {on: failed, do: {tell: (p), then: over}}
-""")  # fmt: skip
 
 
 @pytest.mark.parametrize(

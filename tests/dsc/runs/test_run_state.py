@@ -9,8 +9,7 @@ import pytest
 from dsc_charts import PROPERTY
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_charts import happenings, libraries
-from test_engine_properties import Played
+from random_charts import Played, happenings, libraries
 
 from dsc.calls import Outcome
 from dsc.engine.machine_state import MachineState

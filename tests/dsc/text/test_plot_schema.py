@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
+from dsc_charts import EVERYTHING
 from jsonschema import Draft202012Validator
-from test_model import EVERYTHING
 
 from dsc.text.plot_files import json_schema, plot_to_yaml
 from dsc.text.yaml import load_document

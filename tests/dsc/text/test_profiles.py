@@ -6,8 +6,8 @@ import json
 import re
 
 import pytest
+from dsc_base import Base
 from jsonschema import Draft202012Validator
-from test_parameters import Base
 from typer.testing import CliRunner
 
 from dsc import Component, parse_plot
