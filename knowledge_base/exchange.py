@@ -56,7 +56,7 @@ def delta_form(delta: Delta) -> Form:
 
 
 def delta_of(form: Form) -> Delta:
-    """Return the change of a form; the inverse of `delta_form`."""
+    """Return the change that a form describes; the inverse of `delta_form`."""
     return Delta(
         nodes=form.get("nodes", {}),
         removed=tuple(_facts(form.get("removed", ()))),
@@ -142,7 +142,7 @@ def _signature(name: str, parameters: list[list[Any]], result: str | None = None
 
 
 def to_json(state: WorldState, version: int) -> str:
-    """Return the world as JSON text; the docstring of the module describes facts and values."""
+    """Return the world as JSON text; the module docstring shows how facts and values are written."""
     said = {
         "format": FORMAT,
         "version": version,

@@ -73,7 +73,7 @@ class Transaction:
         self.apply(Delta(removed=(Fact(predicate, args),)))
 
     def replace(self, predicate: str, *args: Value) -> None:
-        """Make the fact true, and each fact with another last argument false: `tx.replace("at", "cup1", "shelf")`.
+        """Make a fact true and those false that differ in the last argument only: `tx.replace("at", "cup1", "shelf")`.
 
         Errors as for `tell`. The predicate must have an argument; a predicate with a single argument must be
         functional.

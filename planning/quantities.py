@@ -14,7 +14,7 @@ from knowledge_base.language.evaluation.world import World
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """An arithmetic operation `+ - * /` on quantities; `-` with one argument is the negative value."""
+    """An arithmetic operation `+ - * /` on quantities; `-` with one argument negates it."""
 
     operator: str
     args: tuple[Quantity, ...]
@@ -89,7 +89,7 @@ class Assignment:
 
 
 def helps(change: Assignment, bound: NumericBound) -> bool:
-    """Return whether a change may make a false bound true; the result `False` is certain, `True` is not."""
+    """Return whether a change may make a bound true that is now false. `False` is certain; `True` means "possibly"."""
     if not change.increase or isinstance(change.amount, Fact | Operation) or bound.operator == "=":
         return True
     slopes = linear(Operation("-", (bound.left, bound.right)))

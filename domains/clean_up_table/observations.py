@@ -1,7 +1,7 @@
 """Results of the world's verbs, and the changes of the robot's knowledge that follow from them.
 
-A success reports the effect of the planning action with the same name, in the predicates of the domain. A failure
-reports the robot's observations. A fact may be retracted even if it was unknown.
+A success reports the effect of the planning action with the same name, in the predicates of the domain. A failed
+verb reports what the robot observed. A fact may be retracted even if it was unknown.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Containment of hooks, which a robot's builder wrote: each hook returns a value or raises an `Exception`.
 
-Otherwise, `sys.exit` in a hook would end the program with the hook's task. So would an exception whose class does not
-derive from `Exception`.
+Otherwise, `sys.exit` in a hook would end the program with the hook's task. An exception whose class does not derive
+from `Exception` would end the program, too.
 """
 
 from __future__ import annotations

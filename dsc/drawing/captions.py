@@ -226,7 +226,7 @@ def _values(arguments: Mapping[str, Term]) -> str:
 
 
 def content_text(use: str, arguments: Mapping[str, Term]) -> str:
-    """Return the name of a used plot with its arguments as text."""
+    """Return, as text, the name and arguments of a plot that a state uses."""
     return use + (_values(arguments) if arguments else "")
 
 

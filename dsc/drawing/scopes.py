@@ -238,7 +238,7 @@ def initial_bundle(target: str) -> EdgeBundle:
 
 
 def room_for_loops(bundles: Sequence[EdgeBundle], *, sideways: bool) -> float:
-    """Return the space for the loops of a state with their labels, right of the state (below if `sideways`)."""
+    """Return the space that the self-transitions of a state need at its right, labels included; below if `sideways`."""
     return max((LOOP + 6 + (one.height if sideways else one.width) for one in bundles), default=0.0)
 
 

@@ -139,7 +139,7 @@ def led_away(
 def answered(on: Ways, given_up: MutableMapping[str, str]) -> Ways:
     """Return the transitions of a state, including those on the reports of `gave_up` from inner states.
 
-    Reports that these transitions always handle are removed from `given_up`.
+    Remove from `given_up` each report that these transitions always handle.
     """
     own = on.get(GAVE_UP, ())
     if not (own and given_up):

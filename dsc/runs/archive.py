@@ -81,7 +81,7 @@ class StepRow:
 
 
 class _StoredStep(NamedTuple):
-    """The row of a macrostep as stored; `made` is the digest of its version in the tables of the knowledge."""
+    """The stored row of a macrostep; `made` is the stored digest of the knowledge version that it made."""
 
     place: int
     run: int

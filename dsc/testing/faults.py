@@ -274,7 +274,7 @@ class Interleaving:
         sequencer.wait_before_events(settle)
 
     def _shuffled(self, waiting: Iterable[Message]) -> Iterable[Message]:
-        """Move the first message of a drawn source to the front; the other messages keep their order."""
+        """Choose a source by the seed and move its first message to the front; the other messages keep their order."""
         messages = list(waiting)
         sources = list(dict.fromkeys(map(_source, messages)))
         if len(sources) > 1:

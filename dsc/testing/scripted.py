@@ -109,7 +109,7 @@ class _ScriptedComponent(Component):
         """Check answers of the skill; a component that imitates no other declares any answer from now on.
 
         Raises:
-            InputError: the imitated skill does not have this answer.
+            InputError: the imitated skill does not declare an outcome of this name.
         """
         name = skill.partition(".")[2]
         if not self._imitates and name not in self._signatures:

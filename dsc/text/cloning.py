@@ -107,7 +107,7 @@ class Clones:
 
 
 def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Sequence[Path] = ()) -> Clones:
-    """Return clones of a plot file and of the files with all plots on which it depends; write no file.
+    """Return clones of a plot file and of each file with a plot that it depends on; write no file.
 
     Args:
         file: the plot file; its folder must contain the plots on which the plot depends.

@@ -1,1 +1,1 @@
-"""Viewer of runs in the browser, from records to a page (see PROTOCOL.md); needs the extra `viewer`."""
+"""Shows runs in the browser: reads their records and serves a page (see PROTOCOL.md); needs the extra `viewer`."""

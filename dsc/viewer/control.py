@@ -1,4 +1,4 @@
-"""Control of a live run by the page's reader: events, facts, parameters, and pauses at breakpoints."""
+"""Control of a live run from the page: post events, change facts and parameters, and pause at breakpoints."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Hands(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Breakpoint:
-    """A condition for a pause.
+    """A condition that pauses the run when it becomes true.
 
     A run pauses when it enters a state, handles an event, makes a condition true, or begins a plan step.
     """

@@ -36,7 +36,7 @@ _S = TypeVar("_S")
 
 
 class RecordReplay(Generic[_S]):
-    """A state derived from records, available at any record.
+    """A state computed from records; it can be read as it was at any record.
 
     Args:
         log: the records.

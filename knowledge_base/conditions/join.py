@@ -88,7 +88,7 @@ class AlphaIndex:
         return bool(self.failing) or any(found for _, found in (*self._relying.values(), *self._open.values()))
 
     def relying_at(self, polarity: int, positions: Positions) -> _Relying:
-        """Return the index of the witnesses that depend on facts, by the facts' values at these positions."""
+        """Return the witnesses that depend on facts; the keys are the facts' values at the given positions."""
         return self._relying.setdefault((polarity, positions), (_picker(positions), {}))[1]
 
     def open_at(self, polarity: int, positions: Positions) -> _Open:

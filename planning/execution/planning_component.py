@@ -116,7 +116,7 @@ class PlanningComponent(Component):
         self._answers = {one: Outcome(event, attributes) for one, (event, attributes) in memory["answers"].items()}
 
     async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-        """Execute a skill and keep its outcome until `forget`, because the skill has already changed the plans."""
+        """Execute a skill, and keep its outcome until `forget`, so that `status` can return it after a restart."""
         answer = self._answers[call.action_id] = await super().execute(skill_name, call, arguments)
         return answer
 

@@ -54,7 +54,7 @@ class _RelevantParts:
         self._left: dict[int, GroundOperator] = {}
 
     def of(self, positions: Iterable[int], asked: frozenset[int], settled: frozenset[int]) -> dict[int, GroundOperator]:
-        """Return, by position, the relevant parts of those operators that add a literal in `asked`."""
+        """Return the relevant part of each operator that adds a literal in `asked`; the keys are operator positions."""
         left = self._left
         if left:
             for one in (asked ^ self._asked) | (settled ^ self._settled):

@@ -248,7 +248,7 @@ class Task:
     settled: frozenset[int] = frozenset()
 
 
-_MOST_KEPT = 20_000  # ground actions; a problem of 50 items has 3,000 ground actions
+_MOST_KEPT = 20_000  # ground actions; the table with 50 items has about 3,000
 
 
 class Assembly:

@@ -76,7 +76,7 @@ class DurativeParts:
 
     @property
     def effect(self) -> Effect:
-        """The changes from the start to the end of the action, without other actions."""
+        """The net changes from the start to the end of the action, if no other action runs meanwhile."""
         undone = tuple(leaf.atom for leaf in _unconditional(self.end_effect) if isinstance(leaf, Delete))
         settled = set(_settled(self.end_effect))
         kept = (_unless(part, undone) for part in _parts(self.start_effect) if _changed(part) not in settled)

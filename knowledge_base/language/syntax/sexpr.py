@@ -120,7 +120,7 @@ def _word(kind: str, token: str, place: Place) -> Word:
 
 
 class TypedName(NamedTuple):
-    """A name of a typed list in lower case, with its `?` if it has one; no types means `object`."""
+    """One name of a typed list, in lower case, with its `?` if it has one; empty `types` stand for `object`."""
 
     name: str
     types: tuple[str, ...]

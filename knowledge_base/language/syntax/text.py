@@ -71,7 +71,7 @@ def parse_condition(text: str | Node, source: str | None = None) -> Expression:
 
 
 def parse_effect(text: str | Node, source: str | None = None) -> Effect:
-    """Return an effect, from its text or from a group; `()` changes nothing.
+    """Return the effect that a text or a parsed group describes; `()` is the effect without changes.
 
     Raises:
         ParseError: the form is wrong, or a keyword of conditions (`or`, `exists`) begins an effect.
