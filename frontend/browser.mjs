@@ -91,3 +91,12 @@ export async function settled(page) {
   await page.waitForSelector(".react-flow__node .state.active");
   await page.waitForTimeout(700);
 }
+
+/** Click until it shows: a chart that is laid out at that moment may move its states from under the pointer. */
+export async function clickUntil(button, shows, { tries = 4, timeout = 6000, ...state } = {}) {
+  for (let left = tries; left > 0; left--) {
+    if (await button.isVisible()) await button.click();
+    const shown = shows.waitFor({ ...state, timeout: left === 1 ? 30_000 : timeout });
+    if (await shown.then(() => true, (error) => { if (left === 1) throw error; })) return;
+  }
+}

@@ -4,7 +4,7 @@ import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { browse, loaded, open, record, serve } from "../browser.mjs";
+import { browse, clickUntil, loaded, open, record, serve } from "../browser.mjs";
 
 const folder = mkdtempSync(join(tmpdir(), "dsc-"));
 const NAMES = ["constructor", "__proto__", "toString", "hasOwnProperty"];
@@ -109,8 +109,7 @@ test("names that every object has are names like others", async () => {
     await loaded(page, all.length);
     await page.getByRole("button", { name: "To the end" }).click();
     for (const name of NAMES) await page.locator(`.react-flow__node[data-id="${name}"]`).waitFor();
-    await page.getByRole("button", { name: /^__proto__, dynamic, active/ }).click();
-    await page.getByRole("row", { name: "?__proto__ 7" }).waitFor();
+    await clickUntil(page.getByRole("button", { name: /^__proto__, dynamic, active/ }), page.getByRole("row", { name: "?__proto__ 7" }));
     await page.getByRole("tab", { name: "Knowledge" }).click();
     assert.equal(await page.getByLabel("Facts").getByRole("row").count(), NAMES.length);
     await page.getByLabel("Facts").getByRole("button", { name: "__proto__" }).click();

@@ -6,7 +6,7 @@ import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { browse, loaded, open, OTHER_NAME, record, serve } from "../browser.mjs";
+import { browse, clickUntil, loaded, open, OTHER_NAME, record, serve } from "../browser.mjs";
 
 let program, browser, page, complaints, records;
 
@@ -99,14 +99,11 @@ test("a click in the chart selects a state; it is collapsed, opened and zoomed i
   await goTo(first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("look_at_table/look"))).seq);
   const node = (path) => page.locator(`.react-flow__node[data-id="${path}"]`);
   await node("look_at_table/look").waitFor();
-  await page.getByRole("button", { name: /^look_at_table, / }).click();
-  await page.getByLabel("State", { exact: true }).getByText("Inside: search").waitFor();
-  await page.getByRole("button", { name: "Collapse look_at_table" }).click();
-  await node("look_at_table/look").waitFor({ state: "detached" });
-  await page.getByRole("button", { name: "Expand look_at_table" }).click();
-  await node("look_at_table/look").waitFor();
-  await page.getByRole("button", { name: "Zoom into look_at_table" }).click();
-  await node("work").waitFor({ state: "detached" });
+  const button = (name) => page.getByRole("button", { name });
+  await clickUntil(button(/^look_at_table, /), page.getByLabel("State", { exact: true }).getByText("Inside: search"));
+  await clickUntil(button("Collapse look_at_table"), node("look_at_table/look"), { state: "detached" });
+  await clickUntil(button("Expand look_at_table"), node("look_at_table/look"));
+  await clickUntil(button("Zoom into look_at_table"), node("work"), { state: "detached" });
   await page.getByRole("button", { name: "Chart", exact: true }).click();
   await node("work").waitFor();
   await page.keyboard.press("Escape");
