@@ -198,9 +198,13 @@ class Archive:
                 if version == _oldest(connection):
                     for change in self._changes(connection, version, last):
                         state.commit(change.delta)
-            for row in connection.execute(f"{_KEYS} ORDER BY number"):
-                self._key(row)
+            self.require_keys(connection)
         return last
+
+    def require_keys(self, connection: sqlite3.Connection) -> None:
+        """Raise `DamagedStoreError` if an idempotency key differs from the written key."""
+        for row in connection.execute(f"{_KEYS} ORDER BY number"):
+            self._key(row)
 
     def written_schema(self, connection: sqlite3.Connection) -> Schema:
         """Return the latest schema in the store."""

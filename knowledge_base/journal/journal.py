@@ -92,6 +92,7 @@ class Journal(Archive):
         self._head = self._schema_digest = self._identity = NOTHING
         self._tail = self._snapshot_size = 0  # characters of the changes since the last snapshot, and of that snapshot
         self._durability = durability
+        self._keys_checked = False
         self._writers = WriterLock(path)
         try:
             if new or not is_there(path):
@@ -148,7 +149,11 @@ class Journal(Archive):
         """Return the change that was committed under that key, or `None`; only the writer may call this method."""
         _require_text(key)
         with reported(self._path, "read"):
-            return self._by_key(self._connection, key)
+            found = self._by_key(self._connection, key)
+            if found is None and not self._keys_checked:  # a damaged key would be missed, and its change repeated
+                self.require_keys(self._connection)
+                self._keys_checked = True
+            return found
 
     def later(self, version: int) -> list[Change]:
         """Raise `ConflictError`: this journal is the only writer."""

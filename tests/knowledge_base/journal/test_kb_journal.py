@@ -17,6 +17,7 @@ from kb_worlds import PROPERTY, Ticks, everything, graph_content, unordered
 from knowledge_base import (
     Change,
     ConflictError,
+    DamagedStoreError,
     Delta,
     Fact,
     HistoryError,
@@ -304,6 +305,19 @@ def test_a_key_outlives_a_restart_and_compaction(path, compact):
         assert kb.apply(QUIET, author="a", key="k") == first
         assert kb.apply(QUIET, author="a", key="nothing new").version == 1
         assert (kb.version, kb.ask("(quiet)")) == (2, False)
+
+
+def test_a_key_whose_text_was_damaged_is_not_taken_for_a_new_one(path):
+    with opened(path) as kb:
+        kb.apply(QUIET, author="a", key="k")
+        kb.apply(LOUD, author="b", key="l")
+    with contextlib.closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("UPDATE keys SET key = 'j' WHERE key = 'k'")
+    with opened(path) as kb:
+        assert kb.apply(LOUD, author="b", key="l").version == 2
+        with pytest.raises(DamagedStoreError, match="key 1"):
+            kb.apply(QUIET, author="a", key="k")
+        assert kb.version == 2
 
 
 # --- writing fails
