@@ -67,16 +67,16 @@ def reported(path: Path, doing: str) -> Iterator[None]:
     """Convert SQLite's errors into a `StoreError` with the failed operation and the file."""
     try:
         yield
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:  # SQLite's own words may quote a damaged name
         kind = DamagedStoreError if _means_damage(error) else StoreError
         raise kind(f"cannot {doing} the store: {error}", place=Place(str(path))) from error
 
 
-def _means_damage(error: sqlite3.Error) -> bool:
+def _means_damage(error: sqlite3.Error | UnicodeDecodeError) -> bool:
     """Return whether SQLite reports a malformed file, or Python finds invalid UTF-8 in a text."""
     code = getattr(error, "sqlite_errorcode", None)
     if code is None:
-        return "UTF-8" in str(error)
+        return "UTF-8" in str(error).upper()
     return code & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 

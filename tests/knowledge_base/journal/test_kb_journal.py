@@ -538,3 +538,11 @@ def test_a_torn_tail_costs_only_what_was_torn(path):
             kb.apply(QUIET, author="a")
             assert [c.version for c in kb.changes()] == list(range(1, kb.version + 1))
     assert len(reached) > 3
+
+
+def test_a_declaration_that_is_no_text_any_more_is_damage(path):
+    with opened(path) as kb:
+        kb.apply(QUIET, author="a")
+    path.write_bytes(path.read_bytes().replace(b"key TEXT NOT NULL UNIQUE", b"key TEXT N\xffT NULL UNIQUE"))
+    with pytest.raises(DamagedStoreError):
+        opened(path)
