@@ -36,7 +36,7 @@ class ReactorState(Protocol):
 
     Attributes:
         machine: the chart's state.
-        emitted: outcome events of the plot so far.
+        emitted: the latest outcome events of the plot.
         in_vain: periods without any effect since the last other message.
         problem: the reason why the run cannot continue, or `None`.
         settings: an operator's settings of plot parameters, by plot and parameter.
@@ -44,7 +44,7 @@ class ReactorState(Protocol):
     """
 
     machine: Machine
-    emitted: list[Event]
+    emitted: tuple[Event, ...]
     in_vain: set[tuple[int, int]]
     problem: str | None
     settings: dict[tuple[str, str], ParameterMessage]
@@ -63,6 +63,7 @@ class RunState:
         self._frames: dict[int, FrameState] = {}
         self._root: FrameState | None = None
         self._remembered: tuple[Any, ...] = ()  # values of the reactor
+        self._emitted: tuple[Event, ...] = ()
         self._rows: dict[int, SnapshotRow] = {}  # pending items by place; the earliest first
         self._places: dict[_Key, list[int]] = {}  # the earliest first
         self._activations: dict[int, set[_Key]] = {}
@@ -96,15 +97,15 @@ class RunState:
         if state.root is not self._root:
             self._update_frames(state.root)
         serial = None if state.root is None else state.root.serial
-        # Most events change none of these values; the list of outcome events only grows.
+        # Most events change none of these values.
         settings = reactor.settings.values()
         # The types distinguish 1 and 1.0, which are equal.
         typed = tuple([(one, type(one.value)) for one in settings]) if settings else ()
         remembered = (
-            serial, state.finished, len(reactor.emitted), frozenset(reactor.in_vain), reactor.problem, typed,
+            serial, state.finished, frozenset(reactor.in_vain), reactor.problem, typed,
         )  # fmt: skip
-        if remembered != self._remembered:
-            self._remembered = remembered
+        if remembered != self._remembered or reactor.emitted is not self._emitted:
+            self._remembered, self._emitted = remembered, reactor.emitted
             self._reactor = self._news["reactor"] = _reactor_form(reactor, self._short)
 
     def remember(self, memories: Iterable[tuple[str, Any]]) -> None:

@@ -25,6 +25,8 @@ from knowledge_base.store import KnowledgeBase
 
 MOST_CANCELLED = 1_000
 """Upper bound of the number of cancelled skills whose cause is kept, for the trace of late observations."""
+MOST_EMITTED = 100
+"""Number of outcome events of the plot that are kept: the latest events, and the latest event of each name."""
 CHART = "chart"
 """Author of the changes that a plot makes with `tell`."""
 StepListener = Callable[[Step], None]
@@ -36,7 +38,7 @@ class Reactor:
 
     Attributes:
         machine: the chart's state.
-        emitted: outcome events of the plot so far.
+        emitted: the latest outcome events of the plot, in order, see `MOST_EMITTED`.
         problem: the reason to end the run, or the error of its last step; `None` without either.
         in_vain: activation and number of periods without any effect since the last other message.
         settings: an operator's settings of plots, by plot and parameter.
@@ -52,7 +54,7 @@ class Reactor:
         self.trace = trace
         self.tracer = StepTracer(trace)
         self.listeners: list[StepListener] = []
-        self.emitted: list[Event] = []
+        self.emitted: tuple[Event, ...] = ()
         self.problem: str | None = None
         self.in_vain: set[tuple[int, int]] = set()
         self.settings: dict[tuple[str, str], ParameterMessage] = {}
@@ -62,7 +64,7 @@ class Reactor:
     def restore(self, kept: Kept) -> None:
         """Restore the state after the last macrostep of an interrupted run."""
         self.machine.state = kept.state
-        self.emitted = list(kept.emitted)
+        self.emitted = kept.emitted
         self.in_vain = set(kept.in_vain)
         self.problem = kept.problem
         for setting in kept.settings:
@@ -205,7 +207,8 @@ class Reactor:
                     self._forget_causes(cancelled)
             else:
                 self.tracer.told(output)
-        self.emitted.extend(step.emitted)
+        if step.emitted:
+            self.emitted = _latest((*self.emitted, *step.emitted))
         if step.errors:
             self.problem = self.problem or "; ".join(step.errors)
         return step.output
@@ -236,3 +239,12 @@ def _is_vain(step: Step) -> bool:
     """Return whether a step only scheduled the next period; with equal state and world, later periods do that too."""
     only_timers = all(isinstance(output, StartTimer) for output in step.output)
     return only_timers and not step.knowledge and not step.emitted
+
+
+def _latest(events: tuple[Event, ...]) -> tuple[Event, ...]:
+    """Return the events without the oldest ones, except the latest event of each name."""
+    surplus = len(events) - MOST_EMITTED
+    if surplus <= 0:
+        return events
+    latest = {event.name: index for index, event in enumerate(events)}
+    return tuple(event for index, event in enumerate(events) if index >= surplus or latest[event.name] == index)

@@ -36,7 +36,7 @@ class RunEnd:
 
     Attributes:
         finished: whether the plot reached its final state.
-        emitted: outcome events of the plot, in order.
+        emitted: the latest 100 outcome events of the plot, and the latest of each name, in order.
         problem: the reason if the run ended before the final state, or the error of its last step; else `None`.
     """
 
@@ -247,7 +247,7 @@ class Sequencer:
                 unsubscribe()
         if untaken and reactor.problem is None:
             reactor.problem = "; ".join(untaken)
-        end = RunEnd(self.machine.state.finished, tuple(reactor.emitted), reactor.problem)
+        end = RunEnd(self.machine.state.finished, reactor.emitted, reactor.problem)
         self.trace.record("end", finished=end.finished, problem=end.problem)
         self._keep_end()
         return end

@@ -45,6 +45,26 @@ def test_the_outcome_of_the_plot_is_handed_out():
     assert ran.end.emitted == (Event("lost", {"item": "cup1"}),)
 
 
+def test_a_plot_that_emits_for_ever_keeps_the_latest_outcomes_and_one_of_each_name():
+    ran = Ran("""
+        plot: p
+        variables: {n: {type: number, initial: 0}}
+        emits: {gave_up: {reason: symbol}, count: {n: number}}
+        states:
+          a: {on: {done: {to: b, emit: gave_up, with: {reason: early}}}}
+          b:
+            on:
+              done:
+                - {when: (< ?n 150), to: b, assign: {n: (+ ?n 1)}, emit: count, with: {n: ?n}}
+                - {to: e}
+          e: {final: true}
+    """)
+    first, *others = ran.end.emitted
+    assert first == Event("gave_up", {"reason": "early"})
+    assert [event.attributes["n"] for event in others] == list(range(51, 151))
+    assert not ran.end.reached
+
+
 def test_an_outcome_may_have_another_name_in_the_chart():
     ran = Ran("""
         plot: p
