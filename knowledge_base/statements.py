@@ -21,8 +21,12 @@ from knowledge_base.language.syntax.sexpr import Group, read
 from knowledge_base.language.syntax.text import parse_condition, parse_effect
 from knowledge_base.world.overlay import Overlay
 
+MOST_WORK = 500_000
+"""Number of facts and objects that all statements of one change may visit, in up to about four seconds."""
+_BOUNDS = Bounds(work=MOST_WORK)
 
-def told(statements: Iterable[str], world: World, source: str | None = None, bounds: Bounds | None = None) -> Delta:
+
+def told(statements: Iterable[str], world: World, source: str | None = None, bounds: Bounds = _BOUNDS) -> Delta:
     """Return the change that makes all the statements true, in the order of the statements.
 
     A statement may mention an object before the statement that declares its type.
@@ -42,7 +46,7 @@ def told(statements: Iterable[str], world: World, source: str | None = None, bou
     """
     effects = [_effect(text, _called(source, number)) for number, text in enumerate(statements, 1)]
     view, meter = Overlay(world), Meter(bounds)
-    seen = view if bounds is None else BoundedWorld(view, meter)
+    seen = BoundedWorld(view, meter)
     for effect in effects:
         if (thing := _thing(effect, world)) is not None:
             view.apply(Delta(nodes=thing))

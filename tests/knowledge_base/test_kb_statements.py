@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from knowledge_base import Delta, InputError, KnowledgeBase, Schema, UnknownNameError, fact
+from knowledge_base import Bounds, Delta, InputError, KnowledgeBase, OutOfBoundsError, Schema, UnknownNameError, fact
 from knowledge_base.statements import retracted, told
 
 SCHEMA = Schema.parse(
@@ -32,6 +32,12 @@ def test_facts_numbers_and_things_are_told_in_any_order(kb) -> None:
 def test_an_effect_for_all_things_counts_those_just_told(kb) -> None:
     delta = told(["(cup red)", "(forall (?c - cup) (clean ?c))"], kb)
     assert delta.added == (fact("clean", "mug"), fact("clean", "red"))
+
+
+def test_an_effect_with_endless_instances_is_refused(kb) -> None:
+    endless = "(forall (?a) " * 60 + "(increase (breaks) 1)" + ")" * 60
+    with pytest.raises(OutOfBoundsError, match="looks at more than 10000 facts and things: FACT"):
+        told(["(clean mug)", endless], kb, "FACT", Bounds(work=10_000))
 
 
 def test_later_statements_build_on_earlier_ones(kb) -> None:

@@ -19,7 +19,18 @@ from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.compiler import Answers, compile_answers, compile_query, compile_test
 from knowledge_base.language.evaluation.terms import Bindings, Getter, Test, as_number, compile_term
 from knowledge_base.language.evaluation.world import World
-from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When, check_depth
+from knowledge_base.language.syntax.effect import (
+    Add,
+    AllOf,
+    Delete,
+    Effect,
+    ForEach,
+    NumericEffect,
+    When,
+    check_depth,
+    effect_leaves,
+    mentioned,
+)
 from knowledge_base.language.syntax.expression import (
     Arithmetic,
     Atom,
@@ -228,14 +239,24 @@ class _Application:
             case AllOf(parts):
                 for part in parts:
                     self.apply(part, bindings)
-            case ForEach(variables, inner):
-                for choice in choices(variables, self.world):
+            case ForEach(_, inner):
+                for choice in self.different(effect):
                     self.apply(inner, {**bindings, **choice})
             case When(condition, inner):
                 if holds(condition, self.world, bindings):
                     self.apply(inner, bindings)
             case NumericEffect():
                 self.assign(effect, bindings)
+
+    def different(self, effect: ForEach) -> Iterator[dict[str, Value]]:
+        """Yield one choice of objects for each different instance of the inner effect.
+
+        A variable that the inner effect does not mention needs an object, but makes no further instance. Only numeric
+        effects of equal instances add up.
+        """
+        used, unused = _by_use(effect)
+        if all(next(choices((variable,), self.world), None) for variable in unused):
+            yield from choices(used, self.world)
 
     def fact(self, atom: Atom, bindings: Bindings) -> Fact:
         signature = self.world.schema.told(atom.predicate, atom.place)
@@ -264,3 +285,18 @@ class _Application:
     def refuse(self, contradicts: bool, fluent: Fact, effect: NumericEffect) -> None:  # noqa: FBT001
         if contradicts:
             raise SchemaError(f"the effect changes {fluent} in two ways that contradict", place=effect.place)
+
+
+_Variables = tuple[TypedVariable, ...]
+_uses: IdentityCache[Effect, tuple[_Variables, _Variables]] = IdentityCache()
+
+
+def _by_use(effect: ForEach) -> tuple[_Variables, _Variables]:
+    """Return the variables on which the instances of the inner effect depend, and the other variables."""
+    known = _uses.find(effect, None)
+    if known is not None:
+        return known
+    adds_up = any(isinstance(leaf, NumericEffect) for leaf in effect_leaves(effect.effect))
+    inner = mentioned(effect.effect)
+    used = tuple(one for one in effect.variables if adds_up or one.name in inner)
+    return _uses.keep(effect, None, (used, tuple(one for one in effect.variables if one not in used)))

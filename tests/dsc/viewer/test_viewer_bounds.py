@@ -170,7 +170,7 @@ def test_a_condition_that_comes_to_cost_too_much_is_dropped_and_the_run_goes_on(
 
 
 @pytest.mark.parametrize("said", [
-    ["(forall (?a ?b ?c ?d - item) (clean ?a))"], [f"(when {NEST} (clean o1))"], ["(clean o1)"] * (MOST_STATEMENTS + 1),
+    ["(forall (?a ?b ?c ?d - item) (when (= ?a ?d) (clean ?b)))"], [f"(when {NEST} (clean o1))"], ["(clean o1)"] * (MOST_STATEMENTS + 1),
     [f"(and {'(clean o1) ' * 1000})"],
 ])  # fmt: skip
 def test_an_effect_of_a_browser_that_costs_too_much_changes_nothing(said) -> None:

@@ -199,6 +199,25 @@ def test_a_fact_deleted_and_added_is_added(world) -> None:
     assert delta == Delta(added=(Fact("quiet"),))
 
 
+def test_variables_that_an_effect_does_not_mention_make_no_further_instances(world) -> None:
+    nested = "(forall (?x) " * 60 + "(heavy cup1)" + ")" * 60
+    assert apply_effect(parse_effect(nested), world) == Delta(added=(fact("heavy", "cup1"),))
+    many = " ".join(f"?x{number}" for number in range(60))
+    assert apply_effect(parse_effect(f"(forall ({many} ?i - can) (heavy ?i))"), world).added == (fact("heavy", "can1"),)
+
+
+def test_a_variable_without_an_object_leaves_an_effect_without_instances() -> None:
+    nothing = world_of(Delta(nodes={"shelf": "place"}))
+    assert apply_effect(parse_effect("(forall (?i - item) (quiet))"), nothing) == Delta()
+    assert apply_effect(parse_effect("(forall (?p - place) (quiet))"), nothing).added == (Fact("quiet"),)
+
+
+def test_a_number_grows_by_each_object_that_its_effect_does_not_mention(world) -> None:
+    counted = parse_effect("(forall (?i - item ?p - place) (and (quiet) (increase (time) 1)))")
+    world.apply(Delta(values={fact("time"): 0}))
+    assert apply_effect(counted, world).values == {fact("time"): 6}
+
+
 def test_several_changes_of_a_number_add_up_and_assignments_contradict(world) -> None:
     twice = "(and (increase (weight ?i) 1) (scale-up (weight ?i) 10))"
     assert apply_effect(parse_effect(twice), world, {"i": "cup1"}).values == {fact("weight", "cup1"): 30}

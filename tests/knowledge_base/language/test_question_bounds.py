@@ -138,10 +138,11 @@ def test_a_mistake_is_said_before_the_first_answer(kb):
 
 
 @pytest.mark.parametrize("said", [
-    "(forall (?a ?b ?c ?d - item) (clean ?a))",
-    "(forall (?a ?b ?c ?d - item) (and))",
+    "(forall (?a ?b ?c ?d - item) (and (clean ?a) (clean ?b) (clean ?c) (clean ?d)))",
+    "(forall (?a ?b ?c ?d - item) (when (and (= ?a ?b) (= ?c ?d)) (clean ?a)))",
+    "(forall (?a ?b ?c ?d - item) (increase (weight ?a) 1))",
     "(when (exists (?a ?b ?c ?d - item) (not (= ?d ?d))) (clean o1))",
-    "(forall (?a - item) (and " + "(clean o1) " * 300 + "))",
+    "(forall (?a - item) (and " + "(clean ?a) " * 300 + "))",
     "(assign (weight o1) (+ " + "(weight o1) " * 2500 + "))",
 ])  # fmt: skip
 def test_an_effect_is_given_up_where_its_work_ends(kb, said):
