@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from soak_told import Told
 
 from domains.clean_up_table.items import SURFACES, Item
-from domains.clean_up_table.report import Report
 from domains.clean_up_table.table_world import TableWorld
 from domains.clean_up_table.world_faults import ITEM_MOVED
 from dsc.dynamic.library import Library
@@ -23,6 +22,7 @@ from dsc.testing.invariants import (
     replays,
 )
 from knowledge_base.facts import Delta, Fact, fact
+from planning.report import Report
 
 NO_REPORT, TWICE, NOT_SO, FALSE_CLAIM = "no report", "executed twice", "knowledge is not so", "false claim"
 HANGS, HISTORY, AFTER_STOP = "hangs", "another history", "acts after a stop"
@@ -102,7 +102,7 @@ def wrong_report(report: Report, world: TableWorld, *, stopped: bool, plain: boo
     """
     if report.goal_reached and not world.goal_reached:
         yield "the report says that the goal is reached"
-    left = {one.item for one in report.left}
+    left = {one.what for one in report.left}
     if left != {one.item for one in world.left()}:
         yield f"the report says that {sorted(left)} are left"
     if stopped and any("the run ended" in one.reason for one in report.left):

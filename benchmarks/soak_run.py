@@ -25,9 +25,8 @@ from soak_judge import (
     wrong_report,
 )
 
-from domains.clean_up_table.deployment import CleanUpTable, deploy, resumed
+from domains.clean_up_table.deployment import bundle, deploy, world_of
 from domains.clean_up_table.durable_world import DurableWorld, beside
-from domains.clean_up_table.report import Report
 from domains.clean_up_table.scenario import Scenario, Table
 from dsc.chance import choose, uniform
 from dsc.dynamic.library import Library
@@ -39,8 +38,9 @@ from dsc.testing.crashes import Crashes
 from dsc.testing.faults import USUAL, Fault, Faults, Interleaving
 from dsc.testing.invariants import executed_once, kept_run
 from knowledge_base.errors import DamagedStoreError
-from planning import PlannerProcess
+from planning import Deployment, PlannerProcess, resume
 from planning.engines.race import CachingPlanner
+from planning.report import Report
 from planning.testing import FaultyPlanner
 
 MOST_STEPS = 5_000
@@ -172,14 +172,14 @@ class Trial:
                 if run.ended is not None:
                     return None
                 self._stop.resumed(run.steps[-1].configuration)
-            table = resumed(store, planner)
+            table = resume(bundle(), store, planner=planner)
         with table:
             self._library = table.executive.library
             for component in table.executive.components:
                 self._crashes.inject(self._faults.inject(component))
             return table.run(prepare=lambda sequencer: self._prepare(table, sequencer))
 
-    def _prepare(self, table: CleanUpTable, sequencer: Sequencer) -> None:
+    def _prepare(self, table: Deployment, sequencer: Sequencer) -> None:
         steps = 0
 
         def count(_: Step) -> None:
@@ -193,7 +193,7 @@ class Trial:
             interleaving = Interleaving(self._seed)
             interleaving.attach(sequencer)
             sequencer.listen(lambda _: self._note_turns(interleaving))
-        self._faults.meddle(sequencer, lambda: said_by_others(table.world, sequencer))
+        self._faults.meddle(sequencer, lambda: said_by_others(world_of(table), sequencer))
         self._faults.interrupt(sequencer, Event("stop"))
         self._stop.watch(sequencer, table, restarts=uniform(self._seed, "stop", "restarts") < RESTARTS)
         self._crashes.watch(sequencer)
@@ -240,7 +240,7 @@ class ObeyedStop:
         if configuration != STOPPED:
             self._done = None
 
-    def watch(self, sequencer: Sequencer, table: CleanUpTable, *, restarts: bool) -> None:
+    def watch(self, sequencer: Sequencer, table: Deployment, *, restarts: bool) -> None:
         """Check each macrostep; an operator who `restarts` lets the robot continue after a while."""
         life = self._life = object()
 
@@ -248,12 +248,12 @@ class ObeyedStop:
             if life is not self._life:
                 return  # another program has replaced this one
             stands = sequencer.machine.state.configuration() == STOPPED
-            table.world.catch_up()
+            world_of(table).catch_up()
             if not stands:
-                self.judge(set(table.world.done))
+                self.judge(set(world_of(table).done))
                 self._done = None
             elif self._done is None:
-                self._done = set(table.world.done)
+                self._done = set(world_of(table).done)
                 if restarts:
                     asyncio.get_running_loop().call_later(UNTIL_RESTART, sequencer.post, Event("restart"))
 

@@ -25,7 +25,7 @@ table: {cups: 3, cans: 2, crisp_cans: [large]}
     table = deploy(scenario, seed=6, faults=0.1, listener=grasps)
     with table.executive:
         report = table.run()
-    print("goal reached:", report.goal_reached, "in", report.trips, "trips")
+    print("goal reached:", report.goal_reached, "in", report.own["trips"], "trips")
     print("grasps tried:", grasps.tried)
 
 

@@ -1,8 +1,11 @@
-"""A domain of your own: two planning actions in PDDL, two skills in Python, a goal, and a plan that reaches it."""
+"""A robot of your own: two planning actions in PDDL, two skills in Python, a goal, and a plan that reaches it.
+
+`dsc run examples/own_domain.py` runs it, too.
+"""
 
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from knowledge_base import Delta, fact
-from planning import Executive, PlanningDomain
+from planning import Bundle, PlanningDomain, deploy
 
 WATERING = PlanningDomain.parse("""
 (define (domain watering)
@@ -37,24 +40,33 @@ class Gardener(Component):
         return Outcome("watered", observed=Delta(added=(fact("watered", plant),)))
 
 
-def main() -> None:
-    gardener = Gardener()
-    skills = gardener.skills()
-    plots = [
+SKILLS = Gardener().skills()
+
+robot = Bundle(
+    "gardener",
+    plots=(
         # `go` observes nothing by itself, so its effects are assumed once it has arrived.
-        primitive_plot(skills["go"], done="arrived", implements="go", effects="assumed"),
-        primitive_plot(skills["water"], done="watered", implements="water"),
-    ]
-    with Executive(WATERING, plots, [gardener]) as robot:
-        with robot.knowledge.transaction(author="me") as world:
-            world.add_node("kitchen", "room")
-            world.add_node("balcony", "room")
-            world.tell("robot-in", "kitchen")
-            for plant, room in {"basil": "kitchen", "rose": "balcony"}.items():
-                world.add_node(plant, "plant")
-                world.tell("stands-in", plant, room)
-        end = robot.achieve("(forall (?p - plant) (watered ?p))")
-        print("finished:", end.finished, robot.knowledge.query("(watered ?p)"))
+        primitive_plot(SKILLS["go"], done="arrived", implements="go", effects="assumed"),
+        primitive_plot(SKILLS["water"], done="watered", implements="water"),
+    ),
+    components=lambda: [Gardener()],
+    domain=WATERING,
+    knowledge=Delta(
+        nodes={"kitchen": "room", "balcony": "room", "basil": "plant", "rose": "plant"},
+        added=(
+            fact("robot-in", "kitchen"),
+            fact("stands-in", "basil", "kitchen"),
+            fact("stands-in", "rose", "balcony"),
+        ),
+    ),
+    goal="(forall (?p - plant) (watered ?p))",
+)
+
+
+def main() -> None:
+    with deploy(robot) as deployed:
+        report = deployed.run()
+        print(report.lines()[0])
 
 
 if __name__ == "__main__":
@@ -64,4 +76,4 @@ if __name__ == "__main__":
 #   5.1 s  watered the basil
 #  25.1 s  in the balcony
 #  30.1 s  watered the rose
-# finished: True [{'p': 'basil'}, {'p': 'rose'}]
+# Goal reached (judge: knowledge), 30 s of run time.

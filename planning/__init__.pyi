@@ -1,4 +1,8 @@
 from planning.bundles import Bundle as Bundle
+from planning.deployment import Deployment as Deployment
+from planning.deployment import Task as Task
+from planning.deployment import deploy as deploy
+from planning.deployment import resume as resume
 from planning.domain import PlanningAction as PlanningAction
 from planning.domain import PlanningDomain as PlanningDomain
 from planning.engines.planner import Planner as Planner
@@ -20,6 +24,11 @@ from planning.plan import ProvenUnsolvable as ProvenUnsolvable
 from planning.plan import TimedOut as TimedOut
 from planning.plan import Timing as Timing
 from planning.problem.construction import build_problem as build_problem
+from planning.report import Report as Report
+from planning.simulation import Fault as Fault
+from planning.simulation import Left as Left
+from planning.simulation import Setup as Setup
+from planning.simulation import Simulation as Simulation
 from planning.strips import UnsupportedActionError as UnsupportedActionError
 from planning.strips import UnsupportedGoalError as UnsupportedGoalError
 from planning.unified import from_unified as from_unified

@@ -8,10 +8,10 @@ point group `dsc.bundles`, so a package index serves as the repository ("robot a
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from dsc.components.component import Component
 from dsc.components.hooks import contained
@@ -19,9 +19,12 @@ from dsc.model.plot import ActionPlot
 from dsc.text.plot_files import load_library
 from dsc.validation.subject import addressed_by
 from knowledge_base.errors import InputError, Place, UnknownNameError, described
+from knowledge_base.facts import Delta
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
 from planning.domain import PlanningDomain
+from planning.execution.search import Foresight
+from planning.simulation import Simulation
 
 GROUP = "dsc.bundles"
 """The entry point group; each entry point refers to a `Bundle`, or to a function that returns one."""
@@ -31,9 +34,28 @@ def _none() -> Iterable[Component]:
     return ()
 
 
-@dataclass(frozen=True, slots=True)
+class BundleParts(TypedDict, total=False):
+    """The attributes of a `Bundle` except its name."""
+
+    plots: tuple[ActionPlot, ...]
+    components: Callable[[], Iterable[Component]]
+    domain: PlanningDomain | None
+    needs: tuple[str, ...]
+    about: str
+    main: str | None
+    goal: str | None
+    knowledge: Delta
+    simulation: type[Simulation] | None
+    foresight: Foresight | None
+    failures: frozenset[str]
+    profiles: Path | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Bundle:
     """Components, plots and a domain fragment, distributed together.
+
+    A bundle with `main` or `goal` is a robot: `dsc run` runs it.
 
     Attributes:
         name: the name of the bundle, which other bundles list in `needs`.
@@ -42,6 +64,13 @@ class Bundle:
         domain: the bundle's planning actions, predicates and types. The components' classes may contain more fragments.
         needs: the names of other bundles whose plots or components this bundle's plots use.
         about: a description of one line.
+        main: the plot that a run executes.
+        goal: the goal of a run, which the report checks. A run without `main` plans for the goal.
+        knowledge: the initial knowledge of the robot.
+        simulation: the class of the simulated world. Its components replace real devices.
+        foresight: simulates each plan before its execution.
+        failures: further outcomes of skills that count as failures in reports, see `planning.report.failure_events`.
+        profiles: a folder of settings profiles (`*.yaml`), which `dsc run --profile` finds by name.
     """
 
     name: str
@@ -50,25 +79,22 @@ class Bundle:
     domain: PlanningDomain | None = None
     needs: tuple[str, ...] = ()
     about: str = ""
+    main: str | None = None
+    goal: str | None = None
+    knowledge: Delta = field(default_factory=Delta)
+    simulation: type[Simulation] | None = None
+    foresight: Foresight | None = None
+    failures: frozenset[str] = frozenset()
+    profiles: Path | None = None
 
     @classmethod
-    def in_folder(
-        cls,
-        folder: Path | str,
-        *,
-        name: str | None = None,
-        components: Callable[[], Iterable[Component]] = _none,
-        needs: Iterable[str] = (),
-        about: str = "",
-    ) -> Bundle:
-        """Return the bundle of a folder with `plots/*.yaml`, `domain.pddl`, or both.
+    def in_folder(cls, folder: Path | str, *, name: str | None = None, **parts: Unpack[BundleParts]) -> Bundle:
+        """Return the bundle of a folder with `plots/*.yaml`, `domain.pddl`, `profiles/*.yaml`, or some of them.
 
         Args:
             folder: the folder, e.g. `Path(__file__).parent`.
             name: the name of the bundle; by default the name of the folder.
-            components: see the attribute.
-            needs: see the attribute.
-            about: see the attribute.
+            parts: the other attributes, e.g. `components` and `main`.
 
         Raises:
             InputError: the folder has neither plots nor a domain, or a file contains an error; the message contains the
@@ -78,14 +104,15 @@ class Bundle:
         plots, domain = folder / "plots", folder / "domain.pddl"
         if not plots.is_dir() and not domain.is_file():
             raise InputError("a bundle has plots/*.yaml or a domain.pddl", place=Place(str(folder)))
-        return cls(
-            name or folder.resolve().name,
-            tuple(load_library(plots)) if plots.is_dir() else (),
-            components,
-            PlanningDomain.from_pddl(domain) if domain.is_file() else None,
-            tuple(needs),
-            about,
-        )
+        found: BundleParts = {}
+        if plots.is_dir():
+            found["plots"] = tuple(load_library(plots))
+        if domain.is_file():
+            found["domain"] = PlanningDomain.from_pddl(domain)
+        if (profiles := folder / "profiles").is_dir():
+            found["profiles"] = profiles
+        found.update(parts)
+        return cls(name or folder.resolve().name, **found)
 
     @property
     def primitive(self) -> tuple[str, ...]:

@@ -231,6 +231,7 @@ class Executive:
         simulated: bool = True,
         open_ended: bool = False,
         prepare: Prepare | None = None,
+        header: Mapping[str, Any] | None = None,
     ) -> RunEnd:
         """Plan for a goal, execute the plan, and replan if a change of the world breaks the plan.
 
@@ -244,6 +245,7 @@ class Executive:
             simulated: see `run`.
             open_ended: see `run`.
             prepare: see `run`.
+            header: see `run`.
 
         Raises:
             InputError: the goal is not a condition or contains an undeclared name, or a limit is out of range.
@@ -251,7 +253,7 @@ class Executive:
         check_goal(parse_condition(goal), self.knowledge)
         budget = _budget(seconds, replans)
         arguments = {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
-        return self.run(ACHIEVE, arguments, simulated=simulated, open_ended=open_ended, prepare=prepare)
+        return self.run(ACHIEVE, arguments, simulated=simulated, open_ended=open_ended, prepare=prepare, header=header)
 
     def _taken_up(self) -> tuple[RunStore, Kept]:
         store = self._run_store({})

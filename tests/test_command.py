@@ -12,10 +12,10 @@ from typing import get_type_hints
 import pytest
 from typer.main import get_command
 
-from domains.clean_up_table.deployment import CleanUpTable
-from domains.cli import app, main
 from knowledge_base import Delta, KnowledgeBase, Schema
 from knowledge_base.errors import InputError
+from planning.cli.command import app, main
+from planning.deployment import Deployment
 
 TABLE = Path(__file__).parent.parent / "domains" / "clean_up_table"
 
@@ -37,8 +37,10 @@ def test_a_run_reports_as_json(dsc):
     report = json.loads(out)
     assert (status, err) == (0, "")
     assert report["goal_reached"] is True
-    assert {"left", "items", "trips", "plans", "replans", "skill_failures", "recoveries", "candidates_chosen",
-            "simulated_s", "wall_s"} <= set(report)  # fmt: skip
+    assert (report["robot"], report["judge"]) == ("clean-up-table", "world")
+    assert {"left", "plans", "replans", "skill_failures", "recoveries", "candidates_chosen", "simulated_s",
+            "wall_s", "faults", "problem"} <= set(report)  # fmt: skip
+    assert set(report["clean-up-table"]) == {"items", "left", "trips", "faults", "touched"}
 
 
 def test_a_run_in_a_pipe_tells_its_progress_in_plain_lines(dsc):
@@ -53,7 +55,9 @@ def test_something_left_is_exit_status_1_and_is_named(dsc):
     status, out, _ = dsc("run", "clean-up-table", "--seed", 6, "--faults", 0.2, "--json")
     report = json.loads(out)
     assert (status, report["goal_reached"]) == (1, False)
-    assert sorted(one["item"] for one in report["left"]) == report["touched"] != []
+    own = report["clean-up-table"]
+    assert sorted(one["item"] for one in own["left"]) == own["touched"] != []
+    assert [one["what"] for one in report["left"]] == [one["item"] for one in own["left"]]
     assert all(one["reason"] and one["where"] for one in report["left"])
 
 
@@ -70,7 +74,8 @@ def test_a_scenario_of_ones_own(dsc, tmp_path):
     file.write_text("table:\n  cups: 2\n  items: {pringles: {kind: crisp_can, size: small}, coke: can}\n")
     _, out, _ = dsc("run", "clean-up-table", "--scenario", file, "--json")
     report = json.loads(out)
-    assert (report["items"], report["trips"], report["goal_reached"]) == (4, 2, True)
+    own = report["clean-up-table"]
+    assert (own["items"], own["trips"], report["goal_reached"]) == (4, 2, True)
 
 
 PLOT = """plot: wrong
@@ -383,7 +388,7 @@ def test_no_kind_of_file_gives_a_traceback_or_a_wait(dsc, tmp_path, store, monke
     monkeypatch.setattr("knowledge_base.pddl.files.WRITER_S", 0.0)
     monkeypatch.setattr("knowledge_base.output_files.PATIENCE_S", 0.0)
     monkeypatch.setattr("dsc.cli.runs.until_interrupt", lambda _: None)
-    monkeypatch.setattr(CleanUpTable, "run", would_run)
+    monkeypatch.setattr(Deployment, "run", would_run)
     for path in bad_files(tmp_path / "bad", store):
         before = content(path)
         status, out, err = dsc(*words_with(words, params, swept, path))

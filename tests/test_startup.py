@@ -10,7 +10,7 @@ HEAVY = ("unified_planning", "up_pyperplan", "pyperplan", "networkx", "pydantic"
 PROBE = """
 import sys
 sys.argv = {argv!r}
-from domains.cli import main
+from planning.cli.command import main
 try:
     main()
 except SystemExit:

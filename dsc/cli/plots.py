@@ -39,6 +39,13 @@ PIPE_WIDTH = 160
 """Columns of a tree that is not printed on a terminal."""
 
 
+def components_of_robot(target: str) -> tuple[Component, ...]:
+    """Return the components at `MODULE:NAME`; packages that know more kinds of targets replace this function."""
+    from dsc.components.robot import robot_of
+
+    return robot_of(target)
+
+
 @app.command()
 def check(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Plots (YAML) or charts (.scxml).")],
@@ -54,8 +61,8 @@ def check(
         str | None,
         typer.Option(
             "--robot",
-            metavar="MODULE:NAME",
-            help="A component, several, or a function that makes them: then skills and parameters are checked, too.",
+            metavar="TARGET",
+            help="A robot, or components at MODULE:NAME: then skills and parameters are checked, too.",
         ),
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print a JSON list of findings.")] = False,
@@ -66,11 +73,10 @@ def check(
     A plot may use the other plots in its folder. Exit status: 0 without findings, or with warnings only; 2 with
     findings.
     """
-    from dsc.components.robot import robot_of
     from dsc.text.plot_files import Neighbours
 
     neighbours = Neighbours()
-    components = None if robot is None else robot_of(robot)
+    components = None if robot is None else components_of_robot(robot)
     found = [(file, finding) for file in files for finding in _findings(file, domain, neighbours, components)]
     if json:
         print_json([_as_data(file, finding) for file, finding in found])

@@ -7,11 +7,15 @@ from `Exception` would end the program, too.
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
+import sysconfig
 import threading
 from asyncio.runners import Runner
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
+from traceback import walk_tb
 from types import TracebackType
 from typing import Any
 
@@ -52,6 +56,30 @@ def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:
     if issubclass(kind, GeneratorExit):  # other code closes a coroutine, never the task that runs it
         return task is running_task()
     return not (issubclass(kind, KeyboardInterrupt) and _from_keyboard(error))
+
+
+def raised_at(error: BaseException) -> str:
+    """Return the innermost line of a user's code that raised the error, as ` (file:line)`; empty without a traceback.
+
+    Code of this project, of the standard library and of installed packages counts only if no other code was involved.
+    """
+    frames = []
+    cause: BaseException | None = error
+    while cause is not None:
+        frames += [(frame.f_code.co_filename, line) for frame, line in walk_tb(cause.__traceback__)]
+        cause = cause.__cause__
+    users = [frame for frame in frames if not frame[0].startswith(_NOT_USERS)]
+    found = users or frames
+    return f" ({found[-1][0]}:{found[-1][1]})" if found else ""
+
+
+_ROOT = Path(__file__).parents[2]
+_NOT_USERS = (
+    *(str(_ROOT / package) + os.sep for package in ("knowledge_base", "dsc", "planning")),
+    *{sysconfig.get_path(name) + os.sep for name in ("stdlib", "purelib", "platlib")},
+    "<frozen",
+)
+"""Beginnings of the paths of code that no user of this project has written."""
 
 
 def running_task() -> asyncio.Task[Any] | None:

@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 from dsc.components.component import ALWAYS, Component
-from dsc.components.hooks import contained
+from dsc.components.hooks import contained, raised_at
 from dsc.components.life_cycle import NEUTRAL
 from dsc.components.streams import Push, Stream, require_fitting
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
@@ -57,6 +57,37 @@ def robot_of(named: str) -> tuple[Component, ...]:
     Raises:
         InputError: the module or the name does not exist, or the value of the name is not components.
     """
+    return components_in(made(named_part(named), named))
+
+
+def components_in(found: object) -> tuple[Component, ...]:
+    """Return one component or several components as a tuple; errors as for `require_instances`."""
+    several = isinstance(found, Iterable) and not isinstance(found, Component)
+    return require_instances(found if several else (found,))  # type: ignore[arg-type]  # checked there
+
+
+def made(found: object, named: str) -> object:
+    """Return the result of a function without parameters, or another value unchanged; `named` is for messages.
+
+    Raises:
+        InputError: the function raises an error.
+    """
+    if isinstance(found, Component) or not callable(found):
+        return found
+    try:
+        with contained():
+            return found()
+    except Exception as error:  # a user's function may raise any error
+        raise InputError(f"'{named}' cannot be called: {described(error)}{raised_at(error)}") from error
+
+
+def named_part(named: str) -> object:
+    """Return the value at `module:name`; the module is imported, also from the present folder.
+
+    Raises:
+        InputError: the module cannot be imported.
+        UnknownNameError: the module has no such name.
+    """
     module_name, colon, name = named.partition(":")
     if not (module_name and colon and name):
         raise InputError(f"a robot is named as MODULE:NAME, not {shown(named)}", found=named)
@@ -67,18 +98,13 @@ def robot_of(named: str) -> tuple[Component, ...]:
         with contained():
             module = import_module(module_name)
     except Exception as error:  # a user's module may raise any error
-        raise InputError(f"the module '{module_name}' cannot be imported: {described(error)}") from error
+        raise InputError(
+            f"the module '{module_name}' cannot be imported: {described(error)}{raised_at(error)}"
+        ) from error
     if not hasattr(module, name):
         valid = [one for one in vars(module) if not one.startswith("_")]
         raise UnknownNameError(f"there is no '{name}' in the module '{module_name}'", found=name, valid=valid)
-    found = getattr(module, name)
-    try:
-        with contained():
-            made = found() if callable(found) else found
-    except Exception as error:
-        raise InputError(f"'{named}' gives no components: {described(error)}") from error
-    components = (made,) if isinstance(made, Component) or not isinstance(made, Iterable) else tuple(made)
-    return require_instances(components)
+    return getattr(module, name)
 
 
 def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:

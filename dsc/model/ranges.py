@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -69,6 +70,24 @@ class Range:
             return value
         message = f"'{name}' is {self}; found {written(value)}"
         raise InputError(message, found=str(value), valid=map(str, self.among))
+
+    def read(self, name: str, text: str) -> Value:
+        """Return the value that a text states, e.g. `2.5`, `true` or `kitchen`.
+
+        Args:
+            name: name of the parameter, for messages.
+            text: the text of a value.
+
+        Raises:
+            InputError: the text is not a value of the type, or is out of range; the message has the range.
+        """
+        value: Value = text
+        if self.type == "boolean":
+            value = {"true": True, "false": False}.get(text, text)
+        elif self.type == "number":
+            with suppress(ValueError):
+                value = int(text) if text.lstrip("+-").isdecimal() else float(text)
+        return self.check(name, value)
 
     def problems(self) -> Iterable[str]:
         """Yield a message for each contradiction between the range's fields; empty for a valid range."""

@@ -247,11 +247,12 @@ def checked_setting(
     return ParameterMessage(owner, name, value, of_plot=owner not in components)
 
 
-def checked_arguments(plot: ActionPlot, given: object) -> Mapping[str, Any]:
+def checked_arguments(plot: ActionPlot, given: object, world: World) -> Mapping[str, Any]:
     """Return the validated arguments of a plot.
 
     Raises:
         InputError: `given` is not a mapping, a value is not plain data, or a number or truth value has another type.
+        UnknownNameError: the parameter has a type of the schema, and the world has no such object of this type.
     """
     if not isinstance(given, Mapping):
         raise InputError(f"arguments are a mapping of parameters' names to values, not {shown(given)}")
@@ -259,5 +260,15 @@ def checked_arguments(plot: ActionPlot, given: object) -> Mapping[str, Any]:
         declared = plot.parameters.get(name)
         if declared is not None and declared.type in {"number", "boolean"}:
             declared.range.check(f"{plot.name}.{name}", value)
+        elif declared is not None and world.schema.is_type(declared.type, 1):
+            _require_object(f"{plot.name}.{name}", value, declared.type, world)
         _copied(value, f"the argument '{name}'")
     return given
+
+
+def _require_object(name: str, value: object, kind: str, world: World) -> None:
+    own = world.type_of(value) if isinstance(value, str) else None
+    if own is not None and world.schema.is_a(own, kind):
+        return
+    said = f"there is no {kind} {shown(value)}" if own is None else f"'{value}' is of type {own}"
+    raise UnknownNameError(f"'{name}' is a {kind}; {said}", found=str(value), valid=world.objects(kind))

@@ -191,10 +191,11 @@ class Sequencer:
         """Run the plot until it ends, or until a deadlock; return the end of the run.
 
         Raises:
-            InputError: the plot is unknown, or a parameter is missing or unknown.
+            InputError: the plot or a parameter is unknown, a parameter is missing, or an argument has another type.
             StoreError: the store cannot be written; the run can resume from its last commit.
         """
-        given = message_checks.checked_arguments(self.library.plot(plot), {} if arguments is None else arguments)
+        wanted = self.library.plot(plot)
+        given = message_checks.checked_arguments(wanted, {} if arguments is None else arguments, self.knowledge)
 
         async def begin() -> None:
             self._start(plot, given)

@@ -42,8 +42,8 @@ _MARK = b"\xef\xbb\xbf"  # byte order mark, in UTF-8
 _MOST_DIGITS = 15
 """Maximum number of digits of a version: more than any store needs, and few enough to parse quickly."""
 
-readers: dict[str, Callable[[Path], KnowledgeBase]] = {}
-"""Readers of other sources by file ending, e.g. `.yaml`; packages that use this package register their readers here."""
+readers: list[Callable[[Path], KnowledgeBase | None]] = []
+"""Readers of other sources, which other packages add; each returns `None` for a source of another kind."""
 
 
 class Opened(NamedTuple):
@@ -101,8 +101,9 @@ def _opened(source: Path, domain: Path | None) -> Opened:
 
     if is_database(source):
         return Opened(KnowledgeBase.open(None, source, read_only=True))
-    if source.suffix in readers:
-        return Opened(readers[source.suffix](source))
+    for reader in readers:
+        if (world := reader(source)) is not None:
+            return Opened(world)
     data = read_bytes(source, MAX_WORLD_BYTES)  # read only once, as a pipe allows
     if data.removeprefix(_MARK).lstrip()[:1] == b"{":
         return Opened(KnowledgeBase.from_json(decoded(data, source), source=str(source)))

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from domains.clean_up_table import Scenario, deploy
+from domains.clean_up_table import Scenario, deploy, world_of
 from domains.clean_up_table.world_faults import GRASP_FAILED, ITEM_SLIPPED, Draw
 from dsc import Event
 from dsc.trace import header, write_to
@@ -21,9 +21,9 @@ def run(planner, seed=0, faults=0.0, scenario=None, listener=None, prepare=None)
 def test_a_table_without_faults_is_cleared_in_the_fewest_trips(planner):
     table, report = run(planner)
     assert report.goal_reached
-    assert (report.items, report.left, report.trips, report.plans, report.replans) == (9, (), 3, 1, 0)
+    assert (report.own["items"], report.left, report.own["trips"], report.plans, report.replans) == (9, (), 3, 1, 0)
     assert not report.skill_failures
-    assert table.world.robot_at == "operator"
+    assert world_of(table).robot_at == "operator"
 
 
 @pytest.mark.parametrize(
@@ -40,24 +40,24 @@ def test_a_table_without_faults_is_cleared_in_the_fewest_trips(planner):
 def test_stacking_saves_trips(planner, table, trips):
     _, report = run(planner, scenario=Scenario.parse(f"table: {table}"))
     assert report.goal_reached
-    assert report.trips == trips
+    assert report.own["trips"] == trips
 
 
 def test_an_empty_table_is_reported_clear_without_a_plan(planner):
     _, report = run(planner, scenario=Scenario.parse("table: {}"))
-    assert (report.goal_reached, report.items, report.plans, report.trips) == (True, 0, 0, 0)
+    assert (report.goal_reached, report.own["items"], report.plans, report.own["trips"]) == (True, 0, 0, 0)
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_every_run_ends_with_the_truth(planner, seed):
     table, report = run(planner, seed, 0.2)
     assert report.problem is None
-    assert {one.item for one in report.left} == table.world.touched()
-    assert report.goal_reached == (not report.left) == table.world.goal_reached
+    assert {one.what for one in report.left} == world_of(table).touched()
+    assert report.goal_reached == (not report.left) == world_of(table).goal_reached
     assert all(one.reason for one in report.left)
-    if not any(fault.permanent for fault in table.world.fired):
+    if not any(fault.permanent for fault in world_of(table).fired):
         assert report.goal_reached
-    disposed = {item.name for item in table.world.items if item.disposed}
+    disposed = {item.name for item in world_of(table).items if item.disposed}
     assert {found["item"] for found in table.executive.knowledge.query("(disposed ?item)")} == disposed
 
 
@@ -65,7 +65,7 @@ def test_every_run_ends_with_the_truth(planner, seed):
 def test_however_often_things_fail_the_run_ends_with_the_truth(planner, faults):
     table, report = run(planner, 1000, faults)
     assert report.problem is None
-    assert {one.item for one in report.left} == table.world.touched()
+    assert {one.what for one in report.left} == world_of(table).touched()
 
 
 def traced(planner, seed):
@@ -126,7 +126,7 @@ def test_through_everything_at_once(planner, monkeypatch):
     def listener(record):
         seen.append(record)
         if record.type == "plan.asked" and "added" not in holder:
-            holder["added"] = table.world.add_item("cup")
+            holder["added"] = world_of(table).add_item("cup")
             # A bystander tells the robot, so that the plan being made is already wrong when it comes.
             told = Delta(
                 nodes={holder["added"]: "cup"},
@@ -146,13 +146,13 @@ def test_through_everything_at_once(planner, monkeypatch):
 
     table = deploy(None, 0, 0.0, planner, listener)
     script = Script(ITEM_SLIPPED, GRASP_FAILED)
-    monkeypatch.setattr(table.world.faults, "draw", script)
+    monkeypatch.setattr(world_of(table).faults, "draw", script)
     report = table.run(prepare=lambda sequencer: holder.update(sequencer=sequencer))
 
     assert script.left == []
     assert report.goal_reached
-    assert report.items == 10
-    assert table.world.items[holder["added"]].disposed
+    assert report.own["items"] == 10
+    assert world_of(table).items[holder["added"]].disposed
     assert report.recoveries["slipped: pick_up_from_above, replan"] == 1
     entered = [path for r in seen if r.type == "step" for m in r.data["microsteps"] for path in m["entered"]]
     assert entered.count("stopped") == 1

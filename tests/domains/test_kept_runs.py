@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from kept_lives import SCENARIO, told
 
-from domains.clean_up_table.deployment import PROFILES, deploy, resumed
+from domains.clean_up_table.deployment import HOME, bundle, deploy, world_of
 from domains.clean_up_table.durable_world import KIND, DurableWorld
 from domains.clean_up_table.scenario import Scenario
 from dsc.dynamic.library import Library
@@ -24,6 +24,7 @@ from dsc.sequencer.replay import replay
 from dsc.text.profiles import find_profile
 from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.errors import InputError, StoreError
+from planning import resume
 
 DSC = Path(sys.executable).with_name("dsc")
 EVERY = 12
@@ -57,9 +58,9 @@ def whole(planner, tmp_path_factory):
             boundary(action_id)
 
     with deploy(Scenario.parse(SCENARIO), 3, 0.2, planner, store=alive / "run.kb") as table:
-        table.world.__class__ = CopiedWorld
+        world_of(table).__class__ = CopiedWorld
         report = table.run(prepare=lambda run: run.listen(boundary))
-        return alive / "run.kb", replace(report, wall_s=0), table.world.state(), copies
+        return alive / "run.kb", replace(report, wall_s=0), world_of(table).state(), copies
 
 
 def test_wherever_it_is_broken_off_it_ends_with_the_same_report(whole, planner, tmp_path):
@@ -67,9 +68,9 @@ def test_wherever_it_is_broken_off_it_ends_with_the_same_report(whole, planner, 
     assert len(copies) > 5
     for number, kept in enumerate(copies):
         copy = copied(kept.parent, tmp_path / str(number))
-        with resumed(copy, planner) as table:
+        with resume(bundle(), copy, planner=planner) as table:
             assert replace(table.run(), wall_s=0) == report
-            assert table.world.state() == world
+            assert world_of(table).state() == world
         assert told(copy) == told(path)
 
 
@@ -77,7 +78,7 @@ def test_a_store_changes_nothing_about_the_run(whole, planner):
     _, report, world, _ = whole
     table = deploy(Scenario.parse(SCENARIO), 3, 0.2, planner)
     assert replace(table.run(), wall_s=0) == report
-    assert table.world.state() == world
+    assert world_of(table).state() == world
 
 
 def test_the_replay_of_a_run_with_plans_and_faults_comes_to_the_same(whole):
@@ -179,7 +180,7 @@ def test_the_run_of_another_program_is_left_to_that(tmp_path):
         with store.writing:
             store.begin("patrol", {}, Library())
     with pytest.raises(StoreError, match="the run of 'patrol' in this store is another program's"):
-        resumed(tmp_path / "run.kb")
+        resume(bundle(), tmp_path / "run.kb")
 
 
 def test_the_command_keeps_a_run_resumes_it_and_tells_what_happened(whole, tmp_path):
@@ -199,7 +200,7 @@ def test_the_command_keeps_a_run_resumes_it_and_tells_what_happened(whole, tmp_p
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["run"], "a run needs a world, or a store to --resume; valid: clean-up-table"),
+        (["run"], "a run needs a robot, or a store to --resume; valid: clean-up-table"),
         (
             ["run", "--resume", "x.kb", "--seed", "1"],
             "--resume continues a run as it began, without --seed",
@@ -220,7 +221,7 @@ def test_a_mistake_is_one_line(words, message):
 def test_another_robot_is_the_same_one_after_the_crash(planner, tmp_path):
     (alive := tmp_path / "alive").mkdir()
     copies: list[Any] = []
-    profile = find_profile("on_tracks", PROFILES)
+    profile = find_profile("on_tracks", bundle().profiles or HOME)
 
     def boundary(_):
         if len(copies) < 30:
@@ -228,10 +229,10 @@ def test_another_robot_is_the_same_one_after_the_crash(planner, tmp_path):
 
     with deploy(Scenario.parse(SCENARIO), 3, 0.2, planner, store=alive / "run.kb", profile=profile) as table:
         report = replace(table.run(prepare=lambda run: run.listen(boundary)), wall_s=0)
-        world = table.world.state()
+        world = world_of(table).state()
     for path in filter(None, copies):
-        with resumed(path, planner) as table:
+        with resume(bundle(), path, planner=planner) as table:
             assert table.profile.digest == profile.digest
             assert replace(table.run(), wall_s=0) == report
-            assert table.world.state() == world
+            assert world_of(table).state() == world
         assert told(path) == told(alive / "run.kb")

@@ -5,8 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
-from domains.progress import LiveProgress, PlainProgress, Tally
 from dsc.trace import Record
+from planning.progress import LiveProgress, PlainProgress, Tally
 
 
 def record(seq, type_, **data):

@@ -7,14 +7,14 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from domains.clean_up_table import deploy
-from domains.clean_up_table.deployment import PROFILES, ROBOTS, plots
+from domains.clean_up_table import deploy, world_of
+from domains.clean_up_table.deployment import HOME, ROBOTS, bundle
 from domains.clean_up_table.scenario import Scenario
-from domains.cli import app
 from dsc.text.profiles import load_profile, parse_profile
 from knowledge_base import InputError
+from planning.cli.command import app
 
-SHIPPED = {file.stem: load_profile(file) for file in sorted(PROFILES.glob("*.yaml"))}
+SHIPPED = {file.stem: load_profile(file) for file in sorted((HOME / "profiles").glob("*.yaml"))}
 
 
 def run(planner, name, seed=0, faults=0.0, scenario=None):
@@ -31,12 +31,12 @@ def test_every_robot_has_a_profile_and_every_profile_a_robot():
 def test_each_robot_clears_the_table_with_the_same_plots(planner, name, seed):
     table, report = run(planner, name, seed, 0.15)
     assert {plot.name: plot for plot in table.executive.library if plot.name != "achieve"} == {
-        p.name: p for p in plots()
+        p.name: p for p in bundle().plots
     }
     assert report.problem is None
-    assert report.goal_reached == (not report.left) == table.world.goal_reached
-    assert {one.item for one in report.left} == table.world.touched()
-    if not any(fault.permanent for fault in table.world.fired):
+    assert report.goal_reached == (not report.left) == world_of(table).goal_reached
+    assert {one.what for one in report.left} == world_of(table).touched()
+    if not any(fault.permanent for fault in world_of(table).fired):
         assert report.goal_reached
 
 

@@ -6,7 +6,7 @@ import pytest
 from small_table import make_world
 
 from domains.clean_up_table.components import Arm, Base, Camera, Voice
-from domains.clean_up_table.deployment import HOME, plots
+from domains.clean_up_table.deployment import HOME, bundle
 from dsc import Event, Library
 from dsc.testing import (
     Answer,
@@ -23,7 +23,7 @@ from dsc.testing import (
     world,
 )
 
-LIBRARY = Library(plots())
+LIBRARY = Library(bundle().plots)
 ROBOT = (Base(make_world()), Arm(make_world()), Camera(make_world()), Voice(make_world()))
 DOMAIN = HOME / "domain.pddl"
 ITEMS = "cup1 cup2 cup3 cup4 - cup table floor - surface bin sink - destination"

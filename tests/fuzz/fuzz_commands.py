@@ -24,7 +24,7 @@ import typer
 from fuzz_mutation import NAMES, NUMBERS, mutated
 from fuzz_readers import READERS, Target, stores
 
-from domains.cli import NOBODY_READS, NOT_WRITTEN, app, main
+from planning.cli.command import NOBODY_READS, NOT_WRITTEN, app, main
 
 STATUSES = {0, 1, 2, NOT_WRITTEN, NOBODY_READS}
 MORE_STATUSES = {("plan",): {3, 4}, ("kb", "watch"): {130}}

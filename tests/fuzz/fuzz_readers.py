@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from fuzz_mutation import mutated, reset
 
-from domains.clean_up_table.deployment import deploy, domain, library
+from domains.clean_up_table.deployment import bundle, deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.components.component import Component
 from dsc.components.endpoint import LocalTransport
@@ -54,10 +54,13 @@ from knowledge_base.pddl import read_problem
 from knowledge_base.statements import retracted, told
 from planning.cancellable_work import WorkLimit, WorkLimitError
 from planning.domain import PlanningDomain
+from planning.executive import achieve_plot
 from planning.problem.construction import build_problem
 
 HOME = Path(__file__).parent
 ROOT = HOME.parents[1]
+LIBRARY = Library([*bundle().plots, achieve_plot()])
+DOMAIN = PlanningDomain.from_pddl(ROOT / "domains" / "clean_up_table" / "domain.pddl")
 KITCHEN = ROOT / "examples" / "kitchen"
 PATIENCE_S = 1.0
 """Seconds that a mutated problem may be posed: it says itself when they are over."""
@@ -122,8 +125,8 @@ def read_plot(data: bytes, folder: Path) -> None:
     again = parse_plot(plot_to_yaml(plot))
     if again != plot:
         raise AssertionError(f"read again, it is another plot: {plot_to_yaml(again)}")
-    plots = Library([plot, *(other for other in library() if other.name != plot.name)])
-    findings = [str(one) for one in validate_plot(plot, plots, domain().schema)]
+    plots = Library([plot, *(other for other in LIBRARY if other.name != plot.name)])
+    findings = [str(one) for one in validate_plot(plot, plots, DOMAIN.schema)]
     draw(plot)
     for written in (to_mermaid, to_plantuml, to_scxml):
         _unless(NotExpressibleError, partial(written, plot))
@@ -179,7 +182,7 @@ def read_state(data: bytes, folder: Path) -> None:
         form = json.loads(data)
     except (ValueError, RecursionError):
         return
-    MachineState.from_json(form, library())
+    MachineState.from_json(form, LIBRARY)
 
 
 # -- PDDL and the language -------------------------------------------------------------------------------
@@ -197,7 +200,7 @@ def read_domain(data: bytes, folder: Path) -> None:
 
 def read_fragment(data: bytes, folder: Path) -> None:
     """A part of a domain, merged with one that is there."""
-    merged = PlanningDomain.from_fragments([domain(), _written(data, folder, "fragment.pddl")])
+    merged = PlanningDomain.from_fragments([DOMAIN, _written(data, folder, "fragment.pddl")])
     merged.to_pddl()
 
 

@@ -8,11 +8,11 @@ from importlib.metadata import EntryPoint
 import pytest
 from typer.testing import CliRunner
 
-from domains.cli import app
 from dsc import Component, Outcome, SkillCall, parse_plot, primitive_plot, skill
 from knowledge_base import Delta, InputError, UnknownNameError, fact
 from planning import Bundle, Executive, PlanningDomain, bundles
 from planning.bundles import gathered, installed
+from planning.cli.command import app
 
 
 class Arm(Component):
@@ -110,7 +110,7 @@ def test_a_folder_is_read_with_its_mistakes_named(tmp_path):
     (tmp_path / "plots").mkdir()
     (tmp_path / "plots" / "fetch.yaml").write_text(FETCH)
     (tmp_path / "domain.pddl").write_text("(define (domain d) (:types item))")
-    read = Bundle.in_folder(tmp_path, name="tasks", needs=["handling"])
+    read = Bundle.in_folder(tmp_path, name="tasks", needs=("handling",))
     assert (read.plots, read.needs) == (TASKS.plots, TASKS.needs)
     assert isinstance(read.domain, PlanningDomain)
     (tmp_path / "plots" / "fetch.yaml").write_text("plot: fetch\nstates: 5")

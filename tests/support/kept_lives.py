@@ -6,9 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from domains.clean_up_table.deployment import deploy, resumed
+from domains.clean_up_table.deployment import bundle, deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.runs.archive import archive, has_run
+from planning import resume
 
 SCENARIO = "table: {cups: 2, cans: 1, crisp_cans: [small]}"
 
@@ -16,7 +17,9 @@ SCENARIO = "table: {cups: 2, cans: 1, crisp_cans: [small]}"
 def live(store: str, seed: int, faults: float, say) -> None:
     """Begin the run, or go on with it; say the number of each record that is made, and at last that it is over."""
     path = Path(store)
-    with resumed(path) if has_run(path) else deploy(Scenario.parse(SCENARIO), seed, faults, store=path) as table:
+    with (
+        resume(bundle(), path) if has_run(path) else deploy(Scenario.parse(SCENARIO), seed, faults, store=path) as table
+    ):
         table.run(prepare=lambda run: run.trace.listen(lambda record: say.send(record.seq)))
     say.send("end")
 

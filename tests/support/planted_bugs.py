@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
-from domains.clean_up_table.report import FAILURES
+from domains.clean_up_table.deployment import bundle
+from dsc.dynamic.library import Library
 from dsc.messages import SkillMessage
 from dsc.runs import store
 from dsc.runs.store import RunStore, RunWriter
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.sequencer import Sequencer
+from planning.report import failure_events
+
+FAILURES = failure_events(Library(bundle().plots)) | bundle().failures
 
 
 def a_new_id_on_retry(monkeypatch):

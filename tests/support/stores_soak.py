@@ -247,8 +247,9 @@ def _small_runs(folder: Path, times: int) -> list[Original]:
 
 def _table_runs(folder: Path) -> list[Original]:
     """Runs of the clean-up table: finished, and interrupted before and after the log was put into the file."""
-    from domains.clean_up_table.deployment import deploy, resumed
+    from domains.clean_up_table.deployment import bundle, deploy
     from domains.clean_up_table.scenario import Scenario
+    from planning import resume as deploy_again
 
     alive = folder / "alive"
     alive.mkdir(parents=True)
@@ -268,7 +269,7 @@ def _table_runs(folder: Path) -> list[Original]:
         report = table.run(prepare=lambda run: run.store.writing.listen(boundary))
 
     def resume(home: Path) -> None:
-        with resumed(home / NAME) as table:
+        with deploy_again(bundle(), home / NAME) as table:
             again = table.run()
         if again.goal_reached != report.goal_reached or replay(home / NAME).divergence:
             raise WrongError("the resumed run ends otherwise")

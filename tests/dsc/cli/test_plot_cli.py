@@ -267,7 +267,7 @@ def test_with_a_robot_skills_are_checked_too(robot, name):
         ("some_robt:components", "the module 'some_robt' cannot be imported: ModuleNotFoundError"),
         ("some_robot:componets", "there is no 'componets' in the module 'some_robot'; did you mean 'components'?"),
         ("some_robot:number", "a component is an instance of a subclass of Component, not 7"),
-        ("some_robot:broken", "'some_robot:broken' gives no components: RuntimeError: no arm today"),
+        ("some_robot:broken", "'some_robot:broken' cannot be called: RuntimeError: no arm today ("),
     ],
 )
 def test_what_is_no_robot_is_named(robot, named, said):

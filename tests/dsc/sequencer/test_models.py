@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from domains.clean_up_table.deployment import deploy
-from domains.clean_up_table.deployment import plots as table_plots
+from domains.clean_up_table.deployment import bundle, deploy
 from dsc.dynamic.library import Library
 from dsc.reflection import MODELS, design_facts
 from dsc.text.plot_files import parse_plot
@@ -64,7 +63,7 @@ handlers: [{on: low, listen: {trigger: battery.low}, do: {use: wipe}}]
 
 
 def test_everything_that_a_plot_uses_is_there(kb) -> None:
-    library = Library(table_plots())
+    library = Library(bundle().plots)
     for plot in library:
         assert named(kb, f"(uses plot:{plot.name} ?part)", "part") == {f"plot:{part}" for part in plot.uses()}
 

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 from dsc_bombs import BOMBS, FINAL, HEAD
 
-from domains.cli import main
 from dsc.text.yaml import MAX_BYTES
 from dsc.validation.library import MAX_FINDINGS
+from planning.cli.command import main
 
 BROKEN = Path(__file__).parents[2] / "support" / "broken"
 HELPERS = {"grasp.yaml", "wait.yaml"}

@@ -98,8 +98,8 @@ def test_what_cannot_be_shown_is_refused_with_its_line(tmp_path, lines, message)
 
 
 def test_the_command_names_what_is_damaged(tmp_path, monkeypatch) -> None:
-    from domains.cli import app
     from dsc.cli import runs
+    from planning.cli.command import app
 
     path = tmp_path / "run.jsonl"
     monkeypatch.setattr(runs, "until_interrupt", lambda _viewer: None)

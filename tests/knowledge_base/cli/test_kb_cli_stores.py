@@ -166,7 +166,7 @@ def test_what_is_no_store_is_said_and_not_made(tmp_path, command: tuple[str, ...
 
 
 def test_a_scenario_is_what_the_robot_knows_at_its_start(tmp_path) -> None:
-    import domains.cli  # noqa: F401  brings its kind of source along
+    import planning.cli.command  # noqa: F401  brings its kind of source along
 
     scenario = tmp_path / "two.yaml"
     scenario.write_text("table: {cups: 2}\nrobot_at: sink\n", encoding="utf-8")

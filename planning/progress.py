@@ -38,6 +38,7 @@ class Tally:
         candidates: number of choices of each plot by dynamic states, without choices of planning.
         plans: number of plans found; `replans`: number of plans that replaced a running plan.
         excluded: number of exclusions of each plan step after failures.
+        gave_up: the reason of the last goal for which there was no plan or no further plan; empty without one.
         seconds: run time of the last record, in seconds.
     """
 
@@ -48,6 +49,7 @@ class Tally:
         self.excluded: Counter[str] = Counter()
         self.plans = 0
         self.replans = 0
+        self.gave_up = ""
         self.seconds = 0.0
 
     def __call__(self, record: Record) -> None:
@@ -65,6 +67,8 @@ class Tally:
             self.replans += 1
         elif record.type == "plan.excluded":
             self.excluded[record.data["step"]] += 1
+        elif record.type in {"plan.gave_up", "plan.none"}:
+            self.gave_up = record.data["reason"]
 
 
 def _working(scope: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -95,7 +99,7 @@ class PlainProgress:
             self._write(f"{record.t:8.1f} s  {line}")
 
     def _learn_steps(self, plot: dict[str, Any]) -> None:
-        working = _working(plot)
+        working = {} if plot["plot"] == ACHIEVE else _working(plot)  # progress shows the plan, not its execution state
         self._stages |= working.keys()
         if plot.get("generated"):
             self._steps = {name: state["about"] for name, state in working.items() if _STEP.fullmatch(name)}
@@ -124,16 +128,16 @@ class PlainProgress:
 class LiveProgress(PlainProgress):
     """A listener that writes the lines of `PlainProgress` on a terminal, above a status line.
 
-    The status line contains the run time, the running skill, the number of items left, and the numbers of plans and
-    replans.
+    The status line contains the run time and the running skill. It counts the parts of the goal that are left, plans
+    and replans.
 
     Args:
         console: the console of the terminal.
-        left: returns the number of items that are left.
+        left: returns the number of parts of the goal that are left, or `None`.
         tally: the counts of the run; it must receive each record before this listener does.
     """
 
-    def __init__(self, console: Console, left: Callable[[], int], tally: Tally) -> None:
+    def __init__(self, console: Console, left: Callable[[], int | None], tally: Tally) -> None:
         super().__init__(lambda line: console.print(line, highlight=False))
         self._live: Live = Live(console=console, refresh_per_second=8, transient=True)
         self._left = left
@@ -158,5 +162,7 @@ class LiveProgress(PlainProgress):
             skill = record.data["skill"]
             arguments = ", ".join(str(value) for value in record.data["arguments"].values())
             self._doing = self._doing if skill.startswith("planner.") else f"{skill}({arguments})"
-        counts = f"left {self._left()}  plans {self._tally.plans}  replans {self._tally.replans}"
+        left = self._left()
+        counts = "" if left is None else f"left {left}  "
+        counts += f"plans {self._tally.plans}  replans {self._tally.replans}"
         self._live.update(Text.assemble((f"{record.t:8.1f} s  ", "bold"), self._doing, "  ", (counts, "dim")))

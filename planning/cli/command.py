@@ -1,0 +1,160 @@
+"""The command `dsc`: the commands of all rooms, and the reports of invalid input."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from io import TextIOWrapper
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from dsc.cli import plots
+from dsc.cli.runs import app as runs_app
+from dsc.cli.runs import view_command
+from knowledge_base.cli import app as kb_app
+from knowledge_base.cli import readers
+from planning.cli import bundles_command, doctor_command, plan_command
+from planning.cli.run import components_of_target, robot_knowledge, run_command
+
+if TYPE_CHECKING:
+    from knowledge_base.errors import InputError
+
+BAD_INPUT, NOT_WRITTEN, NOBODY_READS = 2, 74, 141
+"""Exit statuses of every command: bad input, EX_IOERR of sysexits.h, and a shell's status for a broken pipe."""
+
+NO_FILE = frozenset({errno.ELOOP, errno.ENAMETOOLONG, errno.ENOTDIR, errno.EACCES, errno.EPERM})
+"""Error numbers for a path that leads to no file, or to a file without permission."""
+
+
+class _Commands(TyperGroup):
+    """The group of commands; a closed pipe of the reader ends a command with `NOBODY_READS`."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            raise typer.Exit(NOBODY_READS) from None
+
+
+app = typer.Typer(
+    name="dsc",
+    cls=_Commands,
+    help="Dynamic State Charts: state charts for what you can foresee, a planner for what you cannot.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+app.add_typer(plots.app, name="plot")
+app.add_typer(kb_app, name="kb")
+app.add_typer(runs_app, name="runs")
+app.command("run")(run_command)
+app.command("plan")(plan_command)
+app.command("doctor")(doctor_command)
+app.command("bundles")(bundles_command)
+app.command("view")(view_command)
+readers.append(robot_knowledge)
+plots.components_of_robot = components_of_target
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"dsc {version('dynamic-state-charts')}")
+        raise typer.Exit
+
+
+@app.callback()
+def dsc(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Dynamic State Charts: state charts for what you can foresee, a planner for what you cannot."""
+
+
+def main() -> None:
+    """Run the command line; report bad input as one message with exit status 2, and never as a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # a terminal may not support every character
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        _command()
+    except BrokenPipeError:
+        sys.exit(NOBODY_READS)
+    except OSError as error:
+        from knowledge_base.output_files import FULL
+
+        if error.errno not in FULL:
+            raise
+        named = "" if error.filename is None else f" '{error.filename}'"
+        typer.echo(f"dsc: cannot write{named}: {error.strerror}", err=True)
+        sys.exit(NOT_WRITTEN)
+    finally:
+        _drop_unwritten()
+
+
+def _command() -> None:
+    as_json = "--json" in sys.argv
+    try:
+        status = app(standalone_mode=not as_json)  # without --json, Typer itself reports wrong arguments
+    except Exception as error:
+        from knowledge_base.errors import InputError
+
+        wrong = _unusable(error) or (_misused(error) if as_json else error)
+        if not isinstance(wrong, InputError):
+            raise
+        _tell(wrong, as_json=as_json)
+        sys.exit(BAD_INPUT)
+    sys.exit(status)
+
+
+def _unusable(error: Exception) -> InputError | None:
+    """Return the error for a path argument that the operating system refused; `None` for any other error."""
+    from knowledge_base.errors import InputError
+
+    if isinstance(error, RuntimeError) and isinstance(error.__context__, OSError):
+        error = error.__context__  # Python 3.11 raises a RuntimeError for circular links
+    if not isinstance(error, OSError) or error.errno not in NO_FILE or error.filename is None:
+        return None
+    return InputError(f"cannot use '{error.filename}': {error.strerror}", found=str(error.filename))
+
+
+def _misused(error: Exception) -> Exception:
+    """Return an `InputError` for wrong arguments of a command; return any other error unchanged."""
+    from knowledge_base.errors import InputError
+
+    message = getattr(error, "format_message", None)
+    if message is None:
+        return error
+    option, valid = getattr(error, "option_name", None), getattr(error, "possibilities", None) or ()
+    said = f"no such option: {option}" if option else message().partition("\n")[0].removesuffix(".")
+    return InputError(said, found=option, valid=valid)
+
+
+def _tell(error: InputError, *, as_json: bool) -> None:
+    """Print the error on standard error, or with --json as JSON on standard output."""
+    import json
+
+    from knowledge_base.errors import Place
+
+    if not as_json:
+        typer.echo(f"dsc: {error}", err=True)
+        return
+    place = error.place or Place()
+    where = {"file": place.source, "line": place.line, "column": place.column}
+    said = {"outcome": "bad_input", "message": error.message, **where, "found": error.found, "nearest": error.nearest}
+    typer.echo(json.dumps(said))
+
+
+def _drop_unwritten() -> None:
+    """Discard unwritten output, so that Python reports no second error at its exit."""
+    try:
+        if sys.stdout is not None:  # `None` if the process started without standard output
+            sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,269 @@
+"""Command `dsc run`: run any robot, with progress, trace, store and page, and print its report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dsc.cli.runs import NoOpen, Port
+
+if TYPE_CHECKING:
+    from dsc.components.component import Component
+    from dsc.sequencer.sequencer import Sequencer
+    from knowledge_base.output_files import Output
+    from knowledge_base.store import KnowledgeBase
+    from planning.bundles import Bundle
+    from planning.deployment import Deployment, Task
+    from planning.report import Report
+
+GOAL_REACHED, SOMETHING_LEFT = 0, 1
+"""Exit statuses of `dsc run`, besides those of every command."""
+
+
+class Durability(StrEnum):
+    """The events that a kept run survives: a crash of the process, or also a power failure."""
+
+    process = "process"
+    power = "power"
+
+
+def run_command(
+    target: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="TARGET", help="The robot: a bundle's name, MODULE:NAME, a Python file or a project folder."
+        ),
+    ] = None,
+    goal: Annotated[str | None, typer.Option(metavar="CONDITION", help="Plan for this goal.")] = None,
+    plot: Annotated[str | None, typer.Option(metavar="NAME", help="Run this plot.  [default: the robot's]")] = None,
+    with_: Annotated[
+        list[str] | None, typer.Option("--with", metavar="NAME=VALUE", help="A parameter of the plot; repeatable.")
+    ] = None,
+    scenario: Annotated[Path | None, typer.Option(help="The initial world of the simulation.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the faults; same seed, same run.")] = None,
+    faults: Annotated[float | None, typer.Option(min=0.0, max=1.0, help="Chance of a fault per skill call.")] = None,
+    profile: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", help="The robot and the values of its parameters (YAML).")
+    ] = None,
+    real_time: Annotated[bool, typer.Option("--real-time", help="Run in real time.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print the report as one JSON object.")] = False,
+    trace: Annotated[
+        Path | None, typer.Option(help="Write every record to this file (JSON lines); - is standard output.")
+    ] = None,
+    store: Annotated[Path | None, typer.Option(help="Keep the run in this new file: it can be resumed.")] = None,
+    durability: Annotated[
+        Durability, typer.Option(help="With a store, the events that the run survives.")
+    ] = Durability.process,
+    resume: Annotated[Path | None, typer.Option(help="Resume the interrupted run in this store.")] = None,
+    view: Annotated[bool, typer.Option("--view", help="Show it in the browser while it runs.")] = False,
+    port: Port = 0,
+    no_open: NoOpen = False,
+    allow_control: Annotated[
+        bool,
+        typer.Option("--allow-control", help="With --view: the page may pause the run, and post events and facts."),
+    ] = False,
+    no_wait: Annotated[bool, typer.Option("--no-wait", help="With --view: end with the run, not at Ctrl-C.")] = False,
+) -> None:
+    """Run a robot.
+
+    Exit status: 0 goal reached, 1 something is left (the report says what and why), 2 bad input.
+    """
+    from dsc.trace import BEGINS
+    from knowledge_base.errors import InputError
+    from knowledge_base.output_files import Output
+
+    settings = None if profile is None or not Path(profile).suffix else Path(profile)
+    output = None if trace is None else Output(trace, "--trace", scenario, settings, store, resume, over=BEGINS)
+    if resume is not None:
+        beginning = {
+            "--goal": goal, "--plot": plot, "--with": with_, "--scenario": scenario, "--seed": seed,
+            "--faults": faults, "--store": store, "--profile": profile,
+        }  # fmt: skip
+        given = [name for name, value in beginning.items() if value is not None] + ["--real-time"] * real_time
+        if given:
+            raise InputError(f"--resume continues a run as it began, without {', '.join(given)}")
+        deployed = _resumed(resume, target, durability)
+    else:
+        bundle = _bundle(target)
+        deployed = _deployed(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
+                             durability, target)  # fmt: skip
+    follow = partial(_followed, deployed, simulated=not real_time, quiet=json, trace=output)
+    with deployed:
+        if not view:
+            report = follow()
+            _print(report, as_json=json)
+        else:
+            report = _viewed(deployed, follow, port, opens=not no_open, control=allow_control, wait=not no_wait)
+    raise typer.Exit(GOAL_REACHED if report.goal_reached else SOMETHING_LEFT)
+
+
+def _bundle(target: str | None) -> Bundle:
+    from knowledge_base.errors import InputError
+    from planning.bundles import installed
+    from planning.targets import bundle_at
+
+    if target is None:
+        raise InputError("a run needs a robot, or a store to --resume", valid=installed())
+    return bundle_at(target)
+
+
+def _task(bundle: Bundle, goal: str | None, plot: str | None, given: list[str]) -> Task:
+    from knowledge_base.errors import InputError
+    from planning.deployment import Task, own_task, plot_task
+
+    arguments: dict[str, str] = {}
+    for one in given:
+        name, sign, text = one.partition("=")
+        if not (name and sign):
+            raise InputError(f"a parameter is written NAME=VALUE, not '{one}'", found=one)
+        arguments[name.removeprefix("?")] = text
+    if goal is not None and (plot is not None or given):
+        raise InputError("a run has a goal, or a plot with parameters: give --goal, or --plot and --with")
+    if goal is not None:
+        return Task(goal=goal)
+    if plot is None and not given:
+        return own_task(bundle)
+    if plot is None and bundle.main is None:
+        raise InputError("--with states parameters of a plot: name it with --plot")
+    return plot_task(bundle, plot or str(bundle.main), arguments)
+
+
+def _deployed(
+    bundle: Bundle,
+    task: Task,
+    scenario: Path | None,
+    seed: int | None,
+    faults: float | None,
+    profile: str | None,
+    store: Path | None,
+    durability: Durability,
+    target: str | None,
+) -> Deployment:
+    from dsc.text.profiles import find_profile
+    from planning.deployment import deploy
+    from planning.targets import full_target
+
+    settings = None if profile is None else find_profile(profile, bundle.profiles or Path())
+    return deploy(
+        bundle, task, seed=seed, faults=faults, scenario=scenario, profile=settings, store=store,
+        durability=durability.value, target=None if target is None else full_target(target),
+    )  # fmt: skip
+
+
+def _resumed(store: Path, target: str | None, durability: Durability) -> Deployment:
+    """Deploy the robot that began the run in a store; `target` replaces the target that the store has kept."""
+    from knowledge_base.errors import Place, StoreError
+    from planning.deployment import kept_run, resume
+    from planning.targets import bundle_at
+
+    run = kept_run(store)
+    wanted = target or run.header.get("target") or run.header.get("run")
+    if wanted is None:
+        whose = f"the run of '{run.plot}' in this store is another program's, which resumes it: Executive.resume()"
+        raise StoreError(whose, place=Place(str(store)))
+    return resume(bundle_at(str(wanted)), store, durability=durability.value)
+
+
+def _viewed(
+    deployed: Deployment, follow: partial[Report], port: int, *, opens: bool, control: bool, wait: bool
+) -> Report:
+    """Run with a page in the browser, and return the report; with `wait`, the page stays open after the run."""
+    from dsc.cli.runs import page, until_interrupt, viewer_installed
+    from dsc.trace import header
+
+    viewer_installed()
+    from dsc.viewer.access import PageAddress
+    from dsc.viewer.live import LivePage
+
+    live = LivePage(header(**deployed.header()), PageAddress.on(port), control=control)
+    deployed.executive.listen(live.hear)
+    with page(live, opens=opens) as viewer:
+        report = follow(prepare=live.control.attach if live.control else None)
+        live.end()
+        _print(report, as_json=bool(follow.keywords["quiet"]))
+        if wait:
+            until_interrupt(viewer)
+    return report
+
+
+def _followed(
+    deployed: Deployment,
+    *,
+    simulated: bool,
+    quiet: bool,
+    trace: Output | None,
+    prepare: Callable[[Sequencer], None] | None = None,
+) -> Report:
+    """Run and return the report; print the progress unless `quiet`, and write the trace."""
+    from contextlib import ExitStack
+
+    from rich.console import Console
+
+    from dsc.trace import header, write_to
+    from planning.progress import LiveProgress, PlainProgress
+
+    with ExitStack() as stack:
+        if trace is not None:
+            stream = stack.enter_context(trace.stream())
+            stream.write(header(**deployed.header()) + "\n")
+            deployed.executive.listen(write_to(stream))
+        console = Console()
+        if not quiet and console.is_terminal:
+            live = LiveProgress(console, deployed.left, deployed.tally)
+            deployed.executive.listen(stack.enter_context(live))
+        elif not quiet:
+            deployed.executive.listen(PlainProgress(typer.echo))
+        return deployed.run(simulated=simulated, prepare=prepare)
+
+
+def _print(report: Report, *, as_json: bool) -> None:
+    import json
+
+    if as_json:
+        typer.echo(json.dumps(report.to_json()))
+        return
+    typer.echo("")
+    for line in report.lines():
+        typer.echo(line)
+
+
+# -- targets in other commands -------------------------------------------------------------------------------
+
+
+def robot_knowledge(source: Path) -> KnowledgeBase | None:
+    """Return the initial knowledge of a robot, for `dsc kb`; `None` if the source is not a target.
+
+    A scenario (YAML) belongs to the only installed robot whose simulation reads scenarios. The text `TARGET@SCENARIO`
+    names both.
+    """
+    from planning.bundles import installed
+    from planning.deployment import deploy
+    from planning.targets import bundle_at
+
+    target, _, scenario = str(source).partition("@")
+    if source.suffix in {".yaml", ".yml"} and not scenario:
+        able = [one for one in installed().values() if one.simulation and one.simulation.reads_scenarios]
+        if len(able) != 1:
+            return None
+        return deploy(able[0], scenario=source).executive.knowledge
+    if source.is_file() and source.suffix != ".py":
+        return None
+    if not (scenario or source.is_dir() or source.suffix == ".py" or ":" in target or target in installed()):
+        return None
+    return deploy(bundle_at(target), scenario=Path(scenario) if scenario else None).executive.knowledge
+
+
+def components_of_target(target: str) -> tuple[Component, ...]:
+    """Return the components of a robot, or the components that a target names, for `dsc plot check --robot`."""
+    from dsc.components.robot import components_in
+    from planning.bundles import Bundle
+    from planning.deployment import components_for
+    from planning.targets import value_at
+
+    found = value_at(target)
+    return components_for(found) if isinstance(found, Bundle) else components_in(found)

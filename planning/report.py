@@ -1,0 +1,190 @@
+"""The report of a run of any robot: goal, remaining parts, plans, failures and recoveries."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from dsc.dynamic.library import Library
+from dsc.events import FAILURES, GAVE_UP, NO_PLAN
+from dsc.sequencer.sequencer import RunEnd
+from knowledge_base.language.syntax.expression import (
+    And,
+    Atom,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Variable,
+    substitute,
+)
+from knowledge_base.language.syntax.text import to_text
+from knowledge_base.store import KnowledgeBase
+from planning.progress import Tally
+from planning.simulation import Fault, Left
+
+Judge = Literal["world", "knowledge", "outcome"]
+"""The source of `goal_reached`: the true state of a simulated world, the knowledge base, or the outcome of the plot."""
+MOST_COUNTEREXAMPLES = 100
+"""Maximum number of objects that are listed for one violated `forall` of a goal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The result of a run.
+
+    Attributes:
+        robot: the name of the robot.
+        goal_reached: whether the goal is reached according to `judge`, and the run ended without a problem.
+        judge: see `Judge`.
+        left: the parts of the goal that are not reached.
+        outcome: the last outcome event of the plot; `None` if the plot emitted none.
+        attributes: the attributes of this event.
+        plans, replans: the number of plans found, and the number of plans that replaced another plan.
+        skill_failures: the number of each failure outcome of skills.
+        recoveries: the number of uses of each rule.
+        candidates_chosen: the number of choices of each plot by dynamic states.
+        excluded: the number of exclusions of each plan step after failures.
+        faults: the faults of the simulation, in order.
+        simulated_s, wall_s: the duration of the run in run time and in real time, in seconds.
+        problem: the reason why the run ended early; `None` otherwise.
+        own: the robot's own fields, under the name of the robot in JSON.
+        headline: the first line for people.
+    """
+
+    robot: str
+    goal_reached: bool
+    judge: Judge
+    left: tuple[Left, ...]
+    outcome: str | None
+    attributes: Mapping[str, Any]
+    plans: int
+    replans: int
+    skill_failures: Mapping[str, int]
+    recoveries: Mapping[str, int]
+    candidates_chosen: Mapping[str, int]
+    excluded: Mapping[str, int]
+    faults: tuple[Fault, ...]
+    simulated_s: float
+    wall_s: float
+    problem: str | None
+    own: Mapping[str, Any] = field(default_factory=dict)
+    headline: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the report as plain data."""
+        data = asdict(self)
+        del data["headline"]
+        own = data.pop("own")
+        return {**data, self.robot: own} if own else data
+
+    def lines(self) -> list[str]:
+        """Return the report as lines of text."""
+        lines = [
+            f"{self.headline}, {self.simulated_s:.0f} s of run time.",
+            *map(self._left_line, self.left),
+            f"  plans {self.plans}, replans {self.replans}",
+        ]
+        for title, counts in (
+            ("skill failures", self.skill_failures),
+            ("recovered by rule", self.recoveries),
+            ("candidates chosen", self.candidates_chosen),
+            ("excluded for a while", self.excluded),
+        ):
+            if counts:
+                lines.append(f"  {title}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
+        return lines
+
+    def _left_line(self, left: Left) -> str:
+        where = f" ({left.where})" if left.where else ""
+        reason = "" if left.reason in self.headline else f": {left.reason}"  # said in the first line already
+        return f"  left: {left.what}{where}{reason}"
+
+
+def summarise(
+    robot: str,
+    judge: Judge,
+    left: Collection[Left],
+    tally: Tally,
+    end: RunEnd,
+    failures: Collection[str],
+    wall_s: float,
+) -> Report:
+    """Return the report of a run that has ended, without the robot's own fields and faults.
+
+    Args:
+        robot: the name of the robot.
+        judge: see `Judge`.
+        left: the parts of the goal that are not reached; empty for `outcome`.
+        tally: the counts of the run.
+        end: the end of the run.
+        failures: the outcomes of skills that count as failures, see `failure_events`.
+        wall_s: the duration in real time, in seconds.
+    """
+    reached = end.problem is None and (end.reached if judge == "outcome" else not left)
+    said = "Goal reached" if reached else "Goal not reached"
+    return Report(
+        robot=robot,
+        goal_reached=reached,
+        judge=judge,
+        left=tuple(left),
+        outcome=end.emitted[-1].name if end.emitted else None,
+        attributes=dict(end.emitted[-1].attributes) if end.emitted else {},
+        plans=tally.plans,
+        replans=tally.replans,
+        skill_failures={name: n for name, n in sorted(tally.outcomes.items()) if name in failures},
+        recoveries=dict(sorted(tally.recoveries.items())),
+        candidates_chosen=dict(sorted(tally.candidates.items())),
+        excluded=dict(sorted(tally.excluded.items())),
+        faults=(),
+        simulated_s=round(tally.seconds, 3),
+        wall_s=round(wall_s, 3),
+        problem=end.problem,
+        headline=f"{said}{'' if reached else f': {reason_of_end(end, tally.gave_up)}'} (judge: {judge})",
+    )
+
+
+def failure_events(library: Library) -> frozenset[str]:
+    """Return the events that report failures.
+
+    These are the reserved failures, the outcomes of plots that implement planning actions, and the events of rules.
+    """
+    emitted = {event for plot in library if plot.implements for event in plot.emits}
+    answered = {rule.on for plot in library for rule in plot.rules if rule.on is not None}
+    return frozenset({*FAILURES, *emitted, *answered})
+
+
+def reason_of_end(end: RunEnd, gave_up: str = "") -> str:
+    """Return the reason why a run ended without its goal; `gave_up` is the reason of the last goal without a plan."""
+    if end.problem is not None:
+        return end.problem
+    for event in reversed(end.emitted):
+        if event.name in {NO_PLAN, GAVE_UP}:
+            return f"{event.name}: {event.attributes.get('reason', 'no reason')}"
+    if end.emitted:
+        return f"the plot ended with '{end.emitted[-1].name}'" + (f": {gave_up}" if gave_up else "")
+    return gave_up or "the run ended before"
+
+
+def unmet(goal: Expression, knowledge: KnowledgeBase) -> Iterator[str]:
+    """Yield each false part of a goal as text; for a `forall`, the part for each object that violates it."""
+    for part in goal.parts if isinstance(goal, And) else (goal,):
+        if knowledge.ask(part):
+            continue
+        if isinstance(part, And):
+            yield from unmet(part, knowledge)
+        elif isinstance(part, Forall):
+            yield from _counterexamples(part, knowledge)
+        else:
+            yield to_text(part)
+
+
+def _counterexamples(goal: Forall, knowledge: KnowledgeBase) -> Iterator[str]:
+    kinds = [
+        Or(tuple(Atom(kind, (Variable(one.name),)) for kind in one.types or ("object",))) for one in goal.variables
+    ]
+    wanted = goal.body.conclusion if isinstance(goal.body, Imply) else goal.body
+    for found in knowledge.query(And((*kinds, Not(goal.body))), limit=MOST_COUNTEREXAMPLES):
+        yield to_text(substitute(wanted, found))
