@@ -123,7 +123,8 @@ def summarise(
         failures: the outcomes of skills that count as failures, see `failure_events`.
         wall_s: the duration in real time, in seconds.
     """
-    reached = end.problem is None and (end.reached if judge == "outcome" else not left)
+    failed = bool(end.emitted) and end.emitted[-1].name in failures
+    reached = end.problem is None and (end.reached and not failed if judge == "outcome" else not left)
     said = "Goal reached" if reached else "Goal not reached"
     return Report(
         robot=robot,
