@@ -199,8 +199,12 @@ def _followed(
     trace: Output | None,
     prepare: Callable[[Sequencer], None] | None = None,
 ) -> Report:
-    """Run and return the report; print the progress unless `quiet`, and write the trace."""
-    from contextlib import ExitStack
+    """Run and return the report; print the progress unless `quiet`, and write the trace.
+
+    With `quiet`, texts that the robot prints go to standard error: standard output has only the report.
+    """
+    import sys
+    from contextlib import ExitStack, redirect_stdout
 
     from rich.console import Console
 
@@ -218,6 +222,8 @@ def _followed(
             deployed.executive.listen(stack.enter_context(live))
         elif not quiet:
             deployed.executive.listen(PlainProgress(typer.echo))
+        else:
+            stack.enter_context(redirect_stdout(sys.stderr))
         return deployed.run(simulated=simulated, prepare=prepare)
 
 
