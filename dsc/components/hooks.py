@@ -59,25 +59,30 @@ def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:
 
 
 def raised_at(error: BaseException) -> str:
-    """Return the innermost line of a user's code that raised the error, as ` (file:line)`; empty without a traceback.
+    """Return the innermost line of a user's code that raised the error, as ` (file:line)`; empty without a line.
 
     Code of this project, of the standard library and of installed packages counts only if no other code was involved.
+    A syntax error has the line that cannot be read.
     """
+    if isinstance(error, SyntaxError) and error.filename is not None:
+        return f" ({error.filename}:{error.lineno})"
     frames = []
     cause: BaseException | None = error
     while cause is not None:
         frames += [(frame.f_code.co_filename, line) for frame, line in walk_tb(cause.__traceback__)]
         cause = cause.__cause__
     users = [frame for frame in frames if not frame[0].startswith(_NOT_USERS)]
-    found = users or frames
+    found = users or [frame for frame in frames if not frame[0].startswith(_FROZEN)]
     return f" ({found[-1][0]}:{found[-1][1]})" if found else ""
 
 
 _ROOT = Path(__file__).parents[2]
+_FROZEN = "<frozen"
+"""The beginning of the file names of code inside the interpreter, e.g. of `import`."""
 _NOT_USERS = (
     *(str(_ROOT / package) + os.sep for package in ("knowledge_base", "dsc", "planning")),
     *{sysconfig.get_path(name) + os.sep for name in ("stdlib", "purelib", "platlib")},
-    "<frozen",
+    _FROZEN,
 )
 """Beginnings of the paths of code that no user of this project has written."""
 
