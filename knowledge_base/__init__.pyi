@@ -26,7 +26,7 @@ from knowledge_base.language.checking.vocabulary import Signature as Signature
 from knowledge_base.language.evaluation.explanation import Explanation as Explanation
 from knowledge_base.language.evaluation.query_plan import QueryPlan as QueryPlan
 from knowledge_base.language.evaluation.query_plan import QueryStep as QueryStep
-from knowledge_base.language.evaluation.world import Bounds as Bounds
+from knowledge_base.language.evaluation.world_protocol import Bounds as Bounds
 from knowledge_base.language.syntax.text import parse_condition as parse_condition
 from knowledge_base.language.syntax.text import parse_effect as parse_effect
 from knowledge_base.language.syntax.text import to_text as to_text

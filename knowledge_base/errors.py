@@ -215,8 +215,8 @@ class OutOfBoundsError(InputError):
     """
 
     def __init__(self, message: str, *, work: int, seconds: float) -> None:
-        done = f"given up after {work} facts and things in {seconds:.2f} s"
-        super().__init__(f"{message}; {done}: name more of them, or fewer variables, or allow more")
+        done = f"given up after {work} facts and objects in {seconds:.2f} s"
+        super().__init__(f"{message}; {done}: name more objects, use fewer variables, or raise the bound")
         self.work = work
         self.seconds = seconds
 

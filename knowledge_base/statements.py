@@ -14,7 +14,7 @@ from knowledge_base.facts import Delta, Fact
 from knowledge_base.language.checking.check import check, check_effect
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import apply_effect
-from knowledge_base.language.evaluation.world import BoundedWorld, Bounds, Meter, World
+from knowledge_base.language.evaluation.world_protocol import BoundedWorld, Bounds, Meter, World
 from knowledge_base.language.syntax.effect import Add, Effect, NumericEffect
 from knowledge_base.language.syntax.expression import Atom, Call, Comparison, Constant, Expression
 from knowledge_base.language.syntax.sexpr import Group, read

@@ -28,7 +28,7 @@ class Transaction:
             this attribute is that earlier change from the beginning, and the block has no effect.
     """
 
-    def __init__(self, view: Overlay, questions: Questions, first: Change | None = None) -> None:
+    def __init__(self, view: Overlay, questions: Questions, first: Change | None) -> None:
         self._view = view
         self._questions = questions
         self._closed = False

@@ -11,7 +11,7 @@ from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.evaluation.explanation import Explanation, explain
 from knowledge_base.language.evaluation.query_plan import QueryPlan, plan_query
-from knowledge_base.language.evaluation.world import BoundedWorld, Bounds, Meter
+from knowledge_base.language.evaluation.world_protocol import BoundedWorld, Bounds, Meter
 from knowledge_base.language.syntax.expression import TRUE, Expression
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.pddl.writer import problem_to_text

@@ -16,7 +16,7 @@ from knowledge_base.language.checking.inputs import require
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Signature
 from knowledge_base.language.evaluation.evaluator import apply_effect, holds
 from knowledge_base.language.evaluation.explanation import Explanation, explain
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.durative import Duration
 from knowledge_base.language.syntax.effect import Effect, substitute_effect
 from knowledge_base.language.syntax.expression import (

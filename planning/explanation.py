@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.evaluation.lookups import conjuncts
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import Add, AllOf, Effect, ForEach, When, effect_leaves
 from knowledge_base.language.syntax.expression import And, Expression, TypedVariable, substitute
 from knowledge_base.language.syntax.text import to_text

@@ -9,7 +9,7 @@ from typing import Any
 
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Fact
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 
 
 @dataclass(frozen=True, slots=True)

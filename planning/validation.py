@@ -11,7 +11,7 @@ from knowledge_base.facts import Delta
 from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.evaluation.terms import as_number
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.world.overlay import Overlay
 from planning.plan import Plan

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from domains.clean_up_table.observations import Result
-    from knowledge_base.language.evaluation.world import World as Belief
+    from knowledge_base.language.evaluation.world_protocol import World as Belief
     from planning.plan import Plan, PlanStep
 
 _VERBS: dict[str, Callable[[TableWorld, str, tuple[str, ...]], Result]] = {

@@ -17,7 +17,7 @@ from dsc.model.states import DynamicState
 from knowledge_base.facts import Content, Delta
 from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds
 from knowledge_base.language.evaluation.explanation import explain
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import Effect
 from knowledge_base.language.syntax.expression import Constant, Expression, Term, substitute
 from knowledge_base.language.syntax.text import to_text

@@ -22,7 +22,7 @@ from dsc.trace import Trace
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
 from knowledge_base.facts import Delta
 from knowledge_base.language.checking.inputs import require, require_delta, require_text, shown
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.store import KnowledgeBase
 
 Declared = Mapping[str, str | None]

@@ -12,7 +12,7 @@ from dsc.sequencer.clock import LoopClock
 from dsc.viewer.queries import require_short
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.checking.check import check
-from knowledge_base.language.evaluation.world import Bounds
+from knowledge_base.language.evaluation.world_protocol import Bounds
 from knowledge_base.language.syntax.text import parse_condition
 
 if TYPE_CHECKING:

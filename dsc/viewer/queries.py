@@ -21,7 +21,7 @@ from knowledge_base.errors import InputError, OutOfBoundsError, UnknownNameError
 from knowledge_base.exchange import delta_of, schema_of, world_of
 from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation.explanation import Explanation
-from knowledge_base.language.evaluation.world import Bounds
+from knowledge_base.language.evaluation.world_protocol import Bounds
 from knowledge_base.language.syntax.expression import Expression, variables_in_order
 from knowledge_base.language.syntax.text import parse_condition, to_text
 from knowledge_base.view import View

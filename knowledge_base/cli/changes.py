@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from knowledge_base.facts import Delta
-    from knowledge_base.language.evaluation.world import World
+    from knowledge_base.language.evaluation.world_protocol import World
     from knowledge_base.output_files import Output
 
 

@@ -92,7 +92,7 @@ def ask(
     json: Json = False,
 ) -> None:
     """Answer whether EXPR is true. Exit status: 0 yes, 1 no."""
-    from knowledge_base.language.evaluation.world import Bounds
+    from knowledge_base.language.evaluation.world_protocol import Bounds
 
     with opened(source, domain) as (kb, _):
         explanation = kb.explain(_parsed(expression), _params(param), bounds=Bounds(seconds=seconds))
@@ -200,7 +200,7 @@ def _answer(
     as_json: bool,
 ) -> None:
     """Print each answer when it is found; the answers are never all in memory."""
-    from knowledge_base.language.evaluation.world import Bounds
+    from knowledge_base.language.evaluation.world_protocol import Bounds
     from knowledge_base.language.syntax.expression import variables_in_order
 
     condition = _parsed(expression)

@@ -96,9 +96,9 @@ def _placed(card: Card, at: Sequence[float], scale: float) -> Placed:
     return Placed(card, at[0] * scale, at[1] * scale, width, lines * LINE + 2 * PADDING - 4)
 
 
-def _push_apart(placed: list[Placed], rounds: int = 300) -> None:
+def _push_apart(placed: list[Placed]) -> None:
     """Move cards that are too close to each other along the axis with the smaller overlap, until no cards are."""
-    for _ in range(rounds):
+    for _ in range(300):  # a bound for cards that push each other back and forth
         moved = False
         for i, one in enumerate(placed):
             for other in placed[i + 1 :]:

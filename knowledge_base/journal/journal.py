@@ -83,7 +83,7 @@ class Journal(Archive):
         durability: Durability,
         clock: Callable[[], float],
         *,
-        new: bool = False,
+        new: bool,
     ) -> None:
         self._path = path
         if not is_there(path) and schema is None:

@@ -142,7 +142,7 @@ def _misspelt(name: str, valid: Collection[str]) -> bool:
     return any(not other.startswith(name) and not name.startswith(other) for other in close)
 
 
-def parse_declaration(text: str, source: str | None = None) -> DeclarationText:
+def parse_declaration(text: str, source: str | None) -> DeclarationText:
     """Read one declaration from its text, e.g. `(near ?a ?b - thing)`.
 
     Raises:

@@ -15,7 +15,7 @@ from knowledge_base.facts import Content, Fact
 from knowledge_base.language.checking.vocabulary import Signature, Vocabulary
 from knowledge_base.language.syntax.durative import Duration
 from knowledge_base.language.syntax.effect import AllOf, Effect
-from knowledge_base.language.syntax.expression import KEYWORDS, TRUE, And, Constant, Expression, TypedVariable
+from knowledge_base.language.syntax.expression import KEYWORDS, And, Constant, Expression, TypedVariable
 from knowledge_base.language.syntax.sexpr import TypedName
 from knowledge_base.language.syntax.text import LONGEST_NUMBER, to_text, types_text
 from knowledge_base.pddl.action_text import ACTION, DURATIVE_ACTION, ActionText
@@ -87,9 +87,7 @@ def axiom_to_text(axiom: AxiomText) -> str:
     return _section(f":derived {_declaration(axiom.head)}", [to_text(axiom.condition)])
 
 
-def problem_to_text(
-    state: WrittenWorld, name: str, domain: str, goal: Expression = TRUE, metric: Metric | None = None
-) -> str:
+def problem_to_text(state: WrittenWorld, name: str, domain: str, goal: Expression, metric: Metric | None) -> str:
     """Return the world as the initial state of a problem.
 
     Args:

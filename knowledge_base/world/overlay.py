@@ -9,7 +9,7 @@ from knowledge_base.errors import MAX_NAME, InputError, SchemaError, UnknownName
 from knowledge_base.facts import Content, Delta, Fact, Value, require_content, require_finite, require_writable
 from knowledge_base.language.checking.check import check_arity, value_fits
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature, Vocabulary
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import TypedVariable
 from knowledge_base.spelling import A_NAME_IS, is_name, nearest_name
 from knowledge_base.world.state import FactIndex

@@ -61,7 +61,7 @@ class FairLock:
 
     __exit__: Exit
 
-    def __init__(self, patience_s: float = PATIENCE_S) -> None:
+    def __init__(self, patience_s: float) -> None:
         lock = RLock()
         self.held: Callable[[], bool] = lock._is_owned  # type: ignore[attr-defined]  # noqa: SLF001
         self.release = lock.release

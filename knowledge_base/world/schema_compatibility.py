@@ -42,7 +42,7 @@ def _declared(schema: Schema) -> set[str]:
     return {*schema.types, *schema.constants, *schema.predicates, *schema.functions} - {ROOT_TYPE}
 
 
-def require_functional(state: WorldState, place: Place | None = None) -> None:
+def require_functional(state: WorldState, place: Place | None) -> None:
     """Raise an error if two facts exclude each other under a predicate that the extended schema declares functional.
 
     Raises:
@@ -54,7 +54,7 @@ def require_functional(state: WorldState, place: Place | None = None) -> None:
         raise SchemaMismatchError([error.message], place=place) from None
 
 
-def missing_constants(state: WorldState, place: Place | None = None) -> Delta:
+def missing_constants(state: WorldState, place: Place | None) -> Delta:
     """Return the change that adds the constants of the extended schema.
 
     Raises:
@@ -62,7 +62,7 @@ def missing_constants(state: WorldState, place: Place | None = None) -> Delta:
     """
     known, constants = state.nodes, state.schema.constants
     wrong = [
-        f"the constant '{name}' is a thing of type '{known[name]}' there, not '{type_name}'"
+        f"the constant '{name}' is an object of type '{known[name]}' there, not '{type_name}'"
         for name, type_name in constants.items()
         if known.get(name, type_name) != type_name
     ]

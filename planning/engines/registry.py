@@ -10,7 +10,7 @@ import platform
 import re
 import shutil
 import subprocess
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, requires, version
@@ -134,10 +134,10 @@ def engine(name: str) -> Engine:
     raise UnknownNameError(f"there is no engine '{name}'", found=name, valid=[one.name for one in ENGINES])
 
 
-def able(features: Collection[str], engines: Iterable[Engine] = ENGINES) -> list[Engine]:
+def able(features: Collection[str]) -> list[Engine]:
     """Return the engines that support these features; engines that also support the wishes come first."""
     wishes = WISHES.intersection(features)
-    suited = [one for one in engines if one.can_do(features)]
+    suited = [one for one in ENGINES if one.can_do(features)]
     return sorted(suited, key=lambda one: not wishes <= one.features)  # stable: otherwise in the order of preference
 
 

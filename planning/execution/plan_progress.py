@@ -14,7 +14,7 @@ from typing import Any
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation.evaluator import holds
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import And, Atom, Constant, Expression
 from knowledge_base.world.overlay import Overlay
 from planning.cancellable_work import WorkLimit

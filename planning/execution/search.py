@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Collection, Iterable
 
     from dsc.sequencer.clock import LoopClock
-    from knowledge_base.language.evaluation.world import World
+    from knowledge_base.language.evaluation.world_protocol import World
     from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from knowledge_base.world.state import WorldState

@@ -48,7 +48,7 @@ class Usage:
     anything: bool = False
     seconds: float = 0.0
 
-    def clashes(self, other: Usage, shared: Iterable[str] = ()) -> bool:
+    def clashes(self, other: Usage, shared: Iterable[str]) -> bool:
         """Return whether both usages may need one component at one time; components in `shared` do not count."""
         return self.anything or other.anything or bool((self.components & other.components).difference(shared))
 
@@ -159,7 +159,7 @@ class Carrier:
         rules: the contingency rules, which may use further plots and components.
     """
 
-    def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule] = ()) -> None:
+    def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule]) -> None:
         self._domain = domain
         self._library = library
         self.rules = tuple(rules)

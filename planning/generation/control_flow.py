@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 from dsc.dynamic.responses import skipped
@@ -69,8 +68,8 @@ class Writer:
         order: PartialOrder,
         lanes: Sequence[ControlFlow],
         plan: str | None,
-        left_out: Collection[int] = (),
-        leading: Mapping[str, Iterable[str]] = MappingProxyType({}),
+        left_out: Collection[int],
+        leading: Mapping[str, Iterable[str]],
     ) -> None:
         self._steps = dict(enumerate(steps, start=1))
         self._left_out = left_out

@@ -54,9 +54,9 @@ def laid_out(
     plan: Plan,
     domain: PlanningDomain,
     library: Library | None,
-    rules: Sequence[Rule] = (),
-    order: PartialOrder | None = None,
-    shared: Collection[str] = (),
+    rules: Sequence[Rule],
+    order: PartialOrder | None,
+    shared: Collection[str],
 ) -> Layout:
     """Return the layout of a plan; for the arguments see `plot_from_plan`."""
     if order is None:

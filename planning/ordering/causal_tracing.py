@@ -26,7 +26,7 @@ from knowledge_base.facts import Delta, Fact
 from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.evaluator import apply_effect, holds
 from knowledge_base.language.evaluation.lookups import conjuncts
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, effect_parts, substitute_effect
 from knowledge_base.language.syntax.expression import Atom, Constant, Expression, Not, Variable
 from knowledge_base.language.syntax.identity_cache import IdentityCache

@@ -13,7 +13,7 @@ from itertools import chain
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.language.evaluation.evaluator import apply_effect, choices, evaluate_argument, holds
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax import effect as eff
 from knowledge_base.language.syntax import expression as ex
 from knowledge_base.language.syntax.effect import Effect

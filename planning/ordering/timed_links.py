@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation.evaluator import apply_effect, holds
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import AllOf, Effect, substitute_effect
 from knowledge_base.language.syntax.expression import And, Expression, substitute
 from knowledge_base.language.syntax.text import to_text

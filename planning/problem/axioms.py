@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, effect_conditions, effect_leaves
 from knowledge_base.language.syntax.expression import Atom, Exists, Expression, Or, TypedVariable, Variable
 from knowledge_base.pddl.problem_text import Metric

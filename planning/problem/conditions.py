@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.evaluation.evaluator import evaluate_argument, evaluate_term, holds
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax import expression as ex
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
 from knowledge_base.language.syntax.expression import Atom, Expression, Term

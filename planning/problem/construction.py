@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from knowledge_base.facts import Fact
 from knowledge_base.language.checking.check import check
 from knowledge_base.language.evaluation.evaluator import holds
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import Expression, Term
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import to_text

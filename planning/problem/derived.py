@@ -15,7 +15,7 @@ import networkx as nx
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, Fact, Value
 from knowledge_base.language.evaluation.evaluator import query
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import (
     And,
     Atom,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Vocabulary
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import ForEach, effect_conditions, effect_parts
 from knowledge_base.language.syntax.expression import (
     Arithmetic,

@@ -9,7 +9,7 @@ from itertools import filterfalse
 from typing import Any, NamedTuple, TypeVar
 
 from knowledge_base.facts import Fact, Value
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from planning.plan import PlanStep
 from planning.problem.conditions import Leaf, Literal, is_so
 from planning.quantities import Assignment, NumericBound, fluents, worth

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.evaluation.evaluator import evaluate_term
 from knowledge_base.language.evaluation.terms import as_number
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import AllOf
 from knowledge_base.language.syntax.expression import And, Expression
 from planning.cancellable_work import WorkLimit

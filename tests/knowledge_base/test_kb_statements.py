@@ -36,7 +36,7 @@ def test_an_effect_for_all_things_counts_those_just_told(kb) -> None:
 
 def test_an_effect_with_endless_instances_is_refused(kb) -> None:
     endless = "(forall (?a) " * 60 + "(increase (breaks) 1)" + ")" * 60
-    with pytest.raises(OutOfBoundsError, match="looks at more than 10000 facts and things: FACT"):
+    with pytest.raises(OutOfBoundsError, match="visits more than 10000 facts and objects: FACT"):
         told(["(clean mug)", endless], kb, "FACT", Bounds(work=10_000))
 
 

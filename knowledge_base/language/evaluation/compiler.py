@@ -46,7 +46,7 @@ from knowledge_base.language.evaluation.terms import (
     compile_comparison,
     compile_term,
 )
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import (
     And,
     Atom,

@@ -18,7 +18,7 @@ from knowledge_base.language.checking.check import check_arity
 from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.compiler import Answers, compile_answers, compile_query, compile_test
 from knowledge_base.language.evaluation.terms import Bindings, Getter, Test, as_number, compile_term
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import (
     Add,
     AllOf,

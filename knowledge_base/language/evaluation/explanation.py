@@ -15,7 +15,7 @@ from knowledge_base.language.checking.vocabulary import Read
 from knowledge_base.language.evaluation.compiler import counterexamples, witnesses
 from knowledge_base.language.evaluation.evaluator import NO_BINDINGS, asked, choices, evaluate_term, holds
 from knowledge_base.language.evaluation.terms import Bindings
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import check_depth
 from knowledge_base.language.syntax.expression import (
     And,

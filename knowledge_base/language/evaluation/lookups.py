@@ -18,7 +18,7 @@ from knowledge_base.facts import Value
 from knowledge_base.language.checking.binding import found_variables
 from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.terms import Argument, Bindings, compile_argument
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import (
     And,
     Atom,

@@ -20,7 +20,7 @@ from knowledge_base.language.evaluation.lookups import (
     smallest,
 )
 from knowledge_base.language.evaluation.terms import Bindings
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import check_depth
 from knowledge_base.language.syntax.expression import (
     Atom,

@@ -12,7 +12,7 @@ from knowledge_base.errors import InputError, Place, SchemaError
 from knowledge_base.facts import GEOMETRY, Content, Value
 from knowledge_base.language.checking.check import check_arity
 from knowledge_base.language.checking.vocabulary import Vocabulary
-from knowledge_base.language.evaluation.world import World
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import Arithmetic, Call, Comparison, Constant, Term, Variable
 
 Bindings = Mapping[str, Value]

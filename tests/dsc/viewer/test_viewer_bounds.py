@@ -140,7 +140,7 @@ def step():
 
 def test_a_condition_that_costs_too_much_is_no_breakpoint(step) -> None:
     def act(control, after_step) -> None:
-        with pytest.raises(InputError, match=f"looks at more than {MOST_WORK} facts and things"):
+        with pytest.raises(InputError, match=f"visits more than {MOST_WORK} facts and objects"):
             control.obey({"do": "break", "on": {"condition": NEST}})
         assert control.obey({"do": "breaks"}) == {"ok": True, "breaks": []}
         after_step(step)
@@ -161,7 +161,7 @@ def test_a_condition_that_comes_to_cost_too_much_is_dropped_and_the_run_goes_on(
         said = control.obey({"do": "breaks"})
         assert [one["on"] for one in said["breaks"]] == ["condition (clean o1)"]
         (dropped,) = said["dropped"]
-        assert f"condition {NEST}: the question looks at more than {MOST_WORK}" in dropped
+        assert f"condition {NEST}: the query visits more than {MOST_WORK}" in dropped
         control.obey({"do": "tell", "statements": ["(clean o1)"]})
         after_step(step)
         assert control.paused == "condition (clean o1)"
@@ -177,7 +177,7 @@ def test_an_effect_of_a_browser_that_costs_too_much_changes_nothing(said) -> Non
     kb = known(100)
 
     def act(control, _) -> None:
-        with pytest.raises(InputError, match=r"looks at more than|a browser may send"):
+        with pytest.raises(InputError, match=r"visits more than|a browser may send"):
             control.obey({"do": "tell", "statements": said})
 
     controlled(kb, act)

@@ -117,7 +117,7 @@ def test_a_question_is_given_up_after_some_seconds(problem) -> None:
         text = text.replace("(cup ?k)", "(cup ?k) (not (= ?k ?k))")
         result = CliRunner().invoke(app, [command, problem, text, "--seconds", "0"])
         assert isinstance(result.exception, InputError)
-        assert "the question takes longer than 0 s" in str(result.exception)
+        assert "the query takes longer than 0 s" in str(result.exception)
 
 
 @pytest.mark.parametrize("items", [[], [1], [{"a": "x\ny", "b": [1, {"c": None}]}, [], "z"]])

@@ -7,7 +7,7 @@ from itertools import count, islice, pairwise
 import pytest
 
 from knowledge_base import Bounds, ConflictError, Delta, Fact, InputError, KnowledgeBase, OutOfBoundsError, Schema
-from knowledge_base.language.evaluation.world import LOOK_EVERY
+from knowledge_base.language.evaluation.world_protocol import CHECK_EVERY
 from knowledge_base.statements import told
 
 ITEMS = 100
@@ -47,11 +47,11 @@ def ways(kb, text):
 @pytest.mark.parametrize("text", ENDLESS)
 def test_a_question_is_given_up_where_its_work_ends(kb, text):
     for ask in ways(kb, text):
-        with pytest.raises(OutOfBoundsError, match="the question looks at more than 2000 facts and things") as raised:
+        with pytest.raises(OutOfBoundsError, match="the query visits more than 2000 facts and objects") as raised:
             ask(Bounds(work=2000))
         assert 2000 < raised.value.work <= 2000 + ITEMS + 1
         assert text[:40] in str(raised.value)
-        assert "allow more" in str(raised.value)
+        assert "raise the bound" in str(raised.value)
 
 
 @pytest.mark.parametrize("text", ENDLESS)
@@ -66,9 +66,9 @@ def test_a_question_is_given_up_when_its_time_is_over(kb, text):
 def test_a_question_ends_when_it_is_cancelled(kb, text):
     for ask in ways(kb, text):
         looks = (number == 3 for number in count())
-        with pytest.raises(OutOfBoundsError, match="the question was cancelled") as raised:
+        with pytest.raises(OutOfBoundsError, match="the query was cancelled") as raised:
             ask(Bounds(cancelled=looks.__next__))
-        assert raised.value.work <= 4 * (LOOK_EVERY + ITEMS + 1)
+        assert raised.value.work <= 4 * (CHECK_EVERY + ITEMS + 1)
 
 
 def test_a_list_that_is_looked_through_for_few_facts_counts():
@@ -146,7 +146,7 @@ def test_a_mistake_is_said_before_the_first_answer(kb):
     "(assign (weight o1) (+ " + "(weight o1) " * 2500 + "))",
 ])  # fmt: skip
 def test_an_effect_is_given_up_where_its_work_ends(kb, said):
-    with pytest.raises(OutOfBoundsError, match="looks at more than 2000 facts and things: FACT"):
+    with pytest.raises(OutOfBoundsError, match="visits more than 2000 facts and objects: FACT"):
         told([said], kb, "FACT", Bounds(work=2000))
 
 

@@ -52,7 +52,7 @@ class World(Protocol):
         """Return the type of the object; `None` if the object is unknown."""
 
 
-LOOK_EVERY = 500
+CHECK_EVERY = 500
 """Number of facts and objects between two checks of the clock and of `cancelled`: about a millisecond."""
 _LONGEST_SHOWN = 120
 _T = TypeVar("_T")
@@ -75,8 +75,8 @@ class Bounds:
     now: Callable[[], float] = time.monotonic
 
 
-class _Given(Exception):  # noqa: N818  not an `InputError`: the evaluator must not handle it
-    """The query ends without an answer, for this reason."""
+class _BoundReachedError(Exception):  # not an `InputError`: the evaluator must not handle it
+    """A query has reached this bound."""
 
 
 class Meter:
@@ -93,20 +93,20 @@ class Meter:
         self._bounds = bounds = bounds or Bounds()
         self._began = bounds.now()
         self.work = 0
-        self._look_at = 0
+        self._next_check = 0
 
     def spend(self, work: int = 1) -> None:
         """Add to the work."""
         self.work += work
-        if self.work >= self._look_at:
-            self._look()
+        if self.work >= self._next_check:
+            self._check()
 
     def each(self, found: Iterable[_T]) -> Iterator[_T]:
-        """Yield the items of `found`, and count each of them as work."""
+        """Yield the items of `found`, and count each item as work."""
         for one in found:
             self.work += 1
-            if self.work >= self._look_at:
-                self._look()
+            if self.work >= self._next_check:
+                self._check()
             yield one
 
     @contextmanager
@@ -117,22 +117,22 @@ class Meter:
         """
         try:
             yield
-        except _Given as given:
+        except _BoundReachedError as reached:
             seconds = self._bounds.now() - self._began
             said = shortened(question if isinstance(question, str) else to_text(question), _LONGEST_SHOWN)
-            raise OutOfBoundsError(f"{given}: {said}", work=self.work, seconds=seconds) from None
+            raise OutOfBoundsError(f"{reached}: {said}", work=self.work, seconds=seconds) from None
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         bounds, seconds = self._bounds, self._bounds.now() - self._began
         if bounds.cancelled is not None and bounds.cancelled():
-            raise _Given("the question was cancelled")
+            raise _BoundReachedError("the query was cancelled")
         if bounds.work is not None and self.work > bounds.work:
-            raise _Given(f"the question looks at more than {bounds.work} facts and things")
+            raise _BoundReachedError(f"the query visits more than {bounds.work} facts and objects")
         if bounds.seconds is not None and seconds > bounds.seconds:
-            raise _Given(f"the question takes longer than {bounds.seconds:g} s")
-        self._look_at = self.work + LOOK_EVERY
+            raise _BoundReachedError(f"the query takes longer than {bounds.seconds:g} s")
+        self._next_check = self.work + CHECK_EVERY
         if bounds.work is not None:
-            self._look_at = min(self._look_at, bounds.work + 1)
+            self._next_check = min(self._next_check, bounds.work + 1)
 
 
 class BoundedWorld:
