@@ -94,7 +94,7 @@ BAD = {
     "nodes": (world(nodes=["cup1"]), "'nodes' is an object"),
     "type": (world(nodes={"home": "place", "cup1": "cupp"}), "there is no type 'cupp'; did you mean 'cup'?"),
     "type is a number": (world(nodes={"cup1": 3}), "there is no type '3'"),
-    "constant": (world(nodes={"home": "cup"}, facts=[], values=[]), "the constant 'home' is a thing of type 'cup' there, not 'place'"),
+    "constant": (world(nodes={"home": "cup"}, facts=[], values=[]), "the constant 'home' is an object of type 'cup' there, not 'place'"),
     "facts": (world(facts={}), "'facts' is a list"),
     "fact": (world(facts=[["quiet"], 7]), 'facts[1] is of the form ["NAME", ARGUMENT...], not 7'),
     "fact without name": (world(facts=[[]]), "facts[0] is of the form"),

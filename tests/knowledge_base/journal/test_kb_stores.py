@@ -61,7 +61,7 @@ def test_a_store_knows_its_own_schema(path):
         ({"predicates": "(clean ?i - item) (on ?i - item)"}, "the predicate 'on' was declared 'on item place', now it is 'on item'"),
         ({"functions": ""}, "the function 'weight' is missing"),
         ({"functions": "(weight ?i - cup)"}, "the function 'weight' was declared 'weight item', now it is 'weight cup'"),
-        ({"constants": "home - place cup1 - place"}, "the constant 'cup1' is a thing of type 'cup' there, not 'place'"),
+        ({"constants": "home - place cup1 - place"}, "the constant 'cup1' is an object of type 'cup' there, not 'place'"),
     ],
 )  # fmt: skip
 def test_another_schema_is_refused_with_what_differs(path, given, difference):
