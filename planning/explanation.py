@@ -26,6 +26,8 @@ from planning.quantities import Assignment, NumericBound, helps, worth
 from planning.strips import Problem
 
 _LONGEST_CHAIN = 6
+_TOGETHER = "each goal fact can be reached by itself, but not all of them together"
+_NUMBERS = "no goal fact is unreachable if numbers change without bound, but no plan reaches the goal"
 
 
 def why_unsolvable(
@@ -48,18 +50,23 @@ def why_unsolvable(
     known = dict.fromkeys([*_present(rules, world), *sorted(reach.facts, key=str)])
     causes = _Causes(domain, rules, grounder, reach, frozenset(known), ReachedFacts(known))
     return tuple(dict.fromkeys(causes.of(grounded.wanted))) or _not_together(
-        domain, world, goal, patience or WorkLimit()
+        domain, world, goal, patience or WorkLimit(), numeric=bool(grounded.task.numbering.bounds)
     )
 
 
-def _not_together(domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit) -> tuple[str, ...]:
-    """Return the mutexes among the goal facts, or a sentence if more than two facts exclude each other."""
+def _not_together(
+    domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit, *, numeric: bool
+) -> tuple[str, ...]:
+    """Return the mutexes among the goal facts, or a sentence if no two facts exclude each other.
+
+    Relaxed reachability ignores how far a number can change, so a `numeric` problem proves no reachable goal fact.
+    """
     patience.doing = "looking for goal facts that exclude each other"
     problem = ProblemBuilder(domain).build_problem(world, goal, patience=patience)
     pairs = [] if problem.one_at_a_time else list(goal_mutexes(problem.whole or problem, patience))
     told = [(one, other) for one, other in pairs if _declared(one) and _declared(other)]
     said = [f"{_as_written(one)} and {_as_written(other)} can never hold together" for one, other in told]
-    return tuple(said) or ("each goal fact can be reached by itself, but not all of them together",)
+    return tuple(said) or (_NUMBERS if numeric else _TOGETHER,)
 
 
 def _declared(fact: Fact) -> bool:

@@ -131,3 +131,18 @@ def test_who_only_uses_up_a_number_does_not_make_enough_of_it(world_of, fuel, go
     world, wanted = world_of(domain.schema, {}, (), {fact("fuel"): fuel}), parse_condition(goal)
     assert build_problem(domain, world, wanted).unreachable == (goal,)
     assert why_unsolvable(domain, world, wanted) == (why,)
+
+
+TANK = """(define (domain tank) (:types tank) (:predicates (full ?t - tank)) (:functions (level ?t - tank) (fuel))
+  (:action pour :parameters (?t - tank) :precondition (>= (fuel) 1)
+    :effect (and (increase (level ?t) 1) (decrease (fuel) 1)))
+  (:action close :parameters (?t - tank) :precondition (>= (level ?t) 3) :effect (full ?t)))"""
+
+
+@pytest.mark.parametrize("goal", ["(>= (level a) 3)", "(full a)", "(and (>= (level a) 1) (>= (level b) 2))"])
+def test_a_numeric_problem_does_not_claim_that_each_goal_fact_can_be_reached(world_of, goal):
+    domain = PlanningDomain.parse(TANK)
+    values = {fact("level", "a"): 0, fact("level", "b"): 0, fact("fuel"): 2}
+    world = world_of(domain.schema, dict.fromkeys("ab", "tank"), values=values)
+    why = why_unsolvable(domain, world, parse_condition(goal))
+    assert why == ("no goal fact is unreachable if numbers change without bound, but no plan reaches the goal",)
