@@ -100,6 +100,8 @@ def wrong_report(report: Report, world: TableWorld, *, stopped: bool, plain: boo
         stopped: whether an operator has ended the run.
         plain: whether only permanent faults may have kept the robot from its goal.
     """
+    if report.programming_error is not None:
+        yield f"programming error in {report.programming_error}"
     if report.goal_reached and not world.goal_reached:
         yield "the report says that the goal is reached"
     left = {one.what for one in report.left}

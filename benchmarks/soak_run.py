@@ -37,7 +37,7 @@ from dsc.sequencer.sequencer import Sequencer
 from dsc.testing.crashes import Crashes
 from dsc.testing.faults import USUAL, Fault, Faults, Interleaving
 from dsc.testing.invariants import executed_once, kept_run
-from knowledge_base.errors import DamagedStoreError
+from knowledge_base.errors import DamagedStoreError, InputError
 from planning import Deployment, PlannerProcess, resume
 from planning.engines.race import CachingPlanner
 from planning.report import Report
@@ -138,22 +138,23 @@ class Trial:
         self._crashes: Crashes[Report | None] = Crashes(folder, seed, chance=CRASHES)
         self._stop = ObeyedStop()
         self._turned = 0
+        self._hung: str | None = None
 
     def run(self) -> Outcome:
         outcome = self.outcome
         try:
             with no_longer_than(A_HANG):
                 report = self._crashes.survive(self._live)
-                self._judge(report)
+                if self._hung is None:
+                    self._judge(report)
+                else:
+                    outcome.wrong.append((HANGS, self._hung))
         except HangError as error:
             outcome.wrong.append((HANGS, str(error)))
         except DamagedStoreError as error:  # without injected damage, two programs have written two histories
             outcome.wrong.append((HISTORY, str(error)))
         except Exception as error:  # noqa: BLE001  any error makes the seed notable
-            if isinstance(error.__cause__, HangError):  # raised by an observer, whose errors are contained
-                outcome.wrong.append((HANGS, str(error.__cause__)))
-            else:
-                outcome.wrong.append((NO_REPORT, f"{type(error).__name__}: {error}"))
+            outcome.wrong.append((NO_REPORT, f"{type(error).__name__}: {error}"))
         outcome.wrong += [(TWICE, problem) for problem in self._crashes.problems]
         outcome.wrong += [(AFTER_STOP, problem) for problem in self._stop.problems]
         outcome.lives = self._crashes.life + 1
@@ -186,7 +187,8 @@ class Trial:
             nonlocal steps
             steps += 1
             if steps > MOST_STEPS:
-                raise HangError(f"more than {MOST_STEPS} macrosteps")
+                self._hung = f"more than {MOST_STEPS} macrosteps"
+                raise InputError(self._hung)
 
         sequencer.listen(count)
         if self._interleaved:

@@ -23,7 +23,9 @@ from dsc.dynamic.library import Library as Library
 from dsc.engine.machine import Machine as Machine
 from dsc.errors import ChangedError as ChangedError
 from dsc.errors import PlotError as PlotError
+from dsc.errors import ProgrammingError as ProgrammingError
 from dsc.errors import RunawayError as RunawayError
+from dsc.errors import SkillError as SkillError
 from dsc.errors import UncertainActionError as UncertainActionError
 from dsc.events import Event as Event
 from dsc.model.plot import ActionPlot as ActionPlot

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
+import logging
 import math
 import multiprocessing
 import os
@@ -25,8 +26,12 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from dsc.calls import OBSERVED, Outcome, SkillCall
+from dsc.errors import ProgrammingError, SkillError
 from knowledge_base.errors import described
 from knowledge_base.facts import Delta
+from knowledge_base.tracebacks import raised_at, whole_traceback
+
+_LOG = logging.getLogger("dsc.skills")
 
 STOPPING = 2.0
 """Real seconds between the stop request and the end of a body, at most."""
@@ -94,7 +99,8 @@ async def in_process(body: Callable[..., Outcome], name: str, call: SkillCall, a
 
     Raises:
         DeadlineError: the deadline has passed.
-        RuntimeError: the body raised an error, or its process ended without an outcome.
+        SkillError: the process ended without an outcome, or the body raised a declared exception.
+        ProgrammingError: the body raised another exception.
     """
     blocking = _blocking(call)
     work = partial(_in_child, body, name, blocking, arguments)
@@ -171,7 +177,9 @@ def _carried_over(error: BaseException) -> Exception:
     with suppress(BaseException):  # an exception may fail while its class is inspected
         if isinstance(error, Exception) and not isinstance(error, StopIteration | type):
             return error
-    return RuntimeError(described(error))
+    carried = RuntimeError(described(error))
+    carried.__cause__ = error
+    return carried
 
 
 async def _until_stopped(ended: asyncio.Future[Outcome], stop: Callable[[], None]) -> Outcome:
@@ -202,7 +210,7 @@ def _hold(call: SkillCall) -> AbstractContextManager[None]:
 def _in_child(body: Callable[..., Outcome], name: str, blocking: BlockingCall, arguments: Mapping[str, Any]) -> Outcome:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    given = (theirs, body, blocking.action_id, blocking.seconds, dict(arguments))
+    given = (theirs, body, name, blocking.action_id, blocking.seconds, dict(arguments))
     process = context.Process(target=_child, args=given, name=f"skill of {name}", daemon=True)
     process.start()
     theirs.close()
@@ -222,11 +230,15 @@ def _heard(ours: Connection, process: BaseProcess, blocking: BlockingCall) -> Ou
             kind, said = ours.recv()
         except EOFError:
             process.join(STOPPING)
-            raise RuntimeError(f"its process ended with exit code {process.exitcode}") from None
+            raise SkillError(f"its process ended with exit code {process.exitcode}") from None
         if kind == "report":
             blocking.report(said)
         elif kind == "error":
-            raise RuntimeError(said)
+            raise SkillError(said)
+        elif kind == "bug":
+            message, traceback = said
+            _LOG.error("%s\n%s", message, traceback)
+            raise ProgrammingError(message)
         else:
             ended: Outcome = said
             return ended
@@ -242,7 +254,12 @@ def _end(process: BaseProcess) -> None:
 
 
 def _child(
-    theirs: Connection, body: Callable[..., Outcome], action_id: str, seconds: float, arguments: Mapping[str, Any]
+    theirs: Connection,
+    body: Callable[..., Outcome],
+    name: str,
+    action_id: str,
+    seconds: float,
+    arguments: Mapping[str, Any],
 ) -> None:
     _end_with_parent()
     call = BlockingCall(action_id, lambda outcome: theirs.send(("report", outcome)), seconds)
@@ -250,7 +267,15 @@ def _child(
         theirs.send(("ended", body(call, **arguments)))
     except BaseException as error:  # noqa: BLE001  # any error reaches the parent as text
         with suppress(OSError):  # the parent process has ended
-            theirs.send(("error", described(error)))
+            theirs.send(_news_of(error, body, name))
+
+
+def _news_of(error: BaseException, body: Callable[..., Outcome], name: str) -> tuple[str, Any]:
+    """Return the message about an error of the body, as text: the parent process may be unable to read the error."""
+    declared = (SkillError, *getattr(getattr(body, "__self__", None), "device_errors", ()))
+    if issubclass(type(error), declared):
+        return "error", described(error)
+    return "bug", (f"{name}.{body.__name__}: {described(error)}{raised_at(error)}", whole_traceback(error))
 
 
 def _end_with_parent() -> None:

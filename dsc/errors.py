@@ -53,7 +53,22 @@ class RunawayError(Exception):
         self.trail = tuple(trail)
 
 
-class UncertainActionError(Exception):
+class SkillError(Exception):
+    """A failure of a device or of the infrastructure, but not of code: a skill that raises it ends with `skill_error`.
+
+    In a hook such as `start`, it leads to FatalError.
+    """
+
+
+class ProgrammingError(Exception):
+    """An undeclared exception of user code; the message has the hook or skill, the exception, the file and the line."""
+
+    def __str__(self) -> str:
+        """Return the message on one line."""
+        return " ".join(super().__str__().split())
+
+
+class UncertainActionError(SkillError):
     """An action with unknown effect before a restart, which must not be repeated without an observation."""
 
 

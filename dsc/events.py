@@ -23,7 +23,12 @@ GAVE_UP = "gave_up"
 TIMED_OUT = "timed_out"
 """Failure of a skill: it did not end before its deadline and was cancelled."""
 SKILL_ERROR = "skill_error"
-"""Failure of a skill: it raised an exception, or ended without a valid outcome."""
+"""Failure of a skill's infrastructure: a device, host or component is lost, or the skill's effect is unknown."""
+PROGRAMMING_ERROR = "programming_error"
+"""Failure of code: a skill raised an undeclared exception, or ended without a valid outcome.
+
+Only a transition, rule or handler that names the event responds to it; otherwise the event ends the run.
+"""
 ERROR = "error"
 """Failure of the evaluation of an action or guard."""
 DONE_STATE = "done.state."
@@ -31,17 +36,20 @@ DONE_STATE = "done.state."
 EXECUTION_ERROR = "error.execution"
 """Name of event `error` in dialect `scxml` (SCXML 3.13)."""
 FAILURES = frozenset({SKILL_ERROR, TIMED_OUT})
+"""Failures of any skill to which generated plots and handlers respond."""
+SKILL_FAILURES = FAILURES | {PROGRAMMING_ERROR}
 """Failures that any skill can have.
 
 If no state of the skill's plot handles such an event, the states around the plot may handle it.
 """
 LED_AWAY = "then."
 """Prefix of an outcome of a generated plot; such an outcome leads to a state of the plot that declares the goal."""
-ERRORS = frozenset({ERROR, EXECUTION_ERROR})
+ERRORS = frozenset({ERROR, EXECUTION_ERROR, PROGRAMMING_ERROR})
+"""Events of failed evaluations."""
 
 TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
 """Events of the executive's clock for one state; no transition may have them under `on`."""
-RESERVED = TIMERS | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, SKILL_ERROR, ERROR}
+RESERVED = TIMERS | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, ERROR} | SKILL_FAILURES
 """Events that only the executive fires, with one exception.
 
 Plots and skills for planning may also end with `no_plan` and `gave_up`.
@@ -55,7 +63,7 @@ NO_ATTRIBUTES: Mapping[str, Any] = MappingProxyType({})
 
 def goes_outwards(event: str) -> bool:
     """Return whether the states around a plot may handle the event if no state of the plot handles it."""
-    return event in FAILURES or event.startswith(LED_AWAY)
+    return event in SKILL_FAILURES or event.startswith(LED_AWAY)
 
 
 class Event(NamedTuple):

@@ -56,6 +56,7 @@ class SkillSignature:
         outcomes: events that the skill may end with or report, with their attributes and types.
         pattern: see `Pattern`.
         after_crash: see `AfterCrash`.
+        place: file and line of the body; empty if unknown.
     """
 
     component: str
@@ -65,6 +66,7 @@ class SkillSignature:
     outcomes: Mapping[str, Mapping[str, str | None]]
     pattern: Pattern = "skill"
     after_crash: AfterCrash = "sense"
+    place: str = ""
 
 
 CarryOut = Callable[[Any, SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
@@ -210,7 +212,13 @@ def signature_of(component: str, name: str, body: SkillBody, declared: Declared)
         outcomes=declared.outcomes,
         pattern=declared.pattern,
         after_crash=declared.after_crash,
+        place=_place_of(body),
     )
+
+
+def _place_of(body: SkillBody) -> str:
+    code = getattr(inspect.unwrap(body), "__code__", None)
+    return "" if code is None else f"{code.co_filename}:{code.co_firstlineno}"
 
 
 def primitive_plot(

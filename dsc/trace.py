@@ -13,6 +13,8 @@ from typing import IO, Any, NamedTuple
 
 from pydantic_core import PydanticSerializationError, to_json
 
+from knowledge_base.errors import InputError
+
 FORMAT = "dsc-trace"
 VERSION = 2
 BEGINS = f'{{"format": "{FORMAT}"'
@@ -66,6 +68,8 @@ class Trace:
 
     Attributes:
         heard: whether there is a listener.
+        blame: receives an error of a listener, which is then not called again; `None` raises the error. An `OSError`,
+            e.g. of a full disk, and an `InputError` are always raised.
         cause: `seq` of the record that leads to the next records.
     """
 
@@ -75,6 +79,7 @@ class Trace:
         self._seq = last
         self.heard = False
         self.cause: int | None = None
+        self.blame: Callable[[Exception], None] | None = None
 
     def listen(self, listener: Listener) -> None:
         """Send `listener` every later record."""
@@ -87,8 +92,16 @@ class Trace:
         if not self.heard:
             return self._seq
         made = Record(self._seq, self._now(), type_, self.cause, data)
-        for listener in self._listeners:
-            listener(made)
+        for listener in tuple(self._listeners):
+            try:
+                listener(made)
+            except (OSError, InputError):
+                raise
+            except (Exception, SystemExit, GeneratorExit) as error:
+                if self.blame is None:
+                    raise
+                self._listeners.remove(listener)
+                self.blame(error if isinstance(error, Exception) else RuntimeError(repr(error)))
         return self._seq
 
 

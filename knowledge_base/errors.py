@@ -243,5 +243,9 @@ class HistoryError(InputError):
     """A version or time is no longer kept, or is in the future."""
 
 
+class UserCodeError(InputError):
+    """A user's function, e.g. a computed predicate, has failed; the message has the file and the line."""
+
+
 class ConditionCancelledError(Exception):
     """A coroutine waits for a condition that is cancelled and will not fire again."""

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from dsc.dynamic.library import Library
-from dsc.events import FAILURES, GAVE_UP, NO_PLAN
+from dsc.events import SKILL_FAILURES
 from dsc.sequencer.sequencer import RunEnd
 from knowledge_base.language.syntax.expression import (
     And,
@@ -50,6 +50,8 @@ class Report:
         faults: the faults of the simulation, in order.
         simulated_s, wall_s: the duration of the run in run time and in real time, in seconds.
         problem: the reason why the run ended early; `None` otherwise.
+        programming_error: as in `RunEnd`.
+        outputs: the outputs of the plot by name.
         own: the robot's own fields, under the name of the robot in JSON.
         headline: the first line for people.
     """
@@ -70,6 +72,8 @@ class Report:
     simulated_s: float
     wall_s: float
     problem: str | None
+    programming_error: str | None
+    outputs: Mapping[str, Any]
     own: Mapping[str, Any] = field(default_factory=dict)
     headline: str = ""
 
@@ -84,6 +88,7 @@ class Report:
         """Return the report as lines of text."""
         lines = [
             f"{self.headline}, {self.simulated_s:.0f} s of run time.",
+            *([] if self._bug_is_told else [f"  programming error in {self.programming_error}"]),
             *map(self._left_line, self.left),
             f"  plans {self.plans}, replans {self.replans}",
         ]
@@ -96,6 +101,10 @@ class Report:
             if counts:
                 lines.append(f"  {title}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
         return lines
+
+    @property
+    def _bug_is_told(self) -> bool:
+        return self.programming_error is None or self.programming_error in self.headline
 
     def _left_line(self, left: Left) -> str:
         where = f" ({left.where})" if left.where else ""
@@ -143,6 +152,8 @@ def summarise(
         simulated_s=round(tally.seconds, 3),
         wall_s=round(wall_s, 3),
         problem=end.problem,
+        programming_error=end.programming_error,
+        outputs=end.outputs,
         headline=f"{said}{'' if reached else f': {reason_of_end(end, tally.gave_up)}'} (judge: {judge})",
     )
 
@@ -154,19 +165,14 @@ def failure_events(library: Library) -> frozenset[str]:
     """
     emitted = {event for plot in library if plot.implements for event in plot.emits}
     answered = {rule.on for plot in library for rule in plot.rules if rule.on is not None}
-    return frozenset({*FAILURES, *emitted, *answered})
+    return frozenset({*SKILL_FAILURES, *emitted, *answered})
 
 
 def reason_of_end(end: RunEnd, gave_up: str = "") -> str:
     """Return the reason why a run ended without its goal; `gave_up` is the reason of the last goal without a plan."""
-    if end.problem is not None:
-        return end.problem
-    for event in reversed(end.emitted):
-        if event.name in {NO_PLAN, GAVE_UP}:
-            return f"{event.name}: {event.attributes.get('reason', 'no reason')}"
-    if end.emitted:
-        return f"the plot ended with '{end.emitted[-1].name}'" + (f": {gave_up}" if gave_up else "")
-    return gave_up or "the run ended before"
+    if end.problem is not None or not gave_up or gave_up in end.reason:
+        return end.reason
+    return f"{end.reason}: {gave_up}" if end.emitted else gave_up
 
 
 def unmet(goal: Expression, knowledge: KnowledgeBase) -> Iterator[str]:

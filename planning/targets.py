@@ -15,10 +15,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from dsc.components.hooks import contained, raised_at
+from dsc.components.hooks import contained
 from dsc.components.robot import made, named_part
 from knowledge_base.errors import InputError, Place, UnknownNameError, described
 from knowledge_base.language.checking.inputs import shown
+from knowledge_base.tracebacks import raised_at
 from planning.bundles import GROUP, Bundle, installed
 
 ROBOT = "robot"

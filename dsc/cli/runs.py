@@ -164,6 +164,8 @@ def _summary(runs: RunArchive, run: RunRow) -> dict[str, Any]:
 def _state(run: RunRow) -> str:
     if run.ended is None:
         return "unfinished"
+    if run.ended["programming_error"]:
+        return f"programming error: {run.ended['programming_error']}"
     return f"ended early: {run.ended['problem']}" if run.ended["problem"] else "finished"
 
 

@@ -14,7 +14,8 @@ from dsc.components.parameters import Parameter, Parameters, check_declarations
 from dsc.components.ports import TAKES, EventActivations
 from dsc.components.streams import Push, Stream
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.language.checking.inputs import shown
 
 ALWAYS = ""
 """Key of `ComponentHooks.needs` that applies in every mode."""
@@ -31,6 +32,8 @@ class ComponentHooks:
         modes: the sub-states of Alive besides `neutral`; if empty, any mode is valid.
         declares: the parameters with type, range and the roles that may change them; if empty, any name is valid.
         relations: conditions between the parameters that must always be true.
+        device_errors: exceptions that report a failed device, e.g. `(OSError,)`: a skill that raises one ends with
+            `skill_error`, and a hook leads to FatalError. Every other exception is a programming error.
         needs: for each mode, a tuple of names of required components; the key `ALWAYS` applies in every mode.
         parameters: the present values, by name.
         life: the life cycle. When the device is lost, call `self.life.become(Life.FATAL_ERROR, "no power")`.
@@ -42,6 +45,7 @@ class ComponentHooks:
     modes: ClassVar[tuple[str, ...]] = ()
     declares: ClassVar[Mapping[str, Parameter]] = {}
     relations: ClassVar[tuple[str, ...]] = ()
+    device_errors: ClassVar[tuple[type[BaseException], ...]] = ()
     needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     parameters: Parameters
@@ -131,12 +135,13 @@ class Component(ComponentHooks, RestartHooks):
         """Validate the declared parameters, and collect the ports; raise `InputError` for an invalid declaration."""
         super().__init_subclass__(**named)
         check_declarations(cls.name or cls.__name__.lower(), cls.declares, cls.relations, cls.__module__)
+        _require_exceptions(cls)
         cls._ports = {name: one for name, one in inspect.getmembers(cls) if isinstance(one, Push | Stream)}
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
         self.parameters = Parameters(self.name, self.declares, self.relations)
-        self.life = LifeCycle()
+        self.life = LifeCycle(self.name, self.device_errors)
         self.activations = EventActivations()
         self.pushes: dict[str, Push] = {}
         self.streams: dict[str, Stream] = {}
@@ -179,7 +184,7 @@ class Component(ComponentHooks, RestartHooks):
         Raises:
             UnknownNameError: the component has no such skill.
             InputError: an argument is missing or unknown.
-            SchemaError: a declared parameter of the component has no value.
+            NoValueError: a declared parameter of the component has no value.
         """
         signatures = self.skills()
         signature = signatures.get(skill_name)
@@ -264,3 +269,12 @@ class Component(ComponentHooks, RestartHooks):
             "pushes": sorted(self.pushes),
             "streams": {name: stream.source for name, stream in self.streams.items()},
         }
+
+
+def _require_exceptions(kind: type[Component]) -> None:
+    """Raise `InputError` unless `device_errors` of a component class is a tuple of exception classes."""
+    found = kind.device_errors
+    if isinstance(found, tuple) and all(isinstance(one, type) and issubclass(one, BaseException) for one in found):
+        return
+    said = f"`device_errors` of {kind.__qualname__} is a tuple of exception classes, as in device_errors = (OSError,)"
+    raise InputError(f"{said}, not {shown(found)}")

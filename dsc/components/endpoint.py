@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from dsc.components.hooks import contained
+from dsc.errors import ProgrammingError, SkillError
 from knowledge_base.errors import InputError, described, text_of
 
 Answers = Callable[[str, Any], Awaitable[Any]]
@@ -45,11 +46,11 @@ _LONGEST = 1_000
 """Maximum number of characters of a `kind` or `life` in a frame."""
 
 
-class NoAnswerError(Exception):
+class NoAnswerError(SkillError):
     """No answer arrived in time: the other endpoint has ended, is late, or is unreachable."""
 
 
-class RefusedError(Exception):
+class RefusedError(SkillError):
     """The other endpoint could not execute a call; the message has its reason."""
 
 
@@ -176,6 +177,7 @@ class Endpoint:
         Raises:
             NoAnswerError: no answer arrived within that many seconds; the call may have been executed.
             RefusedError: the other endpoint could not execute the call.
+            ProgrammingError: code at the other endpoint failed, which has logged the traceback.
             InputError: the body is not plain data.
         """
         number = self._last = self._last + 1
@@ -267,6 +269,8 @@ class Endpoint:
             return
         if said["what"] == "answer":
             waiting.set_result(said["body"])
+        elif said["what"] == "bug":
+            waiting.set_exception(ProgrammingError(text_of(said["body"], str)))
         else:
             waiting.set_exception(RefusedError(text_of(said["body"], str)))
 
@@ -305,6 +309,8 @@ class Endpoint:
             with contained():
                 body = await answers(sender, said["body"])
             encoded(body)
+        except ProgrammingError as error:
+            return "bug", str(error)
         except Exception as error:  # noqa: BLE001  # any error reaches the caller as text
             return "refusal", described(error, named=not isinstance(error, InputError))
         return "answer", body
@@ -321,7 +327,7 @@ def _frame(frame: bytes) -> dict[str, Any] | None:
     if not (type(said["n"]) is int and isinstance(said["life"], str) and len(said["life"]) <= _LONGEST):
         return None
     match said:
-        case {"what": "answer" | "refusal"}:
+        case {"what": "answer" | "refusal" | "bug"}:
             return said
         case {"what": "call" | "push", "kind": str(kind), "low": int(low)}:
             return said if len(kind) <= _LONGEST and low <= said["n"] else None

@@ -7,28 +7,54 @@ from `Exception` would end the program, too.
 from __future__ import annotations
 
 import asyncio
-import os
+import logging
 import signal
-import sysconfig
 import threading
 from asyncio.runners import Runner
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import partial
-from pathlib import Path
-from traceback import walk_tb
 from types import TracebackType
 from typing import Any
 
-from knowledge_base.errors import described
+from dsc.errors import ProgrammingError, SkillError
+from knowledge_base.errors import InputError, described
+from knowledge_base.tracebacks import raised_at, whole_traceback
+
+_LOG = logging.getLogger(__package__)
+Classes = tuple[type[BaseException], ...]
+_found: ContextVar[list[str] | None] = ContextVar("found", default=None)
+_MOST_FOUND = 100
+"""Number of programming errors of one run that are kept for its end; all are logged."""
+
+
+@contextmanager
+def programming_errors() -> Iterator[list[str]]:
+    """Return a context manager with the list of the programming errors in its block, and in tasks begun there."""
+    found: list[str] = []
+    token = _found.set(found)
+    try:
+        yield found
+    finally:
+        _found.reset(token)
 
 
 class contained:  # noqa: N801  # a context manager, named like `suppress`
     """Context manager in which a hook runs: an exception that is not an `Exception` becomes a `RuntimeError`.
 
     A cancellation by another task, the closing of the coroutine, and Ctrl-C pass unchanged.
+
+    Args:
+        hook: the name of the hook, as `arm.start`; with it, a programming error becomes a `ProgrammingError`.
+        raises: the exceptions that the component declares.
     """
 
-    __slots__ = ("_task",)
+    __slots__ = ("_hook", "_raises", "_task")
+
+    def __init__(self, hook: str = "", raises: Classes = ()) -> None:
+        self._hook = hook
+        self._raises = raises
 
     def __enter__(self) -> None:
         self._task = running_task()
@@ -36,9 +62,48 @@ class contained:  # noqa: N801  # a context manager, named like `suppress`
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        if error is not None and not issubclass(type(error), Exception) and is_own(error, self._task):
+        if error is None or not (issubclass(type(error), Exception) or is_own(error, self._task)):
+            return
+        bug = programming_error(error, self._hook, self._raises) if self._hook else None
+        if bug is not None:
+            raise bug from error
+        if not issubclass(type(error), Exception):
             itself = ": it cancelled itself" if issubclass(type(error), asyncio.CancelledError) else ""
             raise RuntimeError(described(error) + itself) from error
+
+
+def programming_error(error: BaseException, hook: str, raises: Classes = ()) -> ProgrammingError | None:
+    """Return the programming error that `error` is or results from, and log its traceback; `None` for other errors.
+
+    Every exception of a hook is a programming error, except a `SkillError` and the declared exceptions.
+
+    Args:
+        error: the exception of a hook or skill.
+        hook: the name of the hook or skill, as `arm.grasp`.
+        raises: the exceptions that the component declares.
+    """
+    cause: BaseException | None = error
+    while cause is not None:
+        if type(cause) is ProgrammingError:  # logged before
+            return cause
+        cause = cause.__cause__
+    kind = type(error)
+    if issubclass(kind, (SkillError, *raises)):
+        return None
+    itself = ": it cancelled itself" if issubclass(kind, asyncio.CancelledError) else ""
+    refused = issubclass(kind, InputError)  # its message is complete without a line of this project
+    said = described(error, named=not refused)
+    bug = ProgrammingError(f"{hook}: {said}{itself}{raised_at(error, only_users=refused)}")
+    _LOG.error("%s\n%s", bug, whole_traceback(error))
+    found = _found.get()
+    if found is not None and len(found) < _MOST_FOUND:
+        found.append(str(bug))
+    return bug
+
+
+def reason_of(error: BaseException) -> str:
+    """Return an error of a hook as text, without the class of an error whose message is complete."""
+    return described(error, named=not issubclass(type(error), (ProgrammingError, InputError)))
 
 
 def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:
@@ -56,35 +121,6 @@ def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:
     if issubclass(kind, GeneratorExit):  # other code closes a coroutine, never the task that runs it
         return task is running_task()
     return not (issubclass(kind, KeyboardInterrupt) and _from_keyboard(error))
-
-
-def raised_at(error: BaseException) -> str:
-    """Return the innermost line of a user's code that raised the error, as ` (file:line)`; empty without a line.
-
-    Code of this project, of the standard library and of installed packages counts only if no other code was involved.
-    A syntax error has the line that cannot be read.
-    """
-    if isinstance(error, SyntaxError) and error.filename is not None:
-        return f" ({error.filename}:{error.lineno})"
-    frames = []
-    cause: BaseException | None = error
-    while cause is not None:
-        frames += [(frame.f_code.co_filename, line) for frame, line in walk_tb(cause.__traceback__)]
-        cause = cause.__cause__
-    users = [frame for frame in frames if not frame[0].startswith(_NOT_USERS)]
-    found = users or [frame for frame in frames if not frame[0].startswith(_FROZEN)]
-    return f" ({found[-1][0]}:{found[-1][1]})" if found else ""
-
-
-_ROOT = Path(__file__).parents[2]
-_FROZEN = "<frozen"
-"""The beginning of the file names of code inside the interpreter, e.g. of `import`."""
-_NOT_USERS = (
-    *(str(_ROOT / package) + os.sep for package in ("knowledge_base", "dsc", "planning")),
-    *{sysconfig.get_path(name) + os.sep for name in ("stdlib", "purelib", "platlib")},
-    _FROZEN,
-)
-"""Beginnings of the paths of code that no user of this project has written."""
 
 
 def running_task() -> asyncio.Task[Any] | None:

@@ -7,7 +7,7 @@ A host stores an action's reports and end until the client releases them, within
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -15,10 +15,11 @@ from dsc.calls import OBSERVED, Clock, Outcome, Reports, SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, Transport, encoded
 from dsc.components.heartbeat import Heartbeat
-from dsc.components.hooks import contained
+from dsc.components.hooks import contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import HostedStreams, Publisher
-from knowledge_base.errors import InputError, described
+from dsc.errors import ProgrammingError
+from knowledge_base.errors import InputError
 from knowledge_base.exchange import delta_form, delta_of
 from knowledge_base.language.checking.inputs import require_delta, require_time, shown
 
@@ -47,15 +48,25 @@ class Host:
         self.endpoint.answer("come alive", self._come_alive)
         self.endpoint.answer("be active", self._be_active)
         self.endpoint.answer("switch", self._switch)
-        self.endpoint.answer("set", lambda _, said: component.configure(said["parameter"], said["value"]))
-        self.endpoint.answer("set all", lambda _, said: component.configure_all(said))
-        self.endpoint.answer("take", lambda _, said: component.take(said["port"], said["message"]))
-        self.endpoint.answer("diagnose", lambda _, __: component.diagnose())
+        self._answer("set", "configure", lambda said: component.configure(said["parameter"], said["value"]))
+        self._answer("set all", "configure_all", component.configure_all)
+        self._answer("take", "take", lambda said: component.take(said["port"], said["message"]))
+        self._answer("diagnose", "diagnose", lambda _: component.diagnose())
         self._is_active = asyncio.Event()
-        self._heart = Heartbeat(self.endpoint, component.needed, self._activated)
+        self._heart = Heartbeat(self.endpoint, self._needed, self._activated)
         self._beating = asyncio.get_running_loop().create_task(self._heart.run())
         self._changed()
         component.life.listen(self._changed)
+
+    def _answer(self, kind: str, hook: str, call: Callable[[Any], Awaitable[Any]]) -> None:
+        """Answer calls of that kind with the result of a hook."""
+
+        async def answers(_: str, said: Any) -> Any:
+            awaited = call(said)
+            with contained(f"{self._component.name}.{hook}", self._component.device_errors):
+                return await awaited
+
+        self.endpoint.answer(kind, answers)
 
     async def close(self) -> None:
         """Stop all services without a message; clients treat the component as failed."""
@@ -68,9 +79,23 @@ class Host:
 
     def _changed(self) -> None:
         life = self._component.life
-        needs = list(self._component.needed())
-        self._condition.put({"life": life.state, "reason": life.reason, "mode": life.mode, "needs": needs})
+        needs = list(self._needed())  # may change the life
+        said = {"life": life.state, "reason": life.reason, "bug": life.bug is not None, "mode": life.mode}
+        self._condition.put({**said, "needs": needs})
         self._heart.stir()
+
+    def _needed(self) -> tuple[str, ...]:
+        """Return the needs of the component; its error leads to FatalError, and counts as no needs."""
+        component = self._component
+        if component.life.bug is not None:
+            return ()
+        try:
+            with contained(f"{component.name}.needed", component.device_errors):
+                return component.needed()
+        except Exception as error:  # noqa: BLE001  # the heartbeat must continue
+            if component.life.state is Life.ALIVE:
+                component.life.fail(error)
+            return ()
 
     async def _hull(self, _: str, __: Any) -> dict[str, Any]:
         skills = [asdict(signature) for signature in self._component.skills().values()]
@@ -99,7 +124,8 @@ class Host:
         (self._is_active.set if active else self._is_active.clear)()
 
     async def _switch(self, _: str, said: dict[str, Any]) -> dict[str, Any]:
-        await self._component.change_mode(said["mode"])
+        with contained(f"{self._component.name}.switch", self._component.device_errors):
+            await self._component.change_mode(said["mode"])
         return self._condition.newest
 
 
@@ -192,11 +218,14 @@ class HostedActions:
                 seconds["deadline"] = self._clock.now() + said["seconds"]
             call = SkillCall(said["id"], self._clock, lambda outcome: reports.put(_plain(outcome)), **seconds)
             async with asyncio.timeout(said["seconds"]):
-                with contained():
+                with contained(f"{self._component.name}.{said['skill']}", self._component.device_errors):
                     outcome = await self._component.execute(said["skill"], call, said["arguments"])
-            end = {"ended": outcome_form(_plain(outcome))}
+                    form = outcome_form(_plain(outcome))
+            end = {"ended": form}
+        except ProgrammingError as error:
+            end = {"bug": str(error)}
         except Exception as error:  # noqa: BLE001  # any error reaches the client as text
-            end = {"failed": described(error)}
+            end = {"failed": reason_of(error)}
         reports.flush()
         self._tell(said["id"], action, end)
 

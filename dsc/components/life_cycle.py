@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable
 from enum import StrEnum
 
-from dsc.components.hooks import contained
-from knowledge_base.errors import InputError, described
+from dsc.components.hooks import Classes, contained, reason_of
+from dsc.errors import ProgrammingError
+from knowledge_base.errors import InputError
+
+_LOG = logging.getLogger(__package__)
 
 
 class Life(StrEnum):
@@ -63,16 +67,24 @@ class Announcer:
 class LifeCycle(Announcer):
     """The life cycle of one component; it announces changes of state, mode and needs.
 
+    Args:
+        component: the component's name.
+        raises: the exceptions that the component declares.
+
     Attributes:
         state: one of `Life`.
         reason: the cause of FatalError, else empty.
+        bug: the programming error that is the cause of FatalError, else `None`.
         starting: whether the component's `start` is running.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, component: str = "", raises: Classes = ()) -> None:
         super().__init__()
+        self._component = component
+        self._raises = raises
         self.state = Life.INIT
         self.reason = ""
+        self.bug: ProgrammingError | None = None
         self.starting = False
         self._activators: set[int] = set()
         self._mode = NEUTRAL
@@ -111,18 +123,20 @@ class LifeCycle(Announcer):
         if self.state is not Life.INIT:
             return
         self.starting = True
+        error: Exception | None = None
         try:
-            with contained():
+            with contained(f"{self._component}.start", self._raises):
                 await start()
-        except Exception as error:  # noqa: BLE001  # after any error the component cannot work
-            became, reason = Life.FATAL_ERROR, described(error)
-        else:
-            became, reason = Life.ALIVE, ""
+        except Exception as raised:  # noqa: BLE001  # after any error the component cannot work
+            error = raised
         finally:
             self.starting = False
             self.announce()
         if self.state is Life.INIT:  # else `start` itself, or a shutdown, has set the state
-            self.become(became, reason)
+            if error is None:
+                self.become(Life.ALIVE)
+            else:
+                self.fail(error)
 
     async def become_active(self, activator: int, activate: Callable[[bool], Awaitable[None]], *, active: bool) -> None:
         """Add or remove an activator.
@@ -139,20 +153,32 @@ class LifeCycle(Announcer):
         if others or not (active or again):
             return
         try:
-            with contained():
+            with contained(f"{self._component}.activate", self._raises):
                 await activate(active)
         except Exception as error:  # noqa: BLE001  # after any error the component lacks its resources
             if self.state is not Life.SHUTDOWN:
-                self.become(Life.FATAL_ERROR, described(error))
+                self.fail(error)
 
-    def become(self, state: Life, reason: str = "") -> None:
+    def fail(self, error: Exception) -> None:
+        """Enter FatalError after an error of a hook."""
+        bug = error if isinstance(error, ProgrammingError) else None
+        self.become(Life.FATAL_ERROR, reason_of(error), bug)
+
+    def become(self, state: Life, reason: str = "", bug: ProgrammingError | None = None) -> None:
         """Enter a state; announce the change also if the component is in that state already.
+
+        Args:
+            state: the new state.
+            reason: the cause of FatalError.
+            bug: the programming error that is this cause.
 
         Raises:
             InputError: the present state has no transition to it.
         """
         if state is not self.state and state not in _NEXT[self.state]:
             raise InputError(f"a component in '{self.state}' cannot become '{state}'", found=state)
-        self.reason = reason if state is Life.FATAL_ERROR else ""
+        self.reason, self.bug = (reason, bug) if state is Life.FATAL_ERROR else ("", None)
+        if state is not self.state:
+            _LOG.info("component '%s': %s%s", self._component, state, f", {reason}" if self.reason else "")
         self.state = state
         self.announce()

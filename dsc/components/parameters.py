@@ -10,6 +10,7 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from typing import Any, Literal, get_args
 
+from dsc.errors import SkillError
 from dsc.model.ranges import Range, Who, refuse_change, written
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
@@ -73,6 +74,10 @@ class Parameter:
     def range(self) -> Range:
         """Permitted values of the parameter."""
         return Range(self.type, self.least, self.most, self.among)
+
+
+class NoValueError(SchemaError, SkillError):
+    """A declared parameter has no value; a profile or an operator may set it."""
 
 
 class Parameters(dict[str, Any]):
@@ -151,7 +156,7 @@ class Parameters(dict[str, Any]):
         self.update(found)
 
     def require_bound(self) -> None:
-        """Raise `SchemaError` if a declared parameter has no value; the message has the reason."""
+        """Raise `NoValueError` if a declared parameter has no value; the message has the reason."""
         self._require_bound(self)
 
     def _require_bound(self, values: Mapping[str, Any]) -> None:
@@ -160,7 +165,7 @@ class Parameters(dict[str, Any]):
                 reasons = ", ".join(f"'{reason}'" for reason in sorted(parameter.reasons))
                 reset = f", and a new value of {reasons} resets it" if reasons else ""
                 message = f"'{self._component}.{name}' has no value: its builder leaves it to a profile{reset}"
-                raise SchemaError(message, found=name)
+                raise NoValueError(message, found=name)
 
     def _after(self, values: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
         if not self._declared:

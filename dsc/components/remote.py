@@ -21,6 +21,7 @@ from dsc.components.heartbeat import Heartbeat
 from dsc.components.host import CONDITION, outcome_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import RENEWED, RemotePush, Subscription
+from dsc.errors import ProgrammingError
 from dsc.skills import SkillSignature
 from knowledge_base.errors import InputError, described, text_of
 from knowledge_base.language.checking.inputs import require_text
@@ -125,6 +126,8 @@ class RemoteComponent(Component):
     def _require_alive(self, condition: dict[str, Any]) -> None:
         self._condition.take(condition)
         life, reason = condition["value"]["life"], condition["value"]["reason"]
+        if condition["value"]["bug"]:
+            raise ProgrammingError(reason)
         if life != Life.ALIVE:
             raise RefusedError(f"it is in '{life}' there" + (f": {reason}" if reason else ""))
 
@@ -140,7 +143,9 @@ class RemoteComponent(Component):
 
     def _changed(self, condition: Any) -> None:
         match condition:
-            case {"life": str(life), "reason": str(reason), "mode": str(mode), "needs": [*needs]} if life in list(Life):
+            case {
+                "life": str(life), "reason": str(reason), "bug": bool(bug), "mode": str(mode), "needs": [*needs]
+            } if life in list(Life):  # fmt: skip
                 for need in needs:
                     require_text(need, "the name of a component that is needed")
             case _:
@@ -148,7 +153,7 @@ class RemoteComponent(Component):
         if self._working and not self.life.starting:
             if self.life.state is Life.SHUTDOWN and life != Life.SHUTDOWN:
                 self.life.become(Life.INIT)
-            self.life.become(Life(life), reason)
+            self.life.become(Life(life), reason, ProgrammingError(reason) if bug else None)
         self.life.mode = mode
 
     async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
@@ -156,6 +161,7 @@ class RemoteComponent(Component):
 
         Raises:
             RefusedError: the skill failed there, or the host no longer knows the action.
+            ProgrammingError: the skill's code failed there.
             NoAnswerError: the host does not answer.
         """
         news = asyncio.Event()
@@ -183,6 +189,8 @@ class RemoteComponent(Component):
                 received += 1
                 if "report" in form:
                     call.report(outcome_of(form["report"]))
+                elif "bug" in form:
+                    raise ProgrammingError(text_of(form["bug"], str))
                 elif "failed" in form:
                     raise RefusedError(text_of(form["failed"], str))
                 else:

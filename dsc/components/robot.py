@@ -9,12 +9,13 @@ from importlib import import_module
 from pathlib import Path
 
 from dsc.components.component import ALWAYS, Component
-from dsc.components.hooks import contained, raised_at
+from dsc.components.hooks import contained
 from dsc.components.life_cycle import NEUTRAL
 from dsc.components.streams import Push, Stream, require_fitting
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
 from knowledge_base.language.checking.inputs import require_several, shown
+from knowledge_base.tracebacks import raised_at
 
 
 def component_of(name: str, *functions: SkillBody) -> Component:

@@ -8,7 +8,7 @@ from collections.abc import Container, Iterable, Mapping
 from typing import Any
 
 from dsc.dynamic.steps import Plots, filled
-from dsc.events import DONE, FAILURES, GAVE_UP
+from dsc.events import DONE, GAVE_UP, SKILL_FAILURES
 from dsc.model.actions import Assign, Emit, Internal, Tell
 from dsc.model.plot import ActionPlot, PlotVariable
 from dsc.model.rules import CONTINUE, ENTER, GIVE_UP, REPLAN, RETRY, Rule
@@ -177,7 +177,7 @@ def skipped(step: str) -> str:
 
 def reason_of(event: str) -> str:
     """Return the reason of a step's failure: the attribute `reason` of a failure event, else the event's name."""
-    return "?event.reason" if event in FAILURES else event
+    return "?event.reason" if event in SKILL_FAILURES else event
 
 
 def reads_event(term: lang.Term) -> bool:

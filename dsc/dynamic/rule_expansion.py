@@ -8,7 +8,7 @@ from dsc.dynamic.event_handlers import with_handlers
 from dsc.dynamic.insertions import Insertions
 from dsc.dynamic.responses import FreshNames, Responses, States, because, reason_of
 from dsc.dynamic.steps import Plots, Step, about_step, answerable, answers_in_plans, concerns
-from dsc.events import DONE, GAVE_UP, NO_CANDIDATE
+from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, PROGRAMMING_ERROR
 from dsc.model.actions import Assign, Emit
 from dsc.model.plot import ActionPlot, Scope, initial_of
 from dsc.model.rules import REPLAN, Rule
@@ -84,7 +84,7 @@ class _Expansion:
                     about = about_step(rule, state, self._plot)
                     onward = self._responses.onward(about, number, name, state)
                     own += self._responses.carried_out(about, f"{name}_{event}_{number}", onward, recoveries)
-            if self._plot.generated:
+            if self._plot.generated and event != PROGRAMMING_ERROR:
                 reason = "no candidate fits" if event == NO_CANDIDATE else reason_of(event)
                 own.append(self._responses.ending(name, REPLAN, reason))
             if own:

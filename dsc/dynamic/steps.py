@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Protocol
 
-from dsc.events import FAILURES, GAVE_UP, NO_CANDIDATE, NO_PLAN, SKILL_ERROR, TIMED_OUT
+from dsc.events import GAVE_UP, NO_CANDIDATE, NO_PLAN, PROGRAMMING_ERROR, SKILL_ERROR, SKILL_FAILURES, TIMED_OUT
 from dsc.model.actions import Configure, Send, Switch
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import STEP, Command, Handler, Response, Rule
@@ -19,6 +19,7 @@ Outcomes = Mapping[str, Mapping[str, str] | None]
 
 _FAILED: Outcomes = {
     SKILL_ERROR: {"skill": "text", "reason": "text"},
+    PROGRAMMING_ERROR: {"skill": "text", "reason": "text"},
     TIMED_OUT: {"skill": "text", "reason": "text", "seconds": "number"},
 }
 
@@ -126,7 +127,7 @@ def answers_in_plans(rule: Rule, plots: Plots) -> bool:
 
 def _answered_in_plans(rule: Rule, plots: Plots) -> Iterator[ActionPlot]:
     carrying = (plot for plot in plots if plot.implements and (not rule.steps or plot.implements in rule.steps))
-    return (plot for plot in carrying if rule.on is None or rule.on in FAILURES or rule.on in plot.emits)
+    return (plot for plot in carrying if rule.on is None or rule.on in SKILL_FAILURES or rule.on in plot.emits)
 
 
 def entered_by(rule: Rule, plot: ActionPlot, plots: Plots) -> Iterator[ActionPlot]:

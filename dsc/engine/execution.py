@@ -107,7 +107,7 @@ class Execution:
         try:
             return self.performer.values(frame, part.edge.passed)
         except InputError as error:
-            self.performer.fail(frame, f"{frame.prefix}{source}: {error}")
+            self.performer.fail(frame, f"{frame.prefix}{source}", error)
             return NOTHING
 
     # -- leaving -----------------------------------------------------------------------------------------
@@ -191,7 +191,7 @@ class Execution:
             elif isinstance(state, DynamicState):
                 self._bind_decision(frame, name, self._decided(frame, name, state, passed))
         except InputError as error:
-            self.performer.fail(frame, f"{frame.prefix}{name}: {error}")
+            self.performer.fail(frame, f"{frame.prefix}{name}", error)
 
     def _decided(self, frame: Frame, name: str, state: DynamicState, passed: Mapping[str, Any]) -> Decision:
         bindings = self.performer.bindings(frame)

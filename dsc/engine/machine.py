@@ -38,7 +38,7 @@ def move(state: MachineState, root: FrameState, event: Event, situation: Situati
         frame = _new(FrameState, (serial, compiled, following, variables, activations, children, kept))
         after = _new(MachineState, (frame, state.serials, False))
     micro = _new(Microstep, (event, choice.taken, choice.exited, choice.entered, ()))
-    step = _new(Step, (after, event, True, (micro,), (), NO_CHANGE, (), (), (), NOTHING))
+    step = _new(Step, (after, event, True, (micro,), (), NO_CHANGE, (), (), (), NOTHING, ()))
     if before.bare is state and before.choices[event.name] is choice:
         before.steps[event.name] = step
     return step

@@ -18,7 +18,7 @@ from dsc.engine.steps import Note, Step
 from dsc.engine.tables import TransitionEdge
 from dsc.engine.transition_selection import Addressed, Enabled, Trigger, select
 from dsc.errors import RunawayError
-from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, Event, goes_outwards
+from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event, goes_outwards
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.expression import Expression
 
@@ -72,7 +72,7 @@ class Macrostep:
             state = at_rest(self._root.frozen(), done.serials)
         return Step(
             state, event, handled, tuple(done.microsteps), tuple(done.decisions), done.knowledge, tuple(done.output),
-            tuple(done.emitted), tuple(done.errors), execution.outputs,
+            tuple(done.emitted), tuple(done.errors), execution.outputs, tuple(done.bugs),
         )  # fmt: skip
 
     def _leave(self) -> None:
@@ -104,7 +104,7 @@ class Macrostep:
         if error.name == EXECUTION_ERROR or any(one.compiled.scxml for one in self._root.that(_is_frame(error.frame))):
             self._performer.output.append(Note(error.name, reason))
         else:
-            self._performer.errors.append(reason)
+            (self._performer.bugs if error.name == PROGRAMMING_ERROR else self._performer.errors).append(reason)
 
     # -- one event ---------------------------------------------------------------------------------------
 
@@ -214,7 +214,7 @@ class Macrostep:
             if broken not in self._broken_guards:
                 self._broken_guards.add(broken)
                 source = frame.prefix + frame.compiled.nodes[edge.source].name
-                self._performer.fail(frame, f"guard of '{edge.trigger}' in {source}: {error}")
+                self._performer.fail(frame, f"guard of '{edge.trigger}' in {source}", error)
             return False
 
     # -- time --------------------------------------------------------------------------------------------

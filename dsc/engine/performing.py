@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections import deque
 from collections.abc import Iterable, Mapping
@@ -12,7 +13,7 @@ from dsc.engine.frames import Frame
 from dsc.engine.machine_state import NOTHING
 from dsc.engine.situation import Situation
 from dsc.engine.tables import StateNode
-from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, Event
+from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event
 from dsc.model.actions import (
     Assign,
     Block,
@@ -29,8 +30,11 @@ from dsc.model.actions import (
 )
 from dsc.model.language import TermField
 from dsc.model.plot import ActionPlot
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError, UserCodeError
 from knowledge_base.language.syntax.expression import Constant, Expression, Term, Variable
+from knowledge_base.tracebacks import whole_traceback
+
+_LOG = logging.getLogger(__package__)
 
 _EXPONENT_FROM = 1e21
 """Smallest number that ECMAScript writes with an exponent."""
@@ -50,8 +54,8 @@ class Performer:
     """
 
     __slots__ = (
-        "bound", "decisions", "emitted", "entered", "errors", "event", "exited", "internal", "knowledge", "microsteps",
-        "output", "serials", "situation",
+        "bound", "bugs", "decisions", "emitted", "entered", "errors", "event", "exited", "internal", "knowledge",
+        "microsteps", "output", "serials", "situation",
     )  # fmt: skip
 
     def __init__(self, situation: Situation, serials: int) -> None:
@@ -64,6 +68,7 @@ class Performer:
         self.output: list[steps.Output] = []
         self.emitted: list[Event] = []
         self.errors: list[str] = []
+        self.bugs: list[str] = []
         self.knowledge = steps.NO_CHANGE
         self.exited: list[str] = []
         self.entered: list[str] = []
@@ -75,10 +80,13 @@ class Performer:
         self.microsteps.append(steps.Microstep(event, taken, tuple(self.exited), tuple(self.entered), bound))
         self.exited, self.entered, self.bound = [], [], []
 
-    def fail(self, frame: Frame, reason: str) -> None:
-        """Fire an error event in the plot after a failed evaluation; `reason` is the message."""
+    def fail(self, frame: Frame, place: str, error: InputError) -> None:
+        """Fire an error event in the plot after a failed evaluation; for an exception of user code, another event."""
         name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
-        self.internal.append(Event(name, {"reason": reason}, frame=frame.serial))
+        if isinstance(error, UserCodeError) and not frame.compiled.scxml:
+            name = PROGRAMMING_ERROR
+            _LOG.error("%s: %s\n%s", place, error, whole_traceback(error))
+        self.internal.append(Event(name, {"reason": f"{place}: {error}"}, frame=frame.serial))
 
     # -- values ------------------------------------------------------------------------------------------
 
@@ -122,7 +130,7 @@ class Performer:
                 else:
                     self.output.append(self._output_of(frame, action, activation, number))
             except InputError as error:
-                self.fail(frame, f"{frame.prefix}{state}: {error}")
+                self.fail(frame, f"{frame.prefix}{state}", error)
                 if frame.compiled.scxml:
                     return
 
@@ -141,7 +149,7 @@ class Performer:
         try:
             delay = _delay_of(self.value(frame, seconds), least=SHORTEST_PERIOD if event == EVERY else 0)
         except InputError as error:
-            self.fail(frame, f"{frame.prefix}{node.name}: {error}")
+            self.fail(frame, f"{frame.prefix}{node.name}", error)
         else:
             self.output.append(steps.StartTimer(activation, index, delay, event))
 
@@ -190,7 +198,7 @@ class Performer:
         try:
             return self.holds(frame, action.condition)
         except InputError as error:
-            self.fail(frame, f"condition of a branch in {frame.prefix}{state}: {error}")
+            self.fail(frame, f"condition of a branch in {frame.prefix}{state}", error)
             return False
 
     def _emit_later(self, frame: Frame, action: Emit, delay: TermField, attributes: Mapping[str, Any]) -> None:

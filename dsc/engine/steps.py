@@ -173,6 +173,7 @@ class Step(NamedTuple):
         errors: messages of failed actions or guards for which no transition on `error` exists. In dialect `scxml` these
             messages are notes in `output`, and the plot continues.
         outputs: values that the outermost plot returns; empty unless this step ends the plot.
+        bugs: messages of failed user code for which no transition on `programming_error` exists.
     """
 
     state: MachineState
@@ -185,6 +186,7 @@ class Step(NamedTuple):
     emitted: tuple[Event, ...] = ()
     errors: tuple[str, ...] = ()
     outputs: Mapping[str, Any] = NOTHING
+    bugs: tuple[str, ...] = ()
 
     @property
     def moved(self) -> bool:

@@ -55,6 +55,8 @@ class Kept:
         emitted: as in `Reactor`.
         in_vain: as in `Reactor`.
         problem: as in `Reactor`.
+        programming_error: as in `Reactor`.
+        outputs: as in `Reactor`.
         settings: the values of `Reactor.settings`.
         pending: pending items, in the order of their requests.
         memory: memories of components, by component name.
@@ -68,6 +70,8 @@ class Kept:
     emitted: tuple[Event, ...]
     in_vain: frozenset[tuple[int, int]]
     problem: str | None
+    programming_error: str | None
+    outputs: Mapping[str, Any]
     settings: tuple[ParameterMessage, ...]
     pending: tuple[Pending, ...]
     memory: Mapping[str, Any]
@@ -105,6 +109,8 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
         emitted=events_of(reactor["emitted"], find),
         in_vain=frozenset((activation, index) for activation, index in reactor["in_vain"]),
         problem=reactor["problem"],
+        programming_error=reactor["programming_error"],
+        outputs=reactor["outputs"],
         settings=tuple([ParameterMessage(**setting) for setting in reactor["settings"]]),
         pending=tuple(pending),
         memory={name: json.loads(memory) for name, memory in now.memory.items()},

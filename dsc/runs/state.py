@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict
 from typing import Any, Protocol
 
@@ -39,6 +39,8 @@ class ReactorState(Protocol):
         emitted: the latest outcome events of the plot.
         in_vain: periods without any effect since the last other message.
         problem: the reason why the run cannot continue, or `None`.
+        programming_error: the programming error that is this reason, or the first one of a listener; or `None`.
+        outputs: the outputs of the plot, after its end.
         settings: an operator's settings of plot parameters, by plot and parameter.
         caused_by: numbers of the trace records about started skills, by action id.
     """
@@ -47,6 +49,8 @@ class ReactorState(Protocol):
     emitted: tuple[Event, ...]
     in_vain: set[tuple[int, int]]
     problem: str | None
+    programming_error: str | None
+    outputs: Mapping[str, Any]
     settings: dict[tuple[str, str], ParameterMessage]
     caused_by: dict[str, int]
 
@@ -102,7 +106,7 @@ class RunState:
         # The types distinguish 1 and 1.0, which are equal.
         typed = tuple([(one, type(one.value)) for one in settings]) if settings else ()
         remembered = (
-            serial, state.finished, frozenset(reactor.in_vain), reactor.problem, typed,
+            serial, state.finished, frozenset(reactor.in_vain), reactor.problem, reactor.programming_error, typed,
         )  # fmt: skip
         if remembered != self._remembered or reactor.emitted is not self._emitted:
             self._remembered, self._emitted = remembered, reactor.emitted
@@ -256,6 +260,8 @@ def _reactor_form(reactor: ReactorState, short: Shortener) -> Form:
         "emitted": events_form(reactor.emitted, short),
         "in_vain": sorted(reactor.in_vain),
         "problem": reactor.problem,
+        "programming_error": reactor.programming_error,
+        "outputs": dict(reactor.outputs),
         "settings": [asdict(one) for one in reactor.settings.values()],
     }
 

@@ -284,9 +284,13 @@ class RunStore:
         )  # fmt: skip
         self.writing.before = version  # the next macrostep may be part of this transaction
 
-    def end(self, *, finished: bool, problem: str | None) -> None:
+    def end(self, reactor: ReactorState) -> None:
         """Write the end of the run."""
-        self.writing.end(self._run, text_of({"finished": finished, "problem": problem}), self._new_records())
+        ended = {
+            "finished": reactor.machine.state.finished, "problem": reactor.problem,
+            "programming_error": reactor.programming_error, "outputs": dict(reactor.outputs),
+        }  # fmt: skip
+        self.writing.end(self._run, text_of(ended), self._new_records())
 
     def take_up(self, library: Library) -> Kept:
         """Load the unfinished run, to be resumed; call this method outside of `writing`.

@@ -8,15 +8,15 @@ Arguments and answers are encoded, so that chart and component share no object b
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
 from dsc.components.component import Component
-from dsc.components.hooks import contained, give_up
+from dsc.components.hooks import contained, give_up, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.robot import Wiring, require_instances
 from dsc.engine import steps
@@ -31,8 +31,9 @@ from dsc.skills import SkillSignature
 from dsc.supervision.activation import ComponentActivation
 from dsc.supervision.component_registry import ComponentRegistry
 from dsc.supervision.skill_dependencies import SkillDependencies
-from knowledge_base.errors import InputError, UnknownNameError, described
+from knowledge_base.errors import InputError, UnknownNameError
 
+_LOG = logging.getLogger(__package__)
 DEFAULT_WITHIN = 300.0
 """Seconds after which a skill without `within` in its trigger is cancelled, so that every wait has a bound."""
 UNKNOWN_SKILL = SkillSignature("", "", {}, {}, {}, after_crash="repeat")
@@ -80,6 +81,11 @@ class Dispatcher:
         """Add a component, which replaces one with an equal name; skills that wait for it begin."""
         self.activation.deploy(component)
         self._wiring.deployed(component)
+
+    @property
+    def is_part(self) -> bool:
+        """Whether the run is a part of another run."""
+        return bool(self._part_of)
 
     def started(self) -> tuple[steps.Start, ...]:
         """Return the starts of skills that are running, or whose final answer was not handled yet."""
@@ -135,6 +141,19 @@ class Dispatcher:
             raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
         return self._components[name]
 
+    def skill_of(self, task: asyncio.Task[Any]) -> str | None:
+        """Return the skill whose execution is this task, as `arm.grasp`; `None` for other tasks."""
+        for running in tuple(self._running.values()):
+            if running.task is task:
+                return f"{running.start.component}.{running.start.skill}"
+        return None
+
+    def place_of(self, start: steps.Start) -> str:
+        """Return file and line of a skill; empty if they are unknown."""
+        component = self._components.get(start.component)
+        signature = None if component is None else component.skills().get(start.skill)
+        return "" if signature is None else signature.place
+
     def memories(self) -> Iterator[tuple[str, Any]]:
         """Yield names and memories of components.
 
@@ -143,10 +162,10 @@ class Dispatcher:
         for component in self._components.values():
             if type(component).remember is not Component.remember:
                 try:
-                    with contained():
+                    with contained(f"{component.name}.remember", component.device_errors):
                         memory = component.remember()
                 except Exception as error:  # noqa: BLE001  # the other components remember
-                    self._fault(f"component '{component.name}' cannot return its memory: {described(error)}")
+                    self._fault(f"component '{component.name}' cannot return its memory: {reason_of(error)}")
                 else:
                     yield component.name, memory
 
@@ -162,7 +181,7 @@ class Dispatcher:
             self.activation.look()
         component = self._components.get(start.component)
         if component is not None and type(component).forget is not Component.forget:
-            task = asyncio.get_running_loop().create_task(_forgotten(component, self._part_of + start.action_id))
+            task = asyncio.get_running_loop().create_task(self._forget(component, self._part_of + start.action_id))
             self._forget_tasks.add(task)
             task.add_done_callback(self._forget_tasks.discard)
 
@@ -211,10 +230,10 @@ class Dispatcher:
         component, action_id = self.component(start.component), self._part_of + start.action_id
         try:
             async with asyncio.timeout(CLOSING):
-                with contained():
+                with contained(f"{component.name}.abandon", component.device_errors):
                     ended = await component.abandon(action_id, start.skill, encoded(start.arguments))
         except Exception as error:  # an error of a component must not end the program
-            raise InputError(f"{start.component}.{start.skill} may continue: {described(error)}") from error
+            raise InputError(f"{start.component}.{start.skill} may continue: {reason_of(error)}") from error
         if ended is not None:
             signature = component.skills().get(start.skill, UNKNOWN_SKILL)
             outcome = validated(ended.outcome, start, signature)
@@ -246,7 +265,8 @@ class Dispatcher:
         signature = component.skills().get(start.skill, UNKNOWN_SKILL)
         within = start.within or (math.inf if signature.pattern == "event" else DEFAULT_WITHIN)
         due = within + (self._clock.now() if interrupted is None else interrupted.began)
-        running = RunningSkill(start, signature, within, due, self._clock, self._post, self._fault)
+        raises = component.device_errors
+        running = RunningSkill(start, signature, raises, within, due, self._clock, self._post, self._fault)
         running.task = asyncio.get_running_loop().create_task(self._execute(component, running, interrupted))
         running.task.add_done_callback(running.ended)
         self._running[start.action_id] = running
@@ -304,13 +324,15 @@ class Dispatcher:
         # The observations are true, also if they arrive late.
         return replace(late(start, running.within), observed=outcome.observed) if running.is_late else outcome
 
+    async def _forget(self, component: Component, action_id: str) -> None:
+        try:
+            with contained(f"{component.name}.forget", component.device_errors):
+                await component.forget(action_id)
+        except Exception:  # noqa: BLE001  # the action has ended: a later failure must not end the run
+            _LOG.info("component '%s' could not forget the action '%s'", component.name, action_id)
+
     def _cancel(self, activation: int) -> None:
         for running in tuple(self._running.values()):
             if running.start.activation == activation:
                 self.stop(running.start)
         self.timers.cancel(activation)
-
-
-async def _forgotten(component: Component, action_id: str) -> None:
-    with suppress(Exception), contained():  # the action has ended: a later error must not end the run
-        await component.forget(action_id)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -12,19 +13,20 @@ from dsc.components.component import Component
 from dsc.components.hooks import is_own, running_task
 from dsc.dynamic.library import Library
 from dsc.engine.steps import NO_CHANGE, Start
-from dsc.events import NO_ATTRIBUTES, RESERVED, SKILL_ERROR, TIMED_OUT, Event
+from dsc.events import NO_ATTRIBUTES, PROGRAMMING_ERROR, RESERVED, SKILL_ERROR, TIMED_OUT, Event
 from dsc.messages import KnowledgeMessage, ParameterMessage, SkillMessage
 from dsc.model.plot import ActionPlot
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock
 from dsc.skills import SkillSignature
 from dsc.trace import Trace
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
+from knowledge_base.errors import HistoryError, InputError, SchemaError, UnknownNameError, described
 from knowledge_base.facts import Delta
 from knowledge_base.language.checking.inputs import require, require_delta, require_text, shown
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.store import KnowledgeBase
 
+_LOG = logging.getLogger("dsc.skills")
 Declared = Mapping[str, str | None]
 """Types of attributes by name; `None` accepts any type."""
 
@@ -47,10 +49,23 @@ def _copied(value: Any, name: str) -> Any:
 # -- outcomes of skills ------------------------------------------------------------------------------------
 
 
-def broken(start: Start, reason: str) -> Outcome:
-    """Return the outcome `skill_error` of a skill that violated a rule, with the reason as one line."""
+def failed(start: Start, reason: str) -> Outcome:
+    """Return the outcome `skill_error` of a skill, with the reason as one line."""
     skill = f"{start.component}.{start.skill}"
     return Outcome(SKILL_ERROR, {"skill": skill, "reason": f"{skill}: {' '.join(reason.split())}"})
+
+
+def faulty(start: Start, reason: str) -> Outcome:
+    """Return the outcome `programming_error` of a skill; the reason begins with the skill or hook that is faulty."""
+    return Outcome(PROGRAMMING_ERROR, {"skill": f"{start.component}.{start.skill}", "reason": " ".join(reason.split())})
+
+
+def _invalid(start: Start, reason: str, place: str) -> Outcome:
+    """Return the outcome `programming_error` of a skill with an invalid outcome, and log the reason."""
+    where = f" ({place})" if place else ""
+    outcome = faulty(start, f"{start.component}.{start.skill}: {reason}{where}")
+    _LOG.error("%s", outcome.attributes["reason"])
+    return outcome
 
 
 def late(start: Start, seconds: float, missing: str = "") -> Outcome:
@@ -61,15 +76,15 @@ def late(start: Start, seconds: float, missing: str = "") -> Outcome:
 
 
 def validated(outcome: object, start: Start, signature: SkillSignature) -> Outcome:
-    """Return the outcome with encoded attributes, or a `skill_error` if the outcome violates the signature."""
+    """Return the outcome with encoded attributes, or a `programming_error` if the outcome violates the signature."""
     try:
         return _conforming(outcome, signature.outcomes)
     except InputError as error:
-        return broken(start, str(error))
+        return _invalid(start, str(error), signature.place)
     except BaseException as error:
         if not is_own(error, running_task()):
             raise
-        return broken(start, f"its outcome cannot be read: {described(error)}")
+        return _invalid(start, f"its outcome cannot be read: {described(error)}", signature.place)
 
 
 def _conforming(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
@@ -81,7 +96,7 @@ def _conforming(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
     event = str.__str__(event)  # a subclass, e.g. an `Enum`, may compare differently
     declared = NO_ATTRIBUTES if event == OBSERVED else outcomes.get(event)
     if declared is None:
-        raise InputError(f"it ended with '{event}', which it does not declare")
+        raise UnknownNameError(f"it ended with '{event}', which it does not declare", found=event, valid=outcomes)
     if not isinstance(attributes, Mapping):
         raise InputError(f"the attributes of '{event}' are a mapping, not {shown(attributes)}")
     if type(observed) is Delta and observed == NO_CHANGE:  # the common case
@@ -133,12 +148,15 @@ _FITS: Mapping[str | None, tuple[str, Callable[[object], bool]]] = {
 """Types of values that are not objects of the world, with a description and a test."""
 
 
-def validated_in_world(message: SkillMessage, knowledge: KnowledgeBase) -> SkillMessage:
-    """Return the message, or a `skill_error` if its outcome contradicts the schema or refers to unknown objects.
+def validated_in_world(message: SkillMessage, knowledge: KnowledgeBase, place: Callable[[Start], str]) -> SkillMessage:
+    """Return the message, or a `programming_error` if its outcome contradicts the schema or the world.
+
+    If the outcome only refers to objects that were deleted, the result is a `skill_error`: the skill could not know.
 
     Args:
         message: a message whose outcome conforms to the skill's signature.
         knowledge: the world before the observations of the outcome.
+        place: returns file and line of the skill.
     """
     said = message.outcome
     if said.observed is NO_CHANGE and not message.declared:
@@ -150,9 +168,26 @@ def validated_in_world(message: SkillMessage, knowledge: KnowledgeBase) -> Skill
             after.apply(said.observed)
         _require_objects(said.event, said.attributes, message.declared or {}, *worlds)
     except Exception as error:  # noqa: BLE001  # an outcome may contain anything, e.g. unhashable values
-        outcome = broken(message.start, described(error, named=not isinstance(error, InputError)))
+        reason = described(error, named=not isinstance(error, InputError))
+        if isinstance(error, UnknownNameError) and _was_deleted(error.found, knowledge):
+            outcome = failed(message.start, reason)
+        else:
+            outcome = _invalid(message.start, reason, place(message.start))
         return SkillMessage(message.start, outcome, final=True, goes_on=not message.final)
     return message
+
+
+def _was_deleted(name: str | None, knowledge: KnowledgeBase) -> bool:
+    """Return whether one of the latest `_MOST_SEARCHED` changes has deleted the object."""
+    try:
+        latest = knowledge.changes(since=max(0, knowledge.version - _MOST_SEARCHED))
+    except HistoryError:  # some of these changes are no longer kept
+        return False
+    return any(name in change.delta.removed_nodes for change in latest)
+
+
+_MOST_SEARCHED = 1_000
+"""Number of changes in which a deleted object is searched."""
 
 
 def _require_objects(event: str, attributes: Mapping[str, Any], declared: Declared, *worlds: World) -> None:

@@ -8,12 +8,11 @@ from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator,
 from functools import partial
 
 from dsc.components.component import Component
-from dsc.components.hooks import GRACE, contained
+from dsc.components.hooks import GRACE, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
 from dsc.messages import Told
 from dsc.sequencer.message_checks import encoded
-from knowledge_base.errors import described
 
 CLOSING = GRACE
 """Seconds for components to receive their last outputs, and for cancelled skills to stop."""
@@ -49,19 +48,21 @@ class Outbox:
 
     def send(self, component: Component, told: Told) -> None:
         """Deliver an output to the component, after all earlier outputs."""
-        self._begin(component, (told,), lambda: _take(component, told))
+        self._begin(component, _hook_of(told), (told,), lambda: _take(component, told))
 
     def restore(self, component: Component, effective: Sequence[SetParameter | SwitchMode]) -> None:
         """Deliver the settings that were effective before a restart: the parameters as one set, then the modes."""
         parameters = [one for one in effective if isinstance(one, SetParameter)]
         if parameters:
             values = {one.parameter: one.value for one in parameters}
-            self._begin(component, parameters, lambda: component.configure_all(encoded(values)))
+            self._begin(component, "configure_all", parameters, lambda: component.configure_all(encoded(values)))
         for one in effective:
             if isinstance(one, SwitchMode):
-                self._begin(component, (one,), partial(_restore_mode, component, one.mode))
+                self._begin(component, "switch", (one,), partial(_restore_mode, component, one.mode))
 
-    def _begin(self, component: Component, told: Iterable[Told], take: Callable[[], Awaitable[None]]) -> None:
+    def _begin(
+        self, component: Component, hook: str, told: Iterable[Told], take: Callable[[], Awaitable[None]]
+    ) -> None:
         numbers = {self._last + n: one for n, one in enumerate(told, start=1)}
         self._under_way |= numbers
         self._last = max(numbers)
@@ -72,7 +73,7 @@ class Outbox:
             if before is not None:
                 await asyncio.wait([before])
             try:
-                with contained():
+                with contained(f"{component.name}.{hook}", component.device_errors):
                     await take()
             except Exception:
                 self._refused.extend(numbers.values())
@@ -110,8 +111,18 @@ class Outbox:
         for name, task in self.untaken.items():
             why = failure(task) if task.done() else None
             if why is not None or task.cancelled() or not task.done():
-                reason = described(why) if why is not None else f"no answer within {CLOSING:g} s"
+                reason = reason_of(why) if why is not None else f"no answer within {CLOSING:g} s"
                 yield f"component '{name}' did not take its last output: {reason}"
+
+
+def _hook_of(told: Told) -> str:
+    match told:
+        case SetParameter():
+            return "configure"
+        case SwitchMode(mode=mode):
+            return "start" if mode == Life.INIT else "stop" if mode == Life.SHUTDOWN else "switch"
+        case SendMessage(port=port):
+            return port
 
 
 async def _take(component: Component, told: Told) -> None:

@@ -13,6 +13,7 @@ from dsc.calls import Outcome, SkillCall
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
+from dsc.errors import ProgrammingError, SkillError
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.sequencer import Sequencer
@@ -64,7 +65,8 @@ class PlotComponent(Component):
         Raises:
             UnknownNameError: there is no such plot.
             InputError: an argument is missing or unknown.
-            RuntimeError: the plot ended before its final state.
+            SkillError: the plot ended before its final state.
+            ProgrammingError: code failed in the run of the plot.
         """
         if skill_name not in self._signatures:
             message = f"component '{self.name}' has no skill '{skill_name}'"
@@ -83,8 +85,10 @@ class PlotComponent(Component):
 
         sequencer.listen(hear)
         end = await sequencer.run(skill_name, arguments)
+        if end.programming_error is not None:
+            raise ProgrammingError(end.programming_error)
         if not ended or end.problem is not None:
-            raise RuntimeError(end.problem or "it did not reach its end")
+            raise SkillError(end.problem or "it did not reach its end")
         return ended[0]
 
 

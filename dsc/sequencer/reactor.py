@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from dsc.calls import OBSERVED
-from dsc.components.hooks import contained
+from dsc.components.hooks import contained, programming_error
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import NO_CHANGE, Cancel, Output, SendLater, SetParameter, Start, StartTimer, Step
 from dsc.errors import RunawayError
-from dsc.events import EVERY, FAILURES, Event
+from dsc.events import EVERY, PROGRAMMING_ERROR, SKILL_FAILURES, Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.runs.kept import Kept
 from dsc.sequencer.step_tracing import StepTracer
@@ -22,6 +22,7 @@ from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.tracebacks import raised_at
 
 MOST_CANCELLED = 1_000
 """Upper bound of the number of cancelled skills whose cause is kept, for the trace of late observations."""
@@ -40,6 +41,9 @@ class Reactor:
         machine: the chart's state.
         emitted: the latest outcome events of the plot, in order, see `MOST_EMITTED`.
         problem: the reason to end the run, or the error of its last step; `None` without either.
+        programming_error: the programming error that is this reason, else `None`.
+        answered_bugs: the programming errors to which the plot has responded.
+        outputs: the outputs of the plot by name, after its end.
         in_vain: activation and number of periods without any effect since the last other message.
         settings: an operator's settings of plots, by plot and parameter.
         caused_by: by action id, the number of the trace record about the start of a skill that may still answer. Of
@@ -53,13 +57,18 @@ class Reactor:
         self.machine = Machine(library)
         self.trace = trace
         self.tracer = StepTracer(trace)
+        trace.blame = lambda error: self._note(error, "a listener of the trace")
         self.listeners: list[StepListener] = []
         self.emitted: tuple[Event, ...] = ()
         self.problem: str | None = None
+        self.programming_error: str | None = None
+        self.answered_bugs: set[str] = set()
+        self.outputs: Mapping[str, Any] = {}
         self.in_vain: set[tuple[int, int]] = set()
         self.settings: dict[tuple[str, str], ParameterMessage] = {}
         self.caused_by: dict[str, int] = {}
         self._cancelled: deque[str] = deque()
+        self._noted: set[str] = set()
 
     def restore(self, kept: Kept) -> None:
         """Restore the state after the last macrostep of an interrupted run."""
@@ -67,6 +76,8 @@ class Reactor:
         self.emitted = kept.emitted
         self.in_vain = set(kept.in_vain)
         self.problem = kept.problem
+        self.programming_error = kept.programming_error
+        self.outputs = kept.outputs
         for setting in kept.settings:
             self._set_default(setting)
         self.caused_by = {one.what.action_id: one.cause for one in kept.pending if isinstance(one.what, Start)}
@@ -113,6 +124,8 @@ class Reactor:
             output = self._commit(step)
             if event is not None and not step.handled:
                 self._unhandled(message, event)
+            elif event is not None and event.name == PROGRAMMING_ERROR:
+                self.answered_bugs.add(event.attributes["reason"])
         except (RunawayError, InputError) as error:
             self.problem = str(error)
             return ()
@@ -186,14 +199,28 @@ class Reactor:
 
     def _apply(self, delta: Delta, author: str) -> None:
         if delta:
-            self.knowledge.apply(delta, author)
+            try:
+                self.knowledge.apply(delta, author)
+            except ExceptionGroup as errors:
+                self._note(errors, "a listener of the knowledge base")
+
+    def _note(self, error: Exception, observer: str) -> None:
+        """Log an error of an observer, one time for each place; an observer must not stop the robot."""
+        place = raised_at(error)
+        if place in self._noted:
+            return
+        self._noted.add(place)
+        programming_error(error, observer)
+
+    def fail(self, bug: str) -> None:
+        """End the run with a programming error."""
+        self.problem = self.problem or bug
+        self.programming_error = self.programming_error or bug
 
     def _commit(self, step: Step) -> tuple[Output, ...]:
         """Record the step and apply its changes of knowledge; return its outputs, which may then be dispatched."""
         if self.listeners:
-            with contained():
-                for listener in self.listeners:
-                    listener(step)
+            self._tell(step)
         self.tracer.step(step)
         if step.decisions:
             self.tracer.decisions(step)
@@ -209,9 +236,24 @@ class Reactor:
                 self.tracer.told(output)
         if step.emitted:
             self.emitted = _latest((*self.emitted, *step.emitted))
+        self.outputs = step.outputs or self.outputs
         if step.errors:
             self.problem = self.problem or "; ".join(step.errors)
+        if step.bugs:
+            self.fail("; ".join(step.bugs))
         return step.output
+
+    def _tell(self, step: Step) -> None:
+        """Call the listeners; an `InputError` of a listener ends the run, and every other error only the listener."""
+        for listener in tuple(self.listeners):
+            try:
+                with contained():
+                    listener(step)
+            except InputError:
+                raise
+            except Exception as error:  # noqa: BLE001  # a listener may raise any error
+                self._note(error, "a listener of the sequencer")
+                self.listeners.remove(listener)
 
     def _forget_causes(self, cancelled: Iterable[str]) -> None:
         """Forget the causes of skills that were cancelled long ago; until then, the skills may still observe."""
@@ -226,12 +268,18 @@ class Reactor:
             self.in_vain.add((message.timer.activation, message.timer.index))
 
     def _unhandled(self, message: Message, event: Event) -> None:
-        """End the run if an active state ignores its skill's final answer, as the state would wait without end."""
+        """End the run if an active state ignores its skill's final answer, as the state would wait without end.
+
+        A programming error ends the run in any case.
+        """
+        if event.name == PROGRAMMING_ERROR and isinstance(message, SkillMessage):
+            self.fail(event.attributes["reason"])
+            return
         if not isinstance(message, SkillMessage) or not message.final or event.to is None:
             return
         if self.machine.state.has_activation(event.to):
             skill = f"{message.start.component}.{message.start.skill}"
-            whose = f": {event.attributes['reason']}" if event.name in FAILURES else f" of {skill}"
+            whose = f": {event.attributes['reason']}" if event.name in SKILL_FAILURES else f" of {skill}"
             self.problem = f"no transition handles '{event.name}'{whose}"
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 
-from dsc.components.hooks import contained
+from dsc.components.hooks import contained, reason_of
 from dsc.engine.steps import SendLater, SetParameter, Start, StartTimer, SwitchMode
 from dsc.messages import LateMessage, TimerMessage
 from dsc.runs.kept import Kept, Pending
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.running_skills import InterruptedSkill
-from knowledge_base.errors import InputError, described
+from knowledge_base.errors import InputError
 
 
 def require_components(kept: Kept, dispatcher: Dispatcher) -> None:
@@ -32,10 +32,11 @@ async def recover(kept: Kept, dispatcher: Dispatcher) -> None:
     """
     for name, memory in kept.memory.items():
         try:
-            with contained():
-                dispatcher.component(name).recall(memory)
+            remembering = dispatcher.component(name)
+            with contained(f"{name}.recall", remembering.device_errors):
+                remembering.recall(memory)
         except Exception as error:
-            raise InputError(f"component '{name}' cannot recall its data: {described(error)}") from error
+            raise InputError(f"component '{name}' cannot recall its data: {reason_of(error)}") from error
     for one in kept.pending:
         if one.cancelled and isinstance(one.what, Start):
             await dispatcher.abandon(one.what)

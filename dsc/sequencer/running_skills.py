@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 from dsc.blocking import DeadlineError
 from dsc.calls import Outcome, Reports
-from dsc.components.hooks import GRACE, give_up, give_up_after, is_own
+from dsc.components.hooks import GRACE, Classes, give_up, give_up_after, is_own, programming_error
 from dsc.engine.steps import Start
-from dsc.events import SKILL_ERROR
+from dsc.events import PROGRAMMING_ERROR, SKILL_ERROR
 from dsc.messages import SkillMessage
 from dsc.sequencer.clock import LoopClock
-from dsc.sequencer.message_checks import broken, late, validated
+from dsc.sequencer.message_checks import failed, faulty, late, validated
 from dsc.skills import SkillSignature
 from knowledge_base.errors import described
 
@@ -41,6 +41,7 @@ class RunningSkill:
     Args:
         start: the start of the skill.
         signature: the skill's signature.
+        raises: the exceptions that the component declares.
         within: maximum duration, in seconds.
         due: second of run time of the deadline; `math.inf` means no deadline.
         clock: run time.
@@ -60,6 +61,7 @@ class RunningSkill:
         self,
         start: Start,
         signature: SkillSignature,
+        raises: Classes,
         within: float,
         due: float,
         clock: LoopClock,
@@ -76,6 +78,7 @@ class RunningSkill:
         self._clock = clock
         self._post = post
         self._fault = fault
+        self._raises = raises
         self._expired = False
         self._timer: asyncio.TimerHandle | None = None
 
@@ -88,9 +91,9 @@ class RunningSkill:
             self.reports.put(validated(outcome, self.start, self.signature))
 
     def _post_report(self, report: Outcome, conflated: int) -> None:
-        failed = report.event == SKILL_ERROR
-        declared = None if failed else self.signature.outcomes.get(report.event)
-        self._post(SkillMessage(self.start, report, failed, goes_on=failed, conflated=conflated, declared=declared))
+        ends = report.event in {SKILL_ERROR, PROGRAMMING_ERROR}
+        declared = None if ends else self.signature.outcomes.get(report.event)
+        self._post(SkillMessage(self.start, report, ends, goes_on=ends, conflated=conflated, declared=declared))
 
     def answer(self, outcome: Outcome) -> None:
         """Post the end, one time; then stop the timer of the deadline."""
@@ -106,7 +109,7 @@ class RunningSkill:
         """Post a failure for a task that has ended without an answer, unless the skill was stopped."""
         why = asyncio.CancelledError("its task was cancelled") if task.cancelled() else task.exception()
         if why is not None and not self.stopped:
-            self.answer(broken(self.start, described(why)))
+            self.answer(self._outcome_of(why))
 
     def failed(self, error: BaseException, missing: str) -> Outcome | None:
         """Return the outcome of a skill that raised an error; `None` if its task was cancelled from outside."""
@@ -115,11 +118,14 @@ class RunningSkill:
             return late(self.start, self.within, missing)
         if not is_own(error, self.task):
             return None
-        if cancelled:
-            return broken(self.start, "CancelledError: it cancelled itself")
-        if self.is_late or issubclass(type(error), DeadlineError):
+        if issubclass(type(error), DeadlineError) or (self.is_late and issubclass(type(error), TimeoutError)):
             return late(self.start, self.within)
-        return broken(self.start, described(error))
+        outcome = self._outcome_of(error)
+        return late(self.start, self.within) if self.is_late and outcome.event == SKILL_ERROR else outcome
+
+    def _outcome_of(self, error: BaseException) -> Outcome:
+        bug = programming_error(error, f"{self.start.component}.{self.start.skill}", self._raises)
+        return failed(self.start, described(error)) if bug is None else faulty(self.start, str(bug))
 
     # -- time --------------------------------------------------------------------------------------------
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import dataclass, field
 from typing import Any
 
 from dsc.components.component import Component
+from dsc.components.hooks import programming_errors
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output
+from dsc.errors import ProgrammingError
 from dsc.events import GAVE_UP, NO_PLAN, Event
 from dsc.messages import FromOutside, LateMessage, Message, SkillMessage
 from dsc.runs.kept import Kept
@@ -21,6 +24,7 @@ from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.inbox import Inbox, LivelockGuard
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.recovery import recover, require_components
+from dsc.sequencer.watchdog import Watchdog
 from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
@@ -38,11 +42,28 @@ class RunEnd:
         finished: whether the plot reached its final state.
         emitted: the latest 100 outcome events of the plot, and the latest of each name, in order.
         problem: the reason if the run ended before the final state, or the error of its last step; else `None`.
+        outputs: the outputs of the plot by name; empty if the run ended before the final state.
+        programming_error: the first undeclared exception of user code to which the plot did not respond, with file and
+            line; else `None`. The run may have finished nevertheless, e.g. if only a listener failed.
     """
 
     finished: bool
     emitted: tuple[Event, ...] = ()
     problem: str | None = None
+    outputs: Mapping[str, Any] = field(default_factory=dict)
+    programming_error: str | None = None
+
+    @property
+    def reason(self) -> str:
+        """The reason why the run ended as it did, as one sentence without a full stop."""
+        if self.programming_error is not None:
+            return f"programming error in {self.programming_error}"
+        if self.problem is not None:
+            return self.problem
+        for event in reversed(self.emitted):
+            if event.name in {NO_PLAN, GAVE_UP}:
+                return f"{event.name}: {event.attributes.get('reason', 'no reason')}"
+        return f"the plot ended with '{self.emitted[-1].name}'" if self.emitted else "the plot reached its end"
 
     @property
     def reached(self) -> bool:
@@ -200,7 +221,7 @@ class Sequencer:
         async def begin() -> None:
             self._start(plot, given)
 
-        return await self._until_end(begin)
+        return await self._watched(begin)
 
     async def resume(self, kept: Kept) -> RunEnd:
         """Continue a run after its last macrostep, and return the end of the run.
@@ -213,9 +234,14 @@ class Sequencer:
             UnknownNameError: a component that the run needs is not deployed; the run is unchanged.
         """
         require_components(kept, self.dispatcher)
-        return await self._until_end(lambda: self._recover(kept))
+        return await self._watched(lambda: self._recover(kept))
 
-    async def _until_end(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
+    async def _watched(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
+        is_part = self.dispatcher.is_part  # the sequencer around it has a watchdog
+        with programming_errors() as bugs, nullcontext() if is_part else Watchdog(self.dispatcher.skill_of):
+            return await self._until_end(begin, bugs)
+
+    async def _until_end(self, begin: Callable[[], Awaitable[None]], bugs: Iterable[str]) -> RunEnd:
         reactor, machine, inbox = self._reactor, self._reactor.machine, self._inbox
         # The tracer subscribes before skills do, so that consequences of a change are recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
@@ -248,15 +274,20 @@ class Sequencer:
                 unsubscribe()
         if untaken and reactor.problem is None:
             reactor.problem = "; ".join(untaken)
-        end = RunEnd(self.machine.state.finished, reactor.emitted, reactor.problem)
-        self.trace.record("end", finished=end.finished, problem=end.problem)
+        unanswered = (bug for bug in bugs if bug not in reactor.answered_bugs)
+        bug = reactor.programming_error = reactor.programming_error or next(unanswered, None)
+        end = RunEnd(self.machine.state.finished, reactor.emitted, reactor.problem, reactor.outputs, bug)
+        self.trace.record(
+            "end", finished=end.finished, reached=end.reached, problem=end.problem, reason=end.reason,
+            outputs=end.outputs, programming_error=bug,
+        )  # fmt: skip
         self._keep_end()
         return end
 
     def _keep_end(self) -> None:
         if self.store is not None and self.store.begun and not self.store.lost:
             with self.store.writing:
-                self.store.end(finished=self.machine.state.finished, problem=self._reactor.problem)
+                self.store.end(self._reactor)
 
     async def _recover(self, kept: Kept) -> None:
         self._reactor.restore(kept)
@@ -264,6 +295,8 @@ class Sequencer:
             await recover(kept, self.dispatcher)
         except InputError as error:
             self._reactor.problem = str(error)
+            if isinstance(error.__cause__, ProgrammingError):
+                self._reactor.fail(str(error.__cause__))
 
     # -- macrosteps: commit, then dispatch ---------------------------------------------------------------
 
@@ -285,7 +318,7 @@ class Sequencer:
 
     def _take(self, message: Message) -> None:
         if isinstance(message, SkillMessage):
-            message = message_checks.validated_in_world(message, self.knowledge)
+            message = message_checks.validated_in_world(message, self.knowledge, self.dispatcher.place_of)
         if self.store is None:
             output = self._reactor.react(message)
         else:

@@ -7,10 +7,11 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
 
 from dsc.components.component import Component
-from dsc.components.hooks import GRACE, contained, give_up
+from dsc.components.hooks import GRACE, contained, give_up, reason_of
 from dsc.components.life_cycle import NEUTRAL, Announcer, Life
+from dsc.errors import ProgrammingError
 from dsc.supervision.component_registry import ComponentRegistry
-from knowledge_base.errors import InputError, described
+from knowledge_base.errors import InputError
 
 PAUSE = 1.0
 """Seconds before a failed component is restarted; the pause doubles after each failure."""
@@ -43,6 +44,7 @@ class ComponentActivation(Announcer):
         self._released: dict[str, asyncio.Task[None]] = {}
         self._looking = False
         self._closed = False
+        self._bugs: dict[str, ProgrammingError] = {}
         for component in registry.components.values():
             self._join(component)
 
@@ -123,13 +125,23 @@ class ComponentActivation(Announcer):
                 yield self._supervisors[name]
 
     def needed(self, component: Component | None) -> tuple[str, ...]:
-        """Return the names of components that `component` needs in its mode; raise `InputError` if its hook fails."""
-        try:
-            with contained():
-                return () if component is None else tuple(component.needed())
-        except Exception as error:
-            name = "" if component is None else component.name
-            raise InputError(f"`needed` of component '{name}' has failed: {described(error)}") from error
+        """Return the names of components that `component` needs in its mode; raise `InputError` if its hook fails.
+
+        A hook with a programming error is not called again.
+        """
+        if component is None:
+            return ()
+        name = component.name
+        error: Exception | None = self._bugs.get(name)
+        if error is None:
+            try:
+                with contained(f"{name}.needed", component.device_errors):
+                    return tuple(component.needed())
+            except ProgrammingError as bug:
+                error = self._bugs[name] = bug
+            except Exception as failure:  # noqa: BLE001  # the skill that needs the component fails
+                error = failure
+        raise InputError(f"`needed` of component '{name}' has failed: {reason_of(error)}") from error
 
     def announce(self) -> None:
         """Update the supervisors after a change of a component, then call the listeners."""
@@ -226,6 +238,11 @@ class Supervisor:
     def on(self) -> bool:
         """Whether the component is alive and active."""
         return self._on and self._component is not None and self._component.life.state is Life.ALIVE
+
+    @property
+    def bug(self) -> ProgrammingError | None:
+        """The programming error in a hook of the component, after which it is in FatalError; else `None`."""
+        return None if self._component is None else self._component.life.bug
 
     @property
     def lost(self) -> bool:

@@ -7,10 +7,11 @@ from collections.abc import MutableMapping
 
 from dsc.components.component import Component
 from dsc.components.hooks import contained
+from dsc.errors import SkillError
 from knowledge_base.errors import UnknownNameError
 
 
-class NotAliveError(Exception):
+class NotAliveError(SkillError):
     """A required component is not alive; the message has the reason."""
 
 
@@ -73,5 +74,5 @@ class ComponentRegistry:
 
 
 async def _reached(needing: Component, name: str) -> Component:
-    with contained():
+    with contained(f"{needing.name}.reach", needing.device_errors):
         return await needing.reach(name)

@@ -52,7 +52,7 @@ class SkillDependencies:
         elif self._component.life.state is not Life.ALIVE:
             await self._component.life.come_alive(self._component.start)
         if self._component.life.state is not Life.ALIVE:
-            raise NotAliveError(self._activation.registry.state_of(self._component.name))
+            raise NotAliveError(self._activation.registry.state_of(self._component.name)) from self._component.life.bug
 
     async def _supervised(self) -> None:
         supervisor = self._activation.supervisor(self._component)
@@ -63,6 +63,8 @@ class SkillDependencies:
             for one in supervisors:
                 if one.problem is not None:
                     raise one.problem
+                if one.bug is not None and one.name != self._component.name:
+                    raise NotAliveError(self._activation.registry.state_of(one.name)) from one.bug
             return all(one.on for one in supervisors) or supervisor.failures > before
 
         self._waits = True
@@ -76,14 +78,16 @@ class SkillDependencies:
             NotAliveError: the component or a dependency is lost; the work was cancelled.
         """
         me = asyncio.current_task()
-        lost: list[str] = []
+        lost: list[NotAliveError] = []
 
         def look() -> None:
             name = self._lost()
             if name is not None and not lost and me is not None:
                 # The component may restart before the cancellation arrives.
                 said = self._activation.registry.state_of(name)
-                lost.append(said if name == self._component.name else f"it needs {said}")
+                lost.append(NotAliveError(said if name == self._component.name else f"it needs {said}"))
+                known = self._activation.registry.known(name)
+                lost[0].__cause__ = None if known is None else known.life.bug
                 me.cancel()
 
         self._component.life.listen(look)
@@ -96,7 +100,7 @@ class SkillDependencies:
         except asyncio.CancelledError:
             if not lost or me is None or me.uncancel() > 0:  # or the state was exited, too
                 raise
-            raise NotAliveError(lost[0]) from None
+            raise lost[0] from lost[0].__cause__
         finally:
             self._component.life.leave(look)
             if self.concerned:

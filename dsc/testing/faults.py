@@ -24,6 +24,7 @@ from dsc.components.component import Component
 from dsc.components.endpoint import LocalTransport
 from dsc.components.life_cycle import Life, LifeCycle
 from dsc.engine.steps import SendLater, Start, Step
+from dsc.errors import SkillError
 from dsc.events import Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.sequencer.sequencer import Sequencer
@@ -69,7 +70,7 @@ _OF_EVENTS = (Fault.EVENT_LATE, Fault.EVENT_TWICE)
 _Component = TypeVar("_Component", bound=Component)
 
 
-class InjectedError(Exception):
+class InjectedError(SkillError):
     """The injected failure of a skill."""
 
 

@@ -31,6 +31,7 @@ from dsc.components.publication import Publisher, Subscription
 from dsc.components.remote import RemoteComponent
 from dsc.components.robot import Wiring
 from dsc.components.streams import Push, Stream
+from dsc.errors import ProgrammingError
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
 from dsc.supervision.activation import ComponentActivation
@@ -345,7 +346,7 @@ class TransportSuite:
     async def test_a_skill_that_fails_there_fails_here(self) -> None:
         """The error has the reason of the failure at the host."""
         async with self._robot() as (_, remote, __):
-            with pytest.raises(RefusedError, match=r"RuntimeError: a2\.0 fell"):
+            with pytest.raises(ProgrammingError, match=r"robot.fall: RuntimeError: a2\.0 fell"):
                 await remote.execute("fall", SkillCall("a2.0", LoopClock(), lambda _: None), {})
 
     @in_loop

@@ -75,7 +75,9 @@ class Notifier:
                 except Exception as error:  # noqa: BLE001  a failing listener must not prevent the calls of the others
                     errors.append(error)
                 except (SystemExit, GeneratorExit) as error:  # a listener must not end the program
-                    errors.append(RuntimeError(described(error)))
+                    exits = RuntimeError(described(error))
+                    exits.__cause__ = error
+                    errors.append(exits)
         except BaseException:  # after an interrupt, another thread must be able to deliver
             if self._deliverer is me:
                 self._deliverer = None

@@ -12,11 +12,12 @@ from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any, Generic, ParamSpec
 
-from knowledge_base.errors import InputError, Place, SchemaError, described, text_of
+from knowledge_base.errors import Place, SchemaError, UserCodeError, described, text_of
 from knowledge_base.language.checking.vocabulary import Read
 from knowledge_base.language.syntax.expression import Atom, Call, Term, TypedVariable, free_variables, substitute
 from knowledge_base.language.syntax.text import parse_term, to_text
 from knowledge_base.pddl.domain_text import parse_declaration
+from knowledge_base.tracebacks import raised_at
 
 MOST_NESTED = 8
 """Maximum nesting of computed predicates that read each other.
@@ -78,15 +79,17 @@ class Computed(Generic[_Inputs]):
         """Return the truth of the predicate for these input values.
 
         Raises:
-            InputError: the function raised an exception, or did not return `True` or `False`.
+            UserCodeError: the function raised an exception, or did not return `True` or `False`.
         """
         function: Callable[..., object] = self.function
         try:
             truth = function(*values)
         except (Exception, SystemExit, GeneratorExit) as error:  # user code must not end the program
-            raise InputError(described(error)) from error
+            raise UserCodeError(f"{described(error)}{raised_at(error)}") from error
         if type(truth) is not bool:
-            raise InputError(f"true or false is expected, and its function gave {text_of(truth, repr)}")
+            code = getattr(inspect.unwrap(function), "__code__", None)
+            where = "" if code is None else f" ({code.co_filename}:{code.co_firstlineno})"
+            raise UserCodeError(f"true or false is expected, and its function gave {text_of(truth, repr)}{where}")
         return truth
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dsc.cli.logs import PROGRAMMING_ERROR, Quiet, Verbose, show_logs
 from dsc.cli.runs import NoOpen, Port
 
 if TYPE_CHECKING:
@@ -68,15 +69,19 @@ def run_command(
         typer.Option("--allow-control", help="With --view: the page may pause the run, and post events and facts."),
     ] = False,
     no_wait: Annotated[bool, typer.Option("--no-wait", help="With --view: end with the run, not at Ctrl-C.")] = False,
+    verbose: Verbose = 0,
+    quiet: Quiet = False,
 ) -> None:
     """Run a robot.
 
-    Exit status: 0 goal reached, 1 something is left (the report says what and why), 2 bad input.
+    Exit status: 0 goal reached, 1 something is left (the report says what and why), 2 bad input. Status 3 reports an
+    exception in the code of the robot, and the log says where.
     """
     from dsc.trace import BEGINS
     from knowledge_base.errors import InputError
     from knowledge_base.output_files import Output
 
+    show_logs(verbose, quiet=quiet)
     settings = None if profile is None or not Path(profile).suffix else Path(profile)
     output = None if trace is None else Output(trace, "--trace", scenario, settings, store, resume, over=BEGINS)
     if resume is not None:
@@ -92,13 +97,17 @@ def run_command(
         bundle = _bundle(target)
         deployed = _deployed(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
                              durability, target)  # fmt: skip
-    follow = partial(_followed, deployed, simulated=not real_time, quiet=json, trace=output)
+    follow = partial(_followed, deployed, simulated=not real_time, quiet=json or quiet, trace=output)
     with deployed:
         if not view:
             report = follow()
             _print(report, as_json=json)
         else:
-            report = _viewed(deployed, follow, port, opens=not no_open, control=allow_control, wait=not no_wait)
+            report = _viewed(
+                deployed, follow, port, opens=not no_open, control=allow_control, wait=not no_wait, as_json=json
+            )
+    if report.programming_error is not None:
+        raise typer.Exit(PROGRAMMING_ERROR)
     raise typer.Exit(GOAL_REACHED if report.goal_reached else SOMETHING_LEFT)
 
 
@@ -170,7 +179,14 @@ def _resumed(store: Path, target: str | None, durability: Durability) -> Deploym
 
 
 def _viewed(
-    deployed: Deployment, follow: partial[Report], port: int, *, opens: bool, control: bool, wait: bool
+    deployed: Deployment,
+    follow: partial[Report],
+    port: int,
+    *,
+    opens: bool,
+    control: bool,
+    wait: bool,
+    as_json: bool,
 ) -> Report:
     """Run with a page in the browser, and return the report; with `wait`, the page stays open after the run."""
     from dsc.cli.runs import page, until_interrupt, viewer_installed
@@ -185,7 +201,7 @@ def _viewed(
     with page(live, opens=opens) as viewer:
         report = follow(prepare=live.control.attach if live.control else None)
         live.end()
-        _print(report, as_json=bool(follow.keywords["quiet"]))
+        _print(report, as_json=as_json)
         if wait:
             until_interrupt(viewer)
     return report

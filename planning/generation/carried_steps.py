@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dsc.dynamic.library import Library
-from dsc.events import FAILURES
+from dsc.events import SKILL_FAILURES
 from dsc.model.actions import Configure, Switch, Trigger, component_of, flat
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import Rule
@@ -77,7 +77,7 @@ def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] =
 
 def _applied(rules: Iterable[Rule], plots: Sequence[ActionPlot]) -> list[Rule]:
     """Return the rules that may apply to a step with these plots as candidates."""
-    emitted = FAILURES.union(*(plot.emits for plot in plots))
+    emitted = SKILL_FAILURES.union(*(plot.emits for plot in plots))
     actions = {plot.implements for plot in plots}
     named = [rule for rule in rules if not rule.steps or actions.intersection(rule.steps)]
     return [rule for rule in named if rule.on is None or rule.on in emitted]

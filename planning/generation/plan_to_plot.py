@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from dsc.dynamic.library import Library
-from dsc.events import FAILURES, GAVE_UP
+from dsc.events import GAVE_UP, SKILL_FAILURES
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import CONTINUE, REPLAN, Rule
 from planning.domain import PlanningDomain
@@ -66,7 +66,7 @@ def laid_out(
     writing = None if library is None else Carrier.of(domain, library, rules)
     steps = [sketched(step, domain) if writing is None else writing.carried(step) for step in plan.steps]
     order = order.restricted(_clashes([step.usage for step in steps], order, shared))
-    outcomes = FAILURES.union(*(step.outcomes for step in steps))
+    outcomes = SKILL_FAILURES.union(*(step.outcomes for step in steps))
     answering = [rule for rule in rules if rule.on is None or rule.on in outcomes]
     return Layout(steps, order, _lanes(order, steps), answering)
 

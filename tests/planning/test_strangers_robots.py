@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -38,6 +39,12 @@ def dsc(*words, status=0, env=None):
     )  # fmt: skip
     assert done.returncode == status, done.stdout + done.stderr
     return done.stdout if status in {0, 1} else done.stderr
+
+
+def dsc_both(*words):
+    """Return standard output and standard error of a command that succeeds."""
+    done = subprocess.run([DSC, *map(str, words)], capture_output=True, text=True, timeout=120, check=True)
+    return done.stdout, done.stderr
 
 
 # -- targets ---------------------------------------------------------------------------------------------------
@@ -198,6 +205,43 @@ def test_other_commands_take_the_same_targets(project):
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (2, "")
     assert "take.yaml:5:16: no component offers the skill 'griper.grasp'; did you mean 'gripper.grasp'?" in done.stdout
+
+
+# -- bugs in the robot's code ------------------------------------------------------------------------------
+
+
+BUGS = {
+    "in a skill": ("room = self.house.at[parcel] =", "room = self.hous.at[parcel] =", "gripper.put: AttributeError"),
+    "in an outcome": ('Outcome("taken",', 'Outcome("takn",', "gripper.grasp: it ended with 'takn'"),
+    "in an observation": ('fact("holding", parcel),)))', 'fact("holds", parcel),)))', "gripper.grasp: there is no predicate 'holds'"),
+    "in a fault": ('self.house.fault(call', 'self.house.falt(call', "wheels.drive: AttributeError"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", BUGS)
+def test_a_bug_ends_the_command_with_status_3_and_its_line(project, kind):
+    right, wrong, said = BUGS[kind]
+    file = project / "delivery.py"
+    text = file.read_text()
+    assert right in text
+    file.write_text(text.replace(right, wrong, 1))
+    done = subprocess.run([DSC, "run", project, "--json"], capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    report = json.loads(done.stdout)
+    assert said in report["programming_error"]
+    assert re.search(r"delivery\.py:\d+\)$", report["programming_error"])
+    assert report["goal_reached"] is False
+    assert report["skill_failures"].get("programming_error") == 1
+    assert done.stderr.count("ERROR dsc.") == 1
+    assert ("Traceback" in done.stderr) == ("Error" in said)
+
+
+def test_the_log_is_as_long_as_the_user_wants_it(project):
+    silent = dsc_both("run", project, "-q")
+    assert "drives to" not in silent[0]
+    assert len(silent[0].splitlines()) < len(dsc_both("run", project)[0].splitlines())
+    assert silent[1] == ""
+    assert "INFO dsc.components: component 'gripper': alive" in dsc_both("run", project, "-v")[1]
 
 
 # -- kept runs -------------------------------------------------------------------------------------------------

@@ -61,9 +61,9 @@ def dispatch_before_commit(monkeypatch):
         step(self, *args)
         writing.connection, writing._cursor = connection, cursor
 
-    def kept(self, **how):
+    def kept(self, reactor):
         later.written(self.writing.connection)
-        end(self, **how)
+        end(self, reactor)
 
     monkeypatch.setattr(RunStore, "step", put_off)
     monkeypatch.setattr(RunStore, "end", kept)

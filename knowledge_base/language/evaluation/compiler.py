@@ -16,7 +16,7 @@ from functools import partial
 from itertools import chain
 from operator import itemgetter
 
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, UserCodeError
 from knowledge_base.facts import Fact
 from knowledge_base.language.checking.check import check_arity
 from knowledge_base.language.checking.vocabulary import Vocabulary
@@ -182,7 +182,8 @@ def _computed(atom: Atom, schema: Vocabulary) -> Test:
             return of.judge(values)
         except InputError as error:
             said = Fact(of.name, arguments(world, bindings))
-            raise InputError(f"{said} cannot be computed: {error}", place=atom.place) from error
+            kind = UserCodeError if isinstance(error, UserCodeError) else InputError
+            raise kind(f"{said} cannot be computed: {error}", place=atom.place) from error
 
     return test
 

@@ -17,6 +17,7 @@ from dsc import blocking
 from dsc.calls import Outcome, SkillCall
 from dsc.components.component import Component
 from dsc.components.robot import component_of
+from dsc.errors import ProgrammingError, SkillError
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.skills import skill
 from knowledge_base.errors import InputError
@@ -206,7 +207,7 @@ def test_a_blocking_skill_runs_in_a_process_and_reports():
     ],
 )
 def test_what_goes_wrong_in_a_process_is_told(name, why):
-    with pytest.raises(RuntimeError, match=why):
+    with pytest.raises(SkillError if name == "dies" else ProgrammingError, match=why):
         execute(Far(), name)
 
 

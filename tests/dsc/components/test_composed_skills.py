@@ -95,7 +95,7 @@ SERVE = """
     plot: p
     emits: {sorry: {}}
     states:
-      a: {entry: {trigger: arm.SKILL}, after: {seconds: LIMIT, to: e}, on: {served: e, not_served: {to: e, emit: sorry}, timed_out: e, skill_error: {to: e, emit: sorry}}}
+      a: {entry: {trigger: arm.SKILL}, after: {seconds: LIMIT, to: e}, on: {served: e, not_served: {to: e, emit: sorry}, timed_out: e, programming_error: {to: e, emit: sorry}}}
       e: {final: true}
 """
 
@@ -180,16 +180,16 @@ def test_how_a_tree_ends_is_declared(success, outcomes, why):
         tree_skill(success, "not_served", outcomes)
 
 
-def test_an_action_of_a_tree_that_ends_with_no_outcome_is_a_skill_error():
+def test_an_action_of_a_tree_that_ends_with_no_outcome_is_a_programming_error():
     ran = serve("says_nothing", Butler())
     (reason,) = [event["attributes"].get("reason") for event in ran.of_type("event")]
-    assert reason == "arm.says_nothing: InputError: the action 'mute' ended with None, which is not an outcome"
+    assert reason == "arm.says_nothing: the action 'mute' ended with None, which is not an outcome"
 
 
 @pytest.mark.parametrize(
     ("how", "reason"), [("raise", "the gripper is stuck"), ("exit", "SystemExit: the driver says no")]
 )
-def test_what_an_action_of_a_tree_raises_is_a_skill_error(how, reason):
+def test_what_an_action_of_a_tree_raises_is_a_programming_error(how, reason):
     ran = serve(f"raises, with: {{how: {how}}}", Butler())
     assert any(reason in event["attributes"].get("reason", "") for event in ran.of_type("event"))
 
@@ -269,7 +269,7 @@ def test_a_plot_that_is_a_skill_is_left_when_it_is_cancelled():
     assert arm.log == ["grasp cup7", "cancelled", "mode neutral"]
 
 
-def test_a_plot_that_is_a_skill_and_gets_stuck_is_a_skill_error():
+def test_a_plot_that_is_a_skill_and_gets_stuck_is_a_programming_error():
     stuck = "{plot: stuck, states: {a: {on: {never: e}}, e: {final: true}}}"
     ran = Ran(
         "{plot: p, states: {a: {entry: {trigger: helper.stuck}, on: {completed: e}}, e: {final: true}}}",

@@ -6,6 +6,7 @@ import asyncio
 import signal
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from dsc_charts import plot
@@ -17,6 +18,7 @@ from dsc.components.behaviour_trees import action, condition, sequence, tree_ski
 from dsc.components.component import Component
 from dsc.components.ports import takes
 from dsc.dynamic.library import Library
+from dsc.errors import SkillError
 from dsc.events import Event
 from dsc.sequencer import dispatcher, message_checks, running_skills
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
@@ -33,7 +35,7 @@ ANSWERS = """
     states:
       a:
         entry: {trigger: arm.SKILL, within: 100}
-        on: {ok: e, skill_error: {to: f, assign: {why: ?event.reason}}, timed_out: l}
+        on: {ok: e, programming_error: {to: f, assign: {why: ?event.reason}}, timed_out: l}
       e: {final: true}
       f: {final: true, emit: because, with: {why: ?why}}
       l: {final: true, emit: late}
@@ -173,15 +175,15 @@ def raising(make):
 
 
 def answers(ran):
-    return [event for event in ran.of_type("event") if event["name"] in {"ok", "skill_error", "timed_out"}]
+    return [event for event in ran.of_type("event") if event["name"] in {"ok", "programming_error", "timed_out"}]
 
 
 @pytest.mark.parametrize("where", ["awaited", "later", "in_thread", "tree", "tests"])
 @pytest.mark.parametrize("kind", RAISED)
-def test_whatever_ends_a_skill_is_one_skill_error(kind, where):
+def test_whatever_ends_a_skill_is_one_programming_error(kind, where):
     ran = Ran(ANSWERS.replace("SKILL", where), arm=Hostile(raising(RAISED[kind])))
     (event,) = answers(ran)
-    assert event["name"] == "skill_error"
+    assert event["name"] == "programming_error"
     assert event["attributes"]["reason"].isprintable()
     assert len(event["attributes"]["reason"]) < 500
     assert ran.at < 2
@@ -189,10 +191,10 @@ def test_whatever_ends_a_skill_is_one_skill_error(kind, where):
 
 @pytest.mark.parametrize("where", ["awaited", "in_thread", "reports", "reports_from_thread"])
 @pytest.mark.parametrize("kind", RETURNED)
-def test_whatever_a_skill_says_that_cannot_be_is_one_skill_error(kind, where):
+def test_whatever_a_skill_says_that_cannot_be_is_one_programming_error(kind, where):
     ran = Ran(ANSWERS.replace("SKILL", where), arm=Hostile(RETURNED[kind]))
     (event,) = answers(ran)
-    assert event["name"] == ("ok" if kind == "odd event" and event["name"] == "ok" else "skill_error")
+    assert event["name"] == ("ok" if kind == "odd event" and event["name"] == "ok" else "programming_error")
     assert ran.at < 2
 
 
@@ -200,12 +202,19 @@ def test_whatever_a_skill_says_that_cannot_be_is_one_skill_error(kind, where):
 def test_what_cannot_be_said_while_it_is_told_something_fails_the_next_skill(kind):
     text = ANSWERS.replace("{trigger: arm.SKILL, within: 100}", "[{send: arm.told}, {trigger: arm.goes, within: 100}]")
     ran = Ran(text, arm=Hostile(raising(RAISED[kind])))
-    assert [event["name"] for event in answers(ran)] == ["skill_error"]
+    assert [event["name"] for event in answers(ran)] == ["programming_error"]
 
 
 @pytest.mark.parametrize("kind", RAISED)
-def test_what_is_raised_at_the_time_limit_is_timed_out(kind):
+def test_what_is_raised_at_the_time_limit_is_not_hidden_by_the_limit(kind):
     ran = Ran(ANSWERS.replace("SKILL", "while_cancelled"), arm=Hostile(raising(RAISED[kind])))
+    assert [event["name"] for event in answers(ran)] == ["programming_error"]
+    assert ran.at == 100
+
+
+@pytest.mark.parametrize("error", [SkillError("no power"), TimeoutError("no answer")])
+def test_a_device_that_fails_at_the_time_limit_has_timed_out(error):
+    ran = Ran(ANSWERS.replace("SKILL", "while_cancelled"), arm=Hostile(raising(lambda: error)))
     assert [event["name"] for event in answers(ran)] == ["timed_out"]
     assert ran.at == 100
 
@@ -217,7 +226,7 @@ def test_an_answer_after_the_time_limit_is_none_but_what_it_observed_is_known():
     assert ran.kb.ask("(p)")
 
 
-def test_a_task_that_others_cancel_is_a_skill_error():
+def test_a_task_that_others_cancel_is_a_programming_error():
     def cancel_all():
         for task in asyncio.all_tasks():
             if "_execute" in repr(task):
@@ -238,11 +247,11 @@ def test_a_task_that_others_cancel_is_a_skill_error():
         arm = Cancels(cancel_all)
         ran = Ran(ANSWERS.replace("SKILL", where), arm=arm, prepare=cancel_soon if where == "goes" else None)
         (event,) = answers(ran)
-        assert event["name"] == "skill_error"
+        assert event["name"] == "programming_error"
         assert "cancelled" in event["attributes"]["reason"]
 
 
-@pytest.mark.parametrize("broken_part", ["validated", "broken"])
+@pytest.mark.parametrize("broken_part", ["validated", "faulty"])
 def test_the_time_limit_holds_even_if_the_handler_of_ends_fails(broken_part, monkeypatch):
     def fails(*_):
         raise RuntimeError("a fault of our own")
@@ -251,11 +260,11 @@ def test_the_time_limit_holds_even_if_the_handler_of_ends_fails(broken_part, mon
         monkeypatch.setattr(module, broken_part, fails, raising=module is not dispatcher)
     ran = Ran(
         ANSWERS.replace("SKILL", "awaited"),
-        arm=Hostile(raising(NoTextError) if broken_part == "broken" else lambda: Outcome("ok")),
+        arm=Hostile(raising(NoTextError) if broken_part == "faulty" else lambda: Outcome("ok")),
     )
     (event,) = answers(ran)
-    assert event["name"] == ("timed_out" if broken_part == "broken" else "skill_error")
-    assert ran.at == (100 if broken_part == "broken" else 0)
+    assert event["name"] == ("timed_out" if broken_part == "faulty" else "programming_error")
+    assert ran.at == (100 if broken_part == "faulty" else 0)
 
 
 @pytest.mark.parametrize("presses", [1, 2])
@@ -292,7 +301,7 @@ def test_a_plot_as_a_skill_says_what_failed_in_it(kind):
     outer = PlotComponent("arm", Library([inner]), [Hostile(raising(RAISED[kind]))])
     ran = Ran(ANSWERS.replace("arm.SKILL", "arm.inner").replace("ok: e", "completed: e"), arm=outer)
     (event,) = answers(ran)
-    assert event["name"] == "skill_error"
+    assert event["name"] == "programming_error"
     assert "arm.awaited" in event["attributes"]["reason"]
 
 
@@ -307,7 +316,7 @@ USES = """
       a:
         entry: [{set: arm.speed, to: 1}, {trigger: arm.goes, within: 100}]
         exit: {switch: arm, to: shutdown}
-        on: {ok: e, skill_error: f, timed_out: f}
+        on: {ok: e, programming_error: f, timed_out: f}
       e: {final: true}
       f: {final: true}
 """
@@ -351,7 +360,7 @@ def test_a_hook_that_exits_fails_and_the_run_goes_on(hook, kind):
     assert hook in arm.called
     assert ran.end.finished
     failed = [event["name"] for event in ran.of_type("event")]
-    assert failed == (["skill_error"] if hook in {"start", "activate", "configure"} else ["ok"])
+    assert failed == (["programming_error"] if hook in {"start", "activate", "configure"} else ["ok"])
     assert ("did not take" in (ran.end.problem or "")) == (hook == "stop")
 
 
@@ -375,7 +384,7 @@ def test_needs_that_cannot_be_read_fail_the_skills_of_their_component_only(kind)
     both = """
         plot: p
         states:
-          a: {entry: [{trigger: needy.goes, within: 100}, {trigger: arm.goes, within: 100}], on: {skill_error: {}, ok: e}}
+          a: {entry: [{trigger: needy.goes, within: 100}, {trigger: arm.goes, within: 100}], on: {programming_error: {}, ok: e}}
           e: {final: true}
     """
     ran = Ran(both, arm=Hooked("none", EXITS[kind]), prepare=prepare)
@@ -383,11 +392,12 @@ def test_needs_that_cannot_be_read_fail_the_skills_of_their_component_only(kind)
     failed, ok = reasons
     assert ok.name == "ok"
     assert failed.attributes["skill"] == "needy.goes"
-    assert "`needed` of component 'needy' has failed" in failed.attributes["reason"]
+    assert failed.attributes["reason"].startswith("needy.needed: ")
+    assert ran.end.programming_error is None  # the plot has handled it
 
 
 @pytest.mark.parametrize("where", ["listener", "subscriber"])
-def test_an_observer_that_exits_fails_in_its_own_name(where):
+def test_an_observer_that_exits_stops_no_robot_and_is_in_the_end_of_the_run(where, caplog):
     def exits(_):
         sys.exit("the window")
 
@@ -398,9 +408,11 @@ def test_an_observer_that_exits_fails_in_its_own_name(where):
             sequencer.knowledge.subscribe(exits)
 
     arm = Hostile(lambda: Outcome("ok", observed=Delta(added=(fact("p"),))))
-    with pytest.raises((RuntimeError, ExceptionGroup)) as failed:
-        Ran(ANSWERS.replace("SKILL", "awaited"), arm=arm, prepare=prepare)
-    assert "the window" in repr(failed.value)
+    end = Ran(ANSWERS.replace("SKILL", "awaited"), arm=arm, prepare=prepare).end
+    assert (end.finished, end.problem) == (True, None)
+    assert "the window" in str(end.programming_error)
+    assert f"{Path(__file__).name}:" in str(end.programming_error)
+    assert "Traceback" in caplog.text
 
 
 # -- late --------------------------------------------------------------------------------------------------

@@ -111,7 +111,7 @@ def test_a_test_of_an_event_that_goes_wrong_fails_the_activation_and_not_who_has
         states:
           o:
             regions:
-              r1: {states: {x: {entry: {trigger: battery.low}, on: {low: {}, skill_error: {to: y, assign: {why: ?event.reason}}}}, y: {final: true}}}
+              r1: {states: {x: {entry: {trigger: battery.low}, on: {low: {}, programming_error: {to: y, assign: {why: ?event.reason}}}}, y: {final: true}}}
               r2: {states: {z: {entry: {trigger: battery.run}, on: {ran: e}}, e: {final: true}}}
             on: {done: {to: f, emit: because, with: {why: ?why}}}
           f: {final: true}

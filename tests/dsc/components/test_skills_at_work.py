@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import math
+import re
 import sys
+from pathlib import Path
 
 import pytest
 from dsc_runs import SLOW, Arm, Ran
@@ -146,7 +148,7 @@ BREAKS = """
     states:
       a:
         entry: {trigger: arm.breaks, with: {how: HOW}, within: 100}
-        on: {ok: e, skill_error: {to: f, assign: {why: ?event.reason}}, timed_out: e}
+        on: {ok: e, programming_error: {to: f, assign: {why: ?event.reason}}, timed_out: e}
       e: {final: true}
       f: {final: true, emit: because, with: {why: ?why}}
 """
@@ -165,7 +167,7 @@ BREAKS = """
         ("no_data", "object"),
     ],
 )
-def test_whatever_a_skill_does_wrong_is_a_skill_error(how, reason):
+def test_whatever_a_skill_does_wrong_is_a_programming_error(how, reason):
     ran = Ran(BREAKS.replace("HOW", how))
     assert ran.end.finished
     (event,) = ran.end.emitted
@@ -252,7 +254,7 @@ SAYS = BREAKS.replace("arm.breaks, with: {how: HOW}", "arm.SKILL").replace("ok: 
     ({"whi": "so"}, "the outcome 'said' has no attribute 'whi'; did you mean 'why'?"),
 ])  # fmt: skip
 @pytest.mark.parametrize("skill_name", ["says", "reports"])
-def test_attributes_that_do_not_fit_their_declaration_are_a_skill_error(wrong, reason, skill_name):
+def test_attributes_that_do_not_fit_their_declaration_are_a_programming_error(wrong, reason, skill_name):
     forks = Delta(nodes={"fork": "object"}, added=(fact("p"),))
     ran = Ran(SAYS.replace("SKILL", skill_name), arm=Sayer(FITTING | wrong, forks), things=["cup1", "cup2"])
     (event,) = ran.end.emitted
@@ -261,14 +263,15 @@ def test_attributes_that_do_not_fit_their_declaration_are_a_skill_error(wrong, r
     assert ran.at == 0
 
 
-def test_an_attribute_that_is_missing_is_a_skill_error_that_names_it():
+def test_an_attribute_that_is_missing_is_a_programming_error_that_names_it():
     ran = Ran(
         SAYS.replace("SKILL", "says"),
         arm=Sayer({name: value for name, value in FITTING.items() if name != "item"}),
         things=["cup1", "cup2"],
     )
     (event,) = ran.end.emitted
-    assert event.attributes["why"] == "arm.says: the outcome 'said' needs its attribute 'item' of type item"
+    assert event.attributes["why"].startswith("arm.says: the outcome 'said' needs its attribute 'item' of type item (")
+    assert f"{Path(__file__).name}:" in event.attributes["why"]
 
 
 @pytest.mark.parametrize(("item", "observed"), [
@@ -293,7 +296,10 @@ def test_a_skill_that_reports_what_is_no_outcome_of_its_own_is_stopped():
 
     ran = Ran(BREAKS.replace("arm.breaks, with: {how: HOW}", "arm.chats"), arm=Chatty())
     (event,) = ran.end.emitted
-    assert event.attributes["why"] == "arm.chats: it ended with 'hello', which it does not declare"
+    place = Chatty().skills()["chats"].place
+    assert (
+        event.attributes["why"] == f"arm.chats: it ended with 'hello', which it does not declare; valid: ok ({place})"
+    )
     assert ran.at == 0
 
 
@@ -330,7 +336,7 @@ def test_a_skill_that_has_failed_by_what_it_reported_answers_no_more(what, and_t
           a:
             entry: {trigger: arm.chats, within: 100}
             on:
-              skill_error: {assign: {failed: (+ ?failed 1)}}
+              programming_error: {assign: {failed: (+ ?failed 1)}}
               ok: {assign: {others: (+ ?others 1)}}
               so_far: {assign: {others: (+ ?others 1)}}
             after: {seconds: 1, to: e}
@@ -351,14 +357,16 @@ def test_what_goes_wrong_in_a_plot_inside_comes_to_the_state_that_holds_it():
         plot: p
         emits: {because: {why: text}}
         states:
-          a: {use: middle, on: {done: e, skill_error: {to: e, emit: because, with: {why: ?event.reason}}}}
+          a: {use: middle, on: {done: e, programming_error: {to: e, emit: because, with: {why: ?event.reason}}}}
           e: {final: true}
         """,
         inner,
         middle,
     )
     (event,) = ran.end.emitted
-    assert event.attributes["why"] == "arm.breaks: RuntimeError: the gripper is stuck"
+    assert re.fullmatch(
+        r"arm.breaks: RuntimeError: the gripper is stuck \(.*dsc_runs.py:\d+\)", event.attributes["why"]
+    )
 
 
 def test_a_rule_answers_what_goes_wrong_in_a_plot_inside():
@@ -419,7 +427,7 @@ def test_a_skill_has_a_bound_even_if_nobody_says_so():
 @pytest.mark.parametrize(
     "entry", ["{trigger: arm.grap}", "{trigger: arm.grasp, with: {itm: cup1}}", "{trigger: arm.grasp}"]
 )
-def test_a_wrong_call_of_a_skill_is_a_skill_error_that_says_so(entry):
+def test_a_wrong_call_of_a_skill_is_a_programming_error_that_says_so(entry):
     class Strict(Arm):
         @skill(outcomes={"grasped": {}})
         async def grasp(self, call, item):  # type: ignore[override]
@@ -427,7 +435,7 @@ def test_a_wrong_call_of_a_skill_is_a_skill_error_that_says_so(entry):
 
     ran = Ran("{plot: p, states: {a: {entry: " + entry + ", on: {grasped: e}}, e: {final: true}}}", arm=Strict())
     assert not ran.end.finished
-    assert "no transition handles 'skill_error'" in (ran.end.problem or "")
+    assert (ran.end.finished, ran.end.programming_error) == (False, ran.end.problem)
     assert "grasp" in (ran.end.problem or "")
 
 
@@ -437,7 +445,7 @@ def test_a_component_that_cannot_be_configured_fails_the_skill_that_needs_it():
         states:
           a:
             entry: [{set: arm.approach, to: impossible}, {trigger: arm.grasp}]
-            on: {grasped: wrong, skill_error: b}
+            on: {grasped: wrong, programming_error: b}
           b: {entry: [{set: arm.approach, to: side}, {trigger: arm.grasp}], on: {grasped: e}}
           wrong:
           e: {final: true}
@@ -452,11 +460,12 @@ def test_a_component_that_exits_while_it_is_configured_fails_the_skill_that_need
         async def configure(self, parameter, value):
             sys.exit("no driver")
 
-    text = "{plot: p, states: {a: {entry: [{set: arm.speed, to: 1}, {trigger: arm.grasp}], on: {grasped: x, skill_error: e}}, x: {}, e: {final: true}}}"
+    text = "{plot: p, states: {a: {entry: [{set: arm.speed, to: 1}, {trigger: arm.grasp}], on: {grasped: x, programming_error: e}}, x: {}, e: {final: true}}}"
     ran = Ran(text, arm=Exits())
     assert ran.end.finished
     (event,) = ran.of_type("event")
-    assert event["attributes"]["reason"] == "arm.grasp: RuntimeError: SystemExit: no driver"
+    assert event["attributes"]["skill"] == "arm.grasp"
+    assert event["attributes"]["reason"].startswith("arm.configure: SystemExit: no driver (")
 
 
 def test_a_component_that_is_for_ever_being_configured_is_timed_out():
@@ -475,7 +484,7 @@ def test_a_component_that_is_for_ever_being_configured_is_timed_out():
 
 @pytest.mark.parametrize(
     ("value", "slow", "why"),
-    [("impossible", 0.0, "RuntimeError: cannot be set"), ("side", 1e6, "no answer within 30 s")],
+    [("impossible", 0.0, "arm.configure: RuntimeError: cannot be set ("), ("side", 1e6, "no answer within 30 s")],
 )
 def test_a_component_that_cannot_be_configured_is_told_also_when_no_skill_needs_it(value, slow, why):
     ran = Ran(
@@ -488,7 +497,8 @@ def test_a_component_that_cannot_be_configured_is_told_also_when_no_skill_needs_
         arm=Arm(slow_to_configure=slow),
     )
     assert ran.end.finished
-    assert ran.end.problem == f"component 'arm' did not take its last output: {why}"
+    assert str(ran.end.problem).startswith(f"component 'arm' did not take its last output: {why}")
+    assert (ran.end.programming_error is None) == bool(slow)
 
 
 # -- components --------------------------------------------------------------------------------------------

@@ -295,7 +295,7 @@ def test_a_skill_that_was_not_believed_is_stopped_even_if_the_crash_came_first(t
         """
         plot: p
         states:
-          a: {entry: [{trigger: robot.sees_nonsense}], on: {skill_error: b, seen: wrong}}
+          a: {entry: [{trigger: robot.sees_nonsense}], on: {programming_error: b, seen: wrong}}
           b: {entry: [{trigger: robot.work}], on: {did: e}}
           wrong:
           e: {final: true}

@@ -45,7 +45,16 @@ def test_the_changes_are_enough_to_have_all_frames(plots, happened, whole_every)
 
 
 def reactor_of(machine):
-    return SimpleNamespace(machine=machine, emitted=(), in_vain=set(), problem=None, settings={}, caused_by={})
+    return SimpleNamespace(
+        machine=machine,
+        emitted=(),
+        in_vain=set(),
+        problem=None,
+        programming_error=None,
+        outputs={},
+        settings={},
+        caused_by={},
+    )
 
 
 WORK = Start("r-2", 2, "robot", "work", {})

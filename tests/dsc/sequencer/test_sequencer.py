@@ -130,7 +130,8 @@ def test_an_outcome_nobody_handles_ends_the_run_with_a_problem():
     ran = Ran("{plot: p, states: {a: {entry: {trigger: arm.grasp}, on: {slipped: e}}, e: {final: true}}}")
     assert not ran.end.finished
     assert ran.end.problem == "no transition handles 'grasped' of arm.grasp"
-    assert ran.of_type("end") == [{"finished": False, "problem": ran.end.problem}]
+    (end,) = ran.of_type("end")
+    assert (end["finished"], end["reached"], end["problem"]) == (False, False, ran.end.problem)
 
 
 def test_an_outcome_whose_guards_do_not_hold_ends_the_run_with_a_problem():
@@ -173,7 +174,8 @@ def test_a_chart_that_goes_round_in_circles_ends_the_run_with_a_problem(states):
     ran = Ran("{plot: p, states: " + states + "}")
     assert not ran.end.finished
     assert "goes round" in (ran.end.problem or "") or "nested deeper" in (ran.end.problem or "")
-    assert ran.of_type("end") == [{"finished": False, "problem": ran.end.problem}]
+    (end,) = ran.of_type("end")
+    assert (end["finished"], end["reached"], end["problem"]) == (False, False, ran.end.problem)
 
 
 @pytest.mark.parametrize("entry", ["{trigger: am.grasp}", "{set: am.x, to: 1}", "{switch: am, to: up}"])

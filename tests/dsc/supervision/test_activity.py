@@ -30,6 +30,7 @@ class Device(Component):
     """Notes what it is told, and when."""
 
     modes = ("mapping",)
+    device_errors = (OSError,)
 
     def __init__(self, name, log, needs=(), *, mapping=()):
         super().__init__(name)

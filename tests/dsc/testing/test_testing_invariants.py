@@ -51,7 +51,7 @@ def test_all_hold_of_a_run_that_went_well(run):
 
 def test_a_run_is_looked_at_as_it_is(run):
     with kept_run(run.path) as kept:
-        assert kept.ended == {"finished": True, "problem": None}
+        assert kept.ended == {"finished": True, "problem": None, "programming_error": None, "outputs": {}}
         assert [step.configuration for step in kept.steps] == [("a",), ("b",), ()]
         assert kept.started == list(run.robot.done)
         assert [record.type for record in kept.records][-1] == "end"

@@ -11,8 +11,9 @@ from dsc_charts import plot
 from fetching import PLOTS, SCHEMA, Arm, Base
 
 from dsc import Event, Library
+from dsc.errors import SkillError
 from dsc.model.plot import ActionPlot
-from dsc.testing import Answer, Call, consumed, entered, exited, rehearsal, rehearse, started, took, trail, world
+from dsc.testing import Answer, Call, entered, exited, rehearsal, rehearse, started, took, trail, world
 from knowledge_base import Delta, InputError, ParseError, UnknownNameError, fact
 
 SLIPPED = Answer("slipped", {"item": "cup"}, after=2)
@@ -121,8 +122,8 @@ def test_a_skill_may_break_or_never_answer():
               on: {skill_error: {to: e, emit: why, with: {reason: ?event.reason}}, timed_out: {to: e, emit: late}, grasped: e}}
           e: {final: true}
     """
-    broken = rehearse([plot(text)], "p", skills={"arm.grasp": RuntimeError("the gripper is stuck")})
-    assert broken.emitted == (Event("why", {"reason": "arm.grasp: RuntimeError: the gripper is stuck"}),)
+    broken = rehearse([plot(text)], "p", skills={"arm.grasp": SkillError("the gripper is stuck")})
+    assert broken.emitted == (Event("why", {"reason": "arm.grasp: SkillError: the gripper is stuck"}),)
     late = rehearse([plot(text)], "p", skills={"arm.grasp": Answer("grasped", after=math.inf)})
     assert late.emitted == (Event("late"),)
     assert late.seconds == pytest.approx(40)
@@ -272,7 +273,7 @@ def test_a_failed_assertion_about_a_call_fails_the_test_whatever_the_plot_makes_
     with pytest.raises(AssertionError, match="the wrong item"):
         rehearse([coping], "p", skills={"arm.grasp": reply})
     broken = rehearse([coping], "p", skills={"arm.grasp": InputError("broken on purpose")})
-    assert consumed(broken, "skill_error", reason="arm.grasp: InputError: broken on purpose")
+    assert broken.problem == "arm.grasp: broken on purpose"
 
 
 @pytest.mark.parametrize("replies", [[None], lambda _call: None, ["grasped", 3]])

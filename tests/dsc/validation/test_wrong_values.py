@@ -148,7 +148,7 @@ def test_a_skill_that_is_no_coroutine_says_what_to_write():
     def go(call) -> Outcome:
         return Outcome("ok")
 
-    text = "plot: q\nemits: {because: {why: text}}\nstates:\n  a: {entry: {trigger: arm.go}, on: {ok: e, skill_error: {to: e, emit: because, with: {why: ?event.reason}}}}\n  e: {final: true}"
+    text = "plot: q\nemits: {because: {why: text}}\nstates:\n  a: {entry: {trigger: arm.go}, on: {ok: e, programming_error: {to: e, emit: because, with: {why: ?event.reason}}}}\n  e: {final: true}"
 
     async def main():
         return await Sequencer(

@@ -178,7 +178,12 @@ def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, plan
     (tmp_path / "in").mkdir()
     with executive(planner, tmp_path / "in" / "run.kb") as robot:
         seen = run_simulated(begun(robot, tmp_path / "in" / "run.kb"))
-        assert told(tmp_path / "in" / "run.kb")[1] == {"finished": True, "problem": None}
+        assert told(tmp_path / "in" / "run.kb")[1] == {
+            "finished": True,
+            "problem": None,
+            "programming_error": None,
+            "outputs": {},
+        }
     for copy in (seen[-2], copies[-2]):
         with executive(planner, copy) as robot:
             with pytest.raises(InputError, match="begun in simulated time and cannot be resumed in real time"):

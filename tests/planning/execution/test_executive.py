@@ -8,7 +8,7 @@ import pytest
 
 from dsc import Component, Event, Library, Outcome, SkillCall, Stream, parse_plot, primitive_plot, skill
 from dsc.components.parameters import Parameter
-from dsc.errors import PlotError
+from dsc.errors import PlotError, SkillError
 from dsc.reflection import MODELS, design_facts
 from dsc.trace import Record
 from knowledge_base import Delta, InputError, KnowledgeBase, fact
@@ -488,6 +488,10 @@ def stuck(_):
     raise RuntimeError("the switch\nis stuck")
 
 
+def broken(_):
+    raise SkillError("no power")
+
+
 MISBEHAVIOUR = [
     (stuck, "lamps.light: RuntimeError: the switch is stuck"),
     (lambda _: Outcome("dark"), "lamps.light: it ended with 'dark', which it does not declare"),
@@ -501,26 +505,34 @@ MISBEHAVIOUR = [
 
 
 @pytest.mark.parametrize(("wrong", "reason"), MISBEHAVIOUR)
-def test_a_skill_that_misbehaves_is_a_failed_step(wrong, reason):
+def test_a_bug_in_a_step_of_a_plan_ends_the_run_and_nothing_is_tried_again(wrong, reason):
     robot, lamps = light(wrong)
     with robot:
         end = robot.achieve("(on l1)")
+    assert reason in str(end.programming_error)
+    assert not end.finished
+    assert len(lamps.switched) == 1
+
+
+def test_a_step_whose_device_fails_is_a_failed_step():
+    robot, lamps = light(broken)
+    with robot:
+        end = robot.achieve("(on l1)")
     (gave_up,) = end.emitted
-    assert reason in gave_up.attributes["reason"]
-    assert end.finished
-    assert not end.reached
+    assert "lamps.light: SkillError: no power" in gave_up.attributes["reason"]
+    assert end.reason == f"gave_up: {gave_up.attributes['reason']}"
+    assert (end.finished, end.reached) == (True, False)
     assert len(lamps.switched) > 1
 
 
-@pytest.mark.parametrize(("wrong", "reason"), MISBEHAVIOUR)
-def test_a_skill_that_misbehaves_once_does_not_keep_the_goal_from_being_reached(wrong, reason):
-    robot, _ = light(Once(wrong))
+def test_a_device_that_fails_once_does_not_keep_the_goal_from_being_reached():
+    robot, _ = light(Once(broken))
     records: list[Record] = []
     robot.listen(records.append)
     with robot:
         assert robot.achieve("(on l1)").reached
     (resumed,) = (record for record in records if record.type == "plan.resumed")
-    assert reason in resumed.data["why"]
+    assert "lamps.light: SkillError: no power" in resumed.data["why"]
 
 
 def test_a_skill_that_hangs_is_a_failed_step():
@@ -540,7 +552,7 @@ def test_a_skill_that_hangs_is_a_failed_step():
 
 def test_a_rule_answers_a_step_whose_skill_fails():
     lamps = Lamps()
-    lamps.answer = stuck
+    lamps.answer = broken
     holder = parse_plot("""
         plot: light_up
         emits: {ended: {how: text}}
@@ -555,7 +567,7 @@ def test_a_rule_answers_a_step_whose_skill_fails():
     with Executive(DOMAIN, [plot, holder], [lamps]) as robot:
         robot.knowledge.apply(Delta(nodes={"l1": "lamp"}, added=(fact("works", "l1"),)), "test")
         (ended,) = robot.run("light_up").emitted
-    assert ended.attributes["how"] == "lamps.light: RuntimeError: the switch is stuck"
+    assert ended.attributes["how"] == "lamps.light: SkillError: no power"
     assert lamps.switched == ["l1"]
 
 

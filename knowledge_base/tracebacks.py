@@ -1,0 +1,62 @@
+"""Lines of users' code in tracebacks, for messages about exceptions of their functions."""
+
+from __future__ import annotations
+
+import os
+import sysconfig
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+
+from knowledge_base.errors import described, printable, shortened
+
+
+def raised_at(error: BaseException, *, only_users: bool = False) -> str:
+    """Return the innermost line of a user's code that raised the error, as ` (file:line)`; empty without a line.
+
+    Code of this project, of the standard library and of installed packages counts only if no other code was involved,
+    and never with `only_users`. A syntax error has the line that cannot be read.
+    """
+    # `isinstance` would read the `__class__` of a user's exception, which may fail.
+    if issubclass(type(error), SyntaxError) and getattr(error, "filename", None) is not None:
+        return f" ({error.filename}:{error.lineno})"  # type: ignore[attr-defined]
+    frames = list(_frames(error))
+    users = [frame for frame in frames if is_users_code(frame[0])]
+    found = users if users or only_users else [frame for frame in frames if not frame[0].startswith(_FROZEN)]
+    return f" ({found[-1][0]}:{found[-1][1]})" if found else ""
+
+
+def _frames(error: BaseException) -> Iterator[tuple[str, int]]:
+    """Yield file and line of each frame of the error, of its causes, and of the first member of a group."""
+    cause: BaseException | None = error
+    while cause is not None:
+        for frame, line in traceback.walk_tb(cause.__traceback__):
+            yield frame.f_code.co_filename, line
+        group = issubclass(type(cause), BaseExceptionGroup)
+        cause = cause.exceptions[0] if group else cause.__cause__  # type: ignore[attr-defined]
+
+
+def is_users_code(file: str) -> bool:
+    """Return whether a file is neither of this project, nor of the standard library, nor of an installed package."""
+    return not file.startswith(_NOT_USERS)
+
+
+def whole_traceback(error: BaseException) -> str:
+    """Return the traceback as printable lines; the description if a part of the error fails while it is formatted."""
+    try:
+        text = "".join(traceback.format_exception(type(error), error, error.__traceback__)).rstrip()
+    except Exception:  # noqa: BLE001  # user code defines the text and type of an exception
+        return described(error)
+    return "\n".join(printable(shortened(line)) for line in text.splitlines()[-_MOST_LINES:])
+
+
+_MOST_LINES = 200
+"""Maximum number of lines of a traceback in a log; the last lines have the exception."""
+_ROOT = Path(__file__).parents[1]
+_FROZEN = "<frozen"
+"""The beginning of the file names of code inside the interpreter, e.g. of `import`."""
+_NOT_USERS = (
+    *(str(_ROOT / package) + os.sep for package in ("knowledge_base", "dsc", "planning")),
+    *{sysconfig.get_path(name) + os.sep for name in ("stdlib", "purelib", "platlib")},
+    _FROZEN,
+)
