@@ -24,7 +24,7 @@ from dsc.blocking import in_process, in_thread
 from dsc.calls import Outcome, SkillCall
 from dsc.events import EXECUTIVES
 from dsc.model.plot import ActionPlot
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
 
 AfterCrash = Literal["repeat", "same_id", "sense"]
@@ -97,9 +97,17 @@ class Declared:
         """Attach this declaration to `body`, and return `body`.
 
         Raises:
-            SchemaError: an outcome has the name of an event that only the executive fires.
+            SchemaError: an outcome has the name of an event that only the executive fires, or the body has no parameter
+                for the call. The error is also raised if the body is not a coroutine function, or is one and blocks.
+            UnknownNameError: `types` has a name that is not a parameter.
         """
-        refuse_reserved(body.__qualname__.rpartition("<locals>.")[2], self.outcomes)
+        named = body.__qualname__.rpartition("<locals>.")[2]
+        try:
+            refuse_reserved(named, self.outcomes)
+            _require_form(named, body, self)
+        except InputError as error:
+            error.place = error.place or Place(*_line_of(body))
+            raise
         setattr(body, DECLARED, self)
         return body
 
@@ -217,8 +225,38 @@ def signature_of(component: str, name: str, body: SkillBody, declared: Declared)
 
 
 def _place_of(body: SkillBody) -> str:
+    file, line = _line_of(body)
+    return "" if file is None else f"{file}:{line}"
+
+
+def _line_of(body: SkillBody) -> tuple[str | None, int | None]:
     code = getattr(inspect.unwrap(body), "__code__", None)
-    return "" if code is None else f"{code.co_filename}:{code.co_firstlineno}"
+    return (None, None) if code is None else (code.co_filename, code.co_firstlineno)
+
+
+def _require_form(named: str, body: SkillBody, declared: Declared) -> None:
+    """Raise an error unless a skill's body has the form that its declaration needs, see `Declared.__call__`."""
+    parameters = list(inspect.signature(body).parameters.values())
+    own = declared.own - ("." not in named)  # a function has no `self`
+    if declared.pattern == "skill" and not (len(parameters) >= own and _is_call(parameters[own - 1])):
+        given = ", ".join(one.name for one in parameters)
+        wanted = "self, call" if "." in named else "call"
+        raise SchemaError(f"skill '{named}' has no parameter for its call: write ({wanted}, ...), not ({given})")
+    coroutine = inspect.iscoroutinefunction(inspect.unwrap(body))
+    if declared.carry_out is _awaited and not coroutine:
+        raise SchemaError(f"skill '{named}' is not a coroutine: write `async def`, or declare it `blocking`")
+    if declared.carry_out in {_in_thread, _in_process} and coroutine:
+        raise SchemaError(f"skill '{named}' is a coroutine, and a blocking skill is a plain function: write `def`")
+    names = [one.name for one in parameters[own:]]
+    for name in declared.types:
+        if name not in names:
+            raise UnknownNameError(f"skill '{named}' has no parameter '{name}'", found=name, valid=names)
+
+
+def _is_call(parameter: inspect.Parameter) -> bool:
+    """Return whether a parameter receives the call: by its name `call`, a leading underscore, or its annotation."""
+    annotation = getattr(parameter.annotation, "__name__", str(parameter.annotation))
+    return parameter.name.startswith(("call", "_")) or annotation.endswith("Call")
 
 
 def primitive_plot(

@@ -14,7 +14,7 @@ from dsc.components.parameters import Parameter, Parameters, check_declarations
 from dsc.components.ports import TAKES, EventActivations
 from dsc.components.streams import Push, Stream
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
 
 ALWAYS = ""
@@ -136,6 +136,7 @@ class Component(ComponentHooks, RestartHooks):
         super().__init_subclass__(**named)
         check_declarations(cls.name or cls.__name__.lower(), cls.declares, cls.relations, cls.__module__)
         _require_exceptions(cls)
+        _refuse_hidden(cls)
         cls._ports = {name: one for name, one in inspect.getmembers(cls) if isinstance(one, Push | Stream)}
 
     def __init__(self, name: str | None = None) -> None:
@@ -269,6 +270,16 @@ class Component(ComponentHooks, RestartHooks):
             "pushes": sorted(self.pushes),
             "streams": {name: stream.source for name, stream in self.streams.items()},
         }
+
+
+def _refuse_hidden(kind: type[Component]) -> None:
+    """Raise `SchemaError` for a skill that hides a method or attribute of `Component`."""
+    for name, body in vars(kind).items():
+        if hasattr(Component, name) and (hasattr(body, DECLARED) or hasattr(body, TAKES)):
+            code = getattr(inspect.unwrap(body), "__code__", None)
+            place = None if code is None else Place(code.co_filename, code.co_firstlineno)
+            message = f"'{name}' of {kind.__qualname__} hides an attribute of every component; choose another name"
+            raise SchemaError(message, place=place, found=name)
 
 
 def _require_exceptions(kind: type[Component]) -> None:

@@ -96,5 +96,5 @@ def test_a_function_that_fails_says_so_in_the_run(kb):
     plain = Schema(SCHEMA.types, SCHEMA.constants, SCHEMA.predicates, SCHEMA.functions)
     world = KnowledgeBase(plain.with_computed(broken))
     world.apply(Delta(nodes={"cup": "item"}), author="test")
-    (error,) = started(world, "cup")[2].errors
+    (error,) = started(world, "cup")[2].bugs
     assert "(at-hand cup) cannot be computed: ZeroDivisionError" in str(error)

@@ -356,7 +356,7 @@ def test_time_stands_still_while_a_thread_works():
 def test_arguments_and_answers_are_copies():
     class Greedy(Arm):
         @skill(outcomes={"ok": {"things": None}})
-        async def take(self, call, things):
+        async def collect(self, call, things):
             things.append("mine")
             return Outcome("ok", {"things": things})
 
@@ -368,7 +368,7 @@ def test_arguments_and_answers_are_copies():
         emits: {end: {yours: symbol, mine: symbol}}
         variables: {got: symbol}
         states:
-          a: {entry: {trigger: arm.take, with: {things: ?things}}, on: {ok: {to: e, assign: {got: ?event.things}}}}
+          a: {entry: {trigger: arm.collect, with: {things: ?things}}, on: {ok: {to: e, assign: {got: ?event.things}}}}
           e: {final: true, emit: end, with: {yours: ?things, mine: ?got}}
         """,
         arm=Greedy(),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -143,17 +144,52 @@ def test_a_wrong_value_is_refused_in_words(act, said):
         act()
 
 
-def test_a_skill_that_is_no_coroutine_says_what_to_write():
+def not_a_coroutine():
     @skill(outcomes={"ok": {}})
     def go(call) -> Outcome:
         return Outcome("ok")
 
-    text = "plot: q\nemits: {because: {why: text}}\nstates:\n  a: {entry: {trigger: arm.go}, on: {ok: e, programming_error: {to: e, emit: because, with: {why: ?event.reason}}}}\n  e: {final: true}"
 
-    async def main():
-        return await Sequencer(
-            Library([parse_plot(text)]), KnowledgeBase(Schema()), [component_of("arm", go)], LoopClock()
-        ).run("q")
+def a_blocking_coroutine():
+    @skill(outcomes={"ok": {}}, blocking="thread")
+    async def go(call) -> Outcome:
+        return Outcome("ok")
 
-    (why,) = run_simulated(main()).emitted
-    assert "it is not a coroutine: write `async def`, or declare it `blocking`" in why.attributes["why"]
+
+def without_call():
+    class Arm(Component):
+        @skill(outcomes={"ok": {}}, types={"item": "item"})
+        async def go(self, item) -> Outcome:
+            return Outcome("ok")
+
+
+def a_misspelt_parameter():
+    class Arm(Component):
+        @skill(outcomes={"ok": {}}, types={"hieght": "number"})
+        async def go(self, call, height) -> Outcome:
+            return Outcome("ok")
+
+
+def a_hidden_method():
+    class Arm(Component):
+        @skill(outcomes={"ok": {}})
+        async def take(self, call) -> Outcome:
+            return Outcome("ok")
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (not_a_coroutine, "skill 'go' is not a coroutine: write `async def`, or declare it `blocking`"),
+        (a_blocking_coroutine, "skill 'go' is a coroutine, and a blocking skill is a plain function: write `def`"),
+        (without_call, "skill 'Arm.go' has no parameter for its call: write (self, call, ...), not (self, item)"),
+        (a_misspelt_parameter, "skill 'Arm.go' has no parameter 'hieght'; did you mean 'height'?"),
+        (a_hidden_method, "'take' of a_hidden_method.<locals>.Arm hides an attribute of every component"),
+    ],
+)
+def test_a_skill_that_can_never_work_is_refused_when_it_is_made_with_its_line(make, said):
+    with pytest.raises(InputError, match=re.escape(said)) as refused:
+        make()
+    assert refused.value.place is not None
+    line = Path(__file__).read_text().splitlines()[(refused.value.place.line or 0) - 1]
+    assert "@skill" in line
