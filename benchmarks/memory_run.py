@@ -17,6 +17,7 @@ from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import primitive_plot, skill
 from dsc.trace import Trace, write_to
 from knowledge_base import KnowledgeBase, Schema
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 
 WAYS = ("plain", "trace", "store")
@@ -55,6 +56,9 @@ WATCH = ActionPlot.model_validate({
     },
     "rules": [{"on": "slipped", "do": {"then": "retry"}}],
 })  # fmt: skip
+
+
+ENOUGH = "the wanted number of events is reached"
 
 
 class Robot(Component):
@@ -115,14 +119,9 @@ class Watch:
             taken += 1
             self._sample(taken, clock.now())
             if taken == self._events:
-                raise StopError
+                raise InputError(ENOUGH)  # ends the run
 
         sequencer.listen(count)
-        try:
-            await sequencer.run("watch", {"cycle": SECONDS * A_CYCLE / self._events})
-        except StopError:
-            return
-
-
-class StopError(Exception):
-    """The wanted number of events is reached."""
+        end = await sequencer.run("watch", {"cycle": SECONDS * A_CYCLE / self._events})
+        if end.problem != ENOUGH:
+            raise RuntimeError(f"the run ended early: {end.reason}")

@@ -24,7 +24,7 @@ from dsc.blocking import in_process, in_thread
 from dsc.calls import Outcome, SkillCall
 from dsc.events import EXECUTIVES
 from dsc.model.plot import ActionPlot
-from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
 from knowledge_base.language.checking.inputs import shown
 
 AfterCrash = Literal["repeat", "same_id", "sense"]
@@ -102,12 +102,13 @@ class Declared:
             UnknownNameError: `types` has a name that is not a parameter.
         """
         named = body.__qualname__.rpartition("<locals>.")[2]
-        try:
-            refuse_reserved(named, self.outcomes)
-            _require_form(named, body, self)
-        except InputError as error:
-            error.place = error.place or Place(*_line_of(body))
-            raise
+        with tolerated():
+            try:
+                refuse_reserved(named, self.outcomes)
+                _require_form(named, body, self)
+            except InputError as error:
+                error.place = error.place or Place(*_line_of(body))
+                raise
         setattr(body, DECLARED, self)
         return body
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import difflib
 import heapq
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -166,6 +168,35 @@ class InputError(Exception):
             shown = ", ".join(names) + (", …" if len(self.valid) > 8 else "")
             return f"{text}; valid: {shown}"
         return text
+
+
+_collected: ContextVar[list[InputError] | None] = ContextVar("collected", default=None)
+
+
+@contextmanager
+def collecting() -> Iterator[list[InputError]]:
+    """Return a context manager with a list, to which `tolerated` adds errors instead of raising them."""
+    found: list[InputError] = []
+    token = _collected.set(found)
+    try:
+        yield found
+    finally:
+        _collected.reset(token)
+
+
+@contextmanager
+def tolerated() -> Iterator[None]:
+    """Inside `collecting`, add an `InputError` of the block to the list, and continue after the block.
+
+    So one check reports all errors of a project. Outside of `collecting`, the error is raised.
+    """
+    try:
+        yield
+    except InputError as error:
+        found = _collected.get()
+        if found is None:
+            raise
+        found.append(error)
 
 
 class ParseError(InputError):

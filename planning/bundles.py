@@ -18,7 +18,7 @@ from dsc.components.hooks import contained
 from dsc.model.plot import ActionPlot
 from dsc.text.plot_files import load_library
 from dsc.validation.subject import addressed_by
-from knowledge_base.errors import InputError, Place, UnknownNameError, described
+from knowledge_base.errors import InputError, Place, UnknownNameError, described, tolerated
 from knowledge_base.facts import Delta
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
@@ -106,9 +106,11 @@ class Bundle:
             raise InputError("a bundle has plots/*.yaml or a domain.pddl", place=Place(str(folder)))
         found: BundleParts = {}
         if plots.is_dir():
-            found["plots"] = tuple(load_library(plots))
+            with tolerated():
+                found["plots"] = tuple(load_library(plots))
         if domain.is_file():
-            found["domain"] = PlanningDomain.from_pddl(domain)
+            with tolerated():
+                found["domain"] = PlanningDomain.from_pddl(domain)
         if (profiles := folder / "profiles").is_dir():
             found["profiles"] = profiles
         found.update(parts)

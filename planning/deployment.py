@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from dsc.components.component import Component
+from dsc.components.hooks import contained
 from dsc.components.robot import require_instances
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
@@ -19,6 +20,7 @@ from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.text.profiles import Profile
 from dsc.trace import Listener, Record
 from knowledge_base.errors import InputError, Place, StoreError, UnknownNameError
+from knowledge_base.facts import Delta
 from knowledge_base.journal.file import Durability
 from knowledge_base.language.syntax.text import parse_condition
 from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of
@@ -156,8 +158,9 @@ class Deployment:
         """Return the parts that are left in the world, which checks only the bundle's own task."""
         if self.simulation is None or not self._own_task:
             return None
-        left = self.simulation.left()
-        return None if left is None else list(left)
+        with contained(f"{type(self.simulation).__name__}.left"):
+            left = self.simulation.left()
+            return None if left is None else list(left)
 
     @property
     def _own_task(self) -> bool:
@@ -170,15 +173,17 @@ class Deployment:
         report = summarise(self.name, judge, left, self.tally, end, failures, wall_s)
         if world is None:
             return report
-        own = world.own_report(knowledge, end)
-        headline = world.headline(own, reached=report.goal_reached) if judge == "world" else None
+        with contained(f"{type(world).__name__}.own_report"):
+            own = world.own_report(knowledge, end)
+            headline = world.headline(own, reached=report.goal_reached) if judge == "world" else None
         return replace(report, own=own, faults=tuple(world.fired), headline=headline or report.headline)
 
     def _judged(self, end: RunEnd) -> tuple[Judge, list[Left]]:
         knowledge, world = self.executive.knowledge, self.simulation
         if world is not None and (left := self._left_in_world()) is not None:
             why = reason_of_end(end, self.tally.gave_up)
-            reasons = [world.reason(one, knowledge, end) or why for one in left]
+            with contained(f"{type(world).__name__}.reason"):
+                reasons = [world.reason(one, knowledge, end) or why for one in left]
             return "world", [replace(one, reason=reason) for one, reason in zip(left, reasons, strict=True)]
         goal = self._task.goal or (self._bundle.goal if self._own_task else None)
         if goal is None:
@@ -220,6 +225,7 @@ def deploy(
         InputError: the bundle has no task, or no simulation for an option. The task does not fit the bundle, a file
             contains an error, or the store already contains a run.
         StoreError: the store cannot be opened, or the world cannot be written.
+        ProgrammingError: the code of the simulation has failed; the message has file and line.
     """
     _require_simulated(bundle, seed=seed, faults=faults, scenario=scenario)
     if store is not None and has_run(store):
@@ -326,7 +332,7 @@ def _deployed(
     listener: Listener | None,
     kept: Mapping[str, Any],
 ) -> Deployment:
-    simulation = None if bundle.simulation is None else bundle.simulation(setup)
+    simulation = simulated(bundle, setup)
     try:
         components = _components(bundle, simulation)
         configure(components, setup.profile)
@@ -341,9 +347,9 @@ def _deployed(
     deployed = Deployment(bundle, executive, simulation, task, setup.profile, kept, resumes=setup.resumes)
     try:
         if simulation is not None and setup.store is not None and not setup.resumes:
-            simulation.begin()
-        knowledge = bundle.knowledge if simulation is None else bundle.knowledge.then(simulation.knowledge())
-        executive.knowledge.apply(knowledge, "deployment", key="deployment")
+            with contained(f"{type(simulation).__name__}.begin", _MAY_RAISE):
+                simulation.begin()
+        executive.knowledge.apply(initial_knowledge(bundle, simulation), "deployment", key="deployment")
         if task.goal is not None:
             check_goal(parse_condition(task.goal, "goal"), executive.knowledge)
     except BaseException:
@@ -356,12 +362,32 @@ def _deployed(
 
 def components_for(bundle: Bundle) -> tuple[Component, ...]:
     """Return new components of a bundle, those of its simulation included, to read their declarations."""
-    simulation = None if bundle.simulation is None else bundle.simulation(Setup())
-    return require_instances(_components(bundle, simulation))
+    return require_instances(_components(bundle, simulated(bundle, Setup())))
+
+
+def initial_knowledge(bundle: Bundle, simulation: Simulation | None) -> Delta:
+    """Return the initial knowledge of a bundle and its simulation; errors as for `deploy`."""
+    if simulation is None:
+        return bundle.knowledge
+    with contained(f"{type(simulation).__name__}.knowledge", _MAY_RAISE):
+        return bundle.knowledge.then(simulation.knowledge())
+
+
+def simulated(bundle: Bundle, setup: Setup) -> Simulation | None:
+    """Return the simulation of a bundle; raise `ProgrammingError` for an exception of its code."""
+    if bundle.simulation is None:
+        return None
+    with contained(bundle.simulation.__name__, _MAY_RAISE):
+        return bundle.simulation(setup)
 
 
 def _components(bundle: Bundle, simulation: Simulation | None) -> list[Component]:
-    return [*components_of(gathered([bundle])), *(() if simulation is None else simulation.components())]
+    with contained(f"the components of '{bundle.name}'", _MAY_RAISE):
+        return [*components_of(gathered([bundle])), *(() if simulation is None else simulation.components())]
+
+
+_MAY_RAISE = (InputError, OSError)
+"""Exceptions of a simulation about its input: a scenario, a profile or a store."""
 
 
 _domains: dict[Bundle, PlanningDomain] = {}

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from knowledge_base.errors import InputError, Place, UnknownNameError
+from knowledge_base.errors import InputError, Place, UnknownNameError, tolerated
 from knowledge_base.language.checking.inputs import require
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Signature
 from knowledge_base.language.evaluation.evaluator import apply_effect, holds
@@ -36,7 +36,7 @@ from knowledge_base.pddl.action_text import ActionText, united
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.pddl.writer import action_to_text, axiom_to_text, domain_to_text
 from knowledge_base.world.schema import Schema, agreed_names
-from planning.planning_actions import Axiom, PlanningAction, checked, checked_axiom, refuse_changed
+from planning.planning_actions import Axiom, PlanningAction, action_of, check_action, checked_axiom, refuse_changed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -139,10 +139,16 @@ class PlanningDomain:
             InputError: the text contains an error; the message contains the place.
         """
         schema = Schema.from_text(read).with_computed(*computed)
-        actions = {a.name: checked(a, schema) for a in read.actions}
-        axioms = tuple(checked_axiom(a, schema) for a in read.axioms)
-        refuse_changed(actions.values(), axioms)
-        return cls(read.name, schema, actions, axioms, tuple(dict.fromkeys(read.remarks())))
+        actions, axioms = {action.name: action_of(action) for action in read.actions}, list[Axiom]()
+        for action in read.actions:
+            with tolerated():
+                check_action(actions[action.name], schema)
+        for axiom in read.axioms:
+            with tolerated():
+                axioms.append(checked_axiom(axiom, schema))
+        with tolerated():
+            refuse_changed(actions.values(), axioms)
+        return cls(read.name, schema, actions, tuple(axioms), tuple(dict.fromkeys(read.remarks())))
 
     def to_text(self) -> DomainText:
         """Return the domain as the text form of one file, so that `from_text` returns an equal domain."""

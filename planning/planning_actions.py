@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
-from knowledge_base.errors import Place, SchemaError
+from knowledge_base.errors import InputError, Place, SchemaError, tolerated
 from knowledge_base.language.checking.check import check, check_arity, check_effect, check_parameters
 from knowledge_base.language.syntax.durative import Duration, DurativeParts
-from knowledge_base.language.syntax.effect import Add, Delete, Effect, effect_leaves
-from knowledge_base.language.syntax.expression import Atom, Comparison, Expression, TypedVariable, Variable
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, effect_leaves
+from knowledge_base.language.syntax.expression import And, Atom, Comparison, Expression, TypedVariable, Variable
 from knowledge_base.pddl.action_text import ActionText
 from knowledge_base.pddl.domain_text import AxiomText
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from knowledge_base.world.schema import Schema
+
+
+_Form = TypeVar("_Form", Expression, Effect)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +59,15 @@ class Axiom:
     place: Place | None = field(default=None, compare=False, repr=False)
 
 
-def checked(action: ActionText, schema: Schema) -> PlanningAction:
-    """Return the planning action of a parsed action, checked against the schema.
+def action_of(action: ActionText) -> PlanningAction:
+    """Return the planning action of a parsed action."""
+    return PlanningAction(
+        action.name, action.parameters, action.precondition, action.effect, action.place, action.duration, action.timed
+    )
 
-    Raises:
-        InputError: the action uses an undeclared name.
-    """
+
+def check_action(action: PlanningAction, schema: Schema) -> None:
+    """Check an action against the schema; raise `InputError` if it uses an undeclared name."""
     for parameter in action.parameters:
         for one in parameter.types:
             schema.require_type(one, parameter.place)  # each argument is an object
@@ -68,15 +75,33 @@ def checked(action: ActionText, schema: Schema) -> PlanningAction:
     # An unknown constant is an error, because a domain does not contain the objects of a problem.
     timed = action.timed or DurativeParts(start=action.precondition, end_effect=action.effect)
     for condition in (timed.start, timed.over_all, timed.end):
-        check(condition, schema, variables, objects=schema.constants)
+        parts = condition.parts if isinstance(condition, And) else ()
+        _check_all(condition, parts, partial(check, schema=schema, variables=variables, objects=schema.constants))
     for effect in (timed.start_effect, timed.end_effect):
-        check_effect(effect, schema, variables, objects=schema.constants)
+        some = effect.parts if isinstance(effect, AllOf) else ()
+        _check_all(effect, some, partial(check_effect, schema=schema, variables=variables, objects=schema.constants))
     if action.duration is not None:
         bounds = Comparison("<=", action.duration.least, action.duration.most)
-        check(bounds, schema, variables, objects=schema.constants)
-    return PlanningAction(
-        action.name, action.parameters, action.precondition, action.effect, action.place, action.duration, action.timed
-    )
+        with tolerated():
+            check(bounds, schema, variables, objects=schema.constants)
+
+
+def _check_all(whole: _Form, parts: Iterable[_Form], check_one: Callable[[_Form], object]) -> None:
+    """Check a form; if it is wrong, check its parts, so that each wrong part is reported."""
+    try:
+        check_one(whole)
+    except InputError:
+        before = False
+        for part in parts:
+            try:
+                check_one(part)
+            except InputError:
+                before = True
+                with tolerated():
+                    raise
+        if not before:
+            with tolerated():
+                raise
 
 
 def checked_axiom(axiom: AxiomText, schema: Schema) -> Axiom:
@@ -95,7 +120,7 @@ def checked_axiom(axiom: AxiomText, schema: Schema) -> Axiom:
     return Axiom(head.name, parameters, axiom.condition, head.place)
 
 
-def refuse_changed(actions: Iterable[PlanningAction], axioms: tuple[Axiom, ...]) -> None:
+def refuse_changed(actions: Iterable[PlanningAction], axioms: Iterable[Axiom]) -> None:
     """Raise `SchemaError` if a planning action changes a derived predicate."""
     derived = {axiom.predicate: axiom for axiom in axioms}
     for action in actions:

@@ -14,7 +14,7 @@ from knowledge_base.cli.console import print_json
 from knowledge_base.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from dsc.components.component import Component
     from dsc.dynamic.library import Library
@@ -78,15 +78,20 @@ def check(
     neighbours = Neighbours()
     components = None if robot is None else components_of_robot(robot)
     found = [(file, finding) for file in files for finding in _findings(file, domain, neighbours, components)]
-    if json:
-        print_json([_as_data(file, finding) for file, finding in found])
-    else:
-        for file, finding in found:
-            typer.echo(f"{finding}" if finding.place else f"{file}: {finding}")
-        if not found:
-            typer.echo(f"{len(files)} plot{'s' * (len(files) != 1)} checked, nothing found")
+    print_findings(found, as_json=json, nothing=f"{len(files)} plot{'s' * (len(files) != 1)} checked, nothing found")
     wrong = [finding for _, finding in found if strict or finding.level == "error"]
     raise typer.Exit(BAD_INPUT if wrong else 0)
+
+
+def print_findings(found: Sequence[tuple[Path | str, Finding]], *, as_json: bool, nothing: str) -> None:
+    """Print findings, one per line or as a JSON list; without findings, print the text `nothing`."""
+    if as_json:
+        print_json([_as_data(file, finding) for file, finding in found])
+        return
+    for file, finding in found:
+        typer.echo(f"{finding}" if finding.place else f"{file}: {finding}")
+    if not found:
+        typer.echo(nothing)
 
 
 @app.command()
@@ -275,7 +280,7 @@ def _schema(file: Path, domain: Path | None) -> Schema | None:
     return None if found is None else Schema.from_pddl(found)
 
 
-def _as_data(file: Path, finding: Finding) -> dict[str, Any]:
+def _as_data(file: Path | str, finding: Finding) -> dict[str, Any]:
     error, place = finding.error, finding.place
     return {
         "file": (place.source if place else None) or str(file),

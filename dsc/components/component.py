@@ -14,7 +14,7 @@ from dsc.components.parameters import Parameter, Parameters, check_declarations
 from dsc.components.ports import TAKES, EventActivations
 from dsc.components.streams import Push, Stream
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
-from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
 from knowledge_base.language.checking.inputs import shown
 
 ALWAYS = ""
@@ -134,9 +134,9 @@ class Component(ComponentHooks, RestartHooks):
     def __init_subclass__(cls, **named: Any) -> None:
         """Validate the declared parameters, and collect the ports; raise `InputError` for an invalid declaration."""
         super().__init_subclass__(**named)
-        check_declarations(cls.name or cls.__name__.lower(), cls.declares, cls.relations, cls.__module__)
-        _require_exceptions(cls)
-        _refuse_hidden(cls)
+        for check in (_check_parameters, _require_exceptions, _refuse_hidden):
+            with tolerated():
+                check(cls)
         cls._ports = {name: one for name, one in inspect.getmembers(cls) if isinstance(one, Push | Stream)}
 
     def __init__(self, name: str | None = None) -> None:
@@ -270,6 +270,10 @@ class Component(ComponentHooks, RestartHooks):
             "pushes": sorted(self.pushes),
             "streams": {name: stream.source for name, stream in self.streams.items()},
         }
+
+
+def _check_parameters(kind: type[Component]) -> None:
+    check_declarations(kind.name or kind.__name__.lower(), kind.declares, kind.relations, kind.__module__)
 
 
 def _refuse_hidden(kind: type[Component]) -> None:

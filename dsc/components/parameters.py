@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 
 from dsc.errors import SkillError
 from dsc.model.ranges import Range, Who, refuse_change, written
-from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
 from knowledge_base.facts import Value
 from knowledge_base.language.evaluation.evaluator import evaluate_term, holds
 from knowledge_base.language.syntax.expression import free_variables
@@ -91,7 +91,9 @@ class Parameters(dict[str, Any]):
     """
 
     def __init__(self, component: str, declared: Mapping[str, Parameter], relations: Iterable[str]) -> None:
-        super().__init__(_changed(component, declared, {}, dict.fromkeys(declared)))
+        super().__init__()
+        with tolerated():
+            self.update(_changed(component, declared, {}, dict.fromkeys(declared)))
         self._component = component
         self._declared = dict(declared)
         self._relations = tuple(relations)

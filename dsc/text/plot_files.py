@@ -13,7 +13,7 @@ from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState
 from dsc.model.transitions import case_value
 from dsc.text.yaml import dump, load_document, path_of, read_file, read_model
-from knowledge_base.errors import InputError, Place
+from knowledge_base.errors import InputError, Place, tolerated
 
 
 def parse_plot(text: str, source: str | None = None) -> ActionPlot:
@@ -40,7 +40,11 @@ def load_library(folder: Path | str) -> Library:
     files = sorted(path_of(folder).glob("*.yaml"))
     if not files:
         raise InputError(f"there are no plots (*.yaml) in '{folder}'", place=Place(str(folder)))
-    return Library(load_plot(file) for file in files)
+    library = Library()
+    for file in files:
+        with tolerated():
+            library.add(load_plot(file))
+    return library
 
 
 def plot_to_yaml(plot: ActionPlot) -> str:

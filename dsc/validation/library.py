@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from itertools import chain, islice
 
 from dsc.dynamic.library import Library
@@ -15,6 +16,7 @@ from dsc.validation.flow import check_wiring
 from dsc.validation.reach import check_reach
 from dsc.validation.shape import check_size, check_structure
 from dsc.validation.subject import Components, Subject
+from knowledge_base.errors import InputError
 from knowledge_base.language.checking.inputs import require, require_several
 from knowledge_base.world.schema import Schema
 
@@ -43,6 +45,8 @@ def validate_plot(
     schema: Schema | None = None,
     skills: Iterable[SkillSignature] | None = None,
     components: Components | None = None,
+    *,
+    thorough: bool = False,
 ) -> list[Finding]:
     """Return the findings about a plot, at most `MAX_FINDINGS`; empty for a valid plot.
 
@@ -53,6 +57,7 @@ def validate_plot(
         skills: the deployed skills; with `None`, triggers are not checked.
         components: names of the deployed components, or their declared parameters by name; with `None`, `set`, `send`
             and `switch` are not checked.
+        thorough: whether a plot with an unsound structure is checked further; a mistake may then have two findings.
 
     Raises:
         InputError: an argument is of another type.
@@ -63,9 +68,22 @@ def validate_plot(
     subject = Subject(plot, library, schema, signatures, components)
     for check in (check_structure, check_size):
         findings = list(islice(check(subject), MAX_FINDINGS))
-        if findings:  # later checks would report these mistakes again, or take too long
-            return findings
+        if findings:  # the other checks would report these mistakes again, or take too long
+            return _with_others(findings, subject) if thorough else findings
     return list(islice(chain.from_iterable(check(subject) for check in _CHECKS), MAX_FINDINGS))
+
+
+def _with_others(findings: list[Finding], subject: Subject) -> list[Finding]:
+    """Return findings about the structure with those of checks that need no sound structure, for each place the first.
+
+    A check may be unable to read a plot of unsound structure; then its findings come after the structure is repaired.
+    """
+    found = {finding.place: finding for finding in reversed(findings)}
+    for check in (check_data, check_components):
+        with suppress(InputError, LookupError):
+            for finding in islice(check(subject), MAX_FINDINGS):
+                found.setdefault(finding.place, finding)
+    return [*findings, *(one for one in found.values() if one not in findings)][:MAX_FINDINGS]
 
 
 def _require_parts(library: object, schema: object) -> None:

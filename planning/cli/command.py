@@ -12,11 +12,13 @@ import typer
 from typer.core import TyperGroup
 
 from dsc.cli import plots
+from dsc.cli.logs import PROGRAMMING_ERROR
 from dsc.cli.runs import app as runs_app
 from dsc.cli.runs import view_command
 from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import readers
 from planning.cli import bundles_command, doctor_command, plan_command
+from planning.cli.check import check_command
 from planning.cli.run import components_of_target, robot_knowledge, run_command
 
 if TYPE_CHECKING:
@@ -52,6 +54,7 @@ app.add_typer(plots.app, name="plot")
 app.add_typer(kb_app, name="kb")
 app.add_typer(runs_app, name="runs")
 app.command("run")(run_command)
+app.command("check")(check_command)
 app.command("plan")(plan_command)
 app.command("doctor")(doctor_command)
 app.command("bundles")(bundles_command)
@@ -103,9 +106,13 @@ def _command() -> None:
     try:
         status = app(standalone_mode=not as_json)  # without --json, Typer itself reports wrong arguments
     except Exception as error:
+        from dsc.errors import ProgrammingError
         from knowledge_base.errors import InputError
 
         wrong = _unusable(error) or (_misused(error) if as_json else error)
+        if isinstance(wrong, ProgrammingError):
+            _tell(InputError(f"programming error in {wrong}"), as_json=as_json)
+            sys.exit(PROGRAMMING_ERROR)
         if not isinstance(wrong, InputError):
             raise
         _tell(wrong, as_json=as_json)

@@ -173,7 +173,7 @@ def a_misspelt_parameter():
 def a_hidden_method():
     class Arm(Component):
         @skill(outcomes={"ok": {}})
-        async def take(self, call) -> Outcome:
+        async def take(self, call) -> Outcome:  # type: ignore[override]
             return Outcome("ok")
 
 
