@@ -79,7 +79,7 @@ def _sources(folder: Path) -> Iterator[Path]:
     for file in sorted(folder.rglob("*")):
         inside = file.relative_to(folder).parts
         hidden = any(part.startswith(".") for part in inside) or _SKIPPED.intersection(inside)
-        if file.suffix in {".yaml", ".yml", ".pddl", ".py"} and not hidden:
+        if file.suffix in {".yaml", ".yml", ".pddl", ".py"} and file.is_file() and not hidden:
             yield file
 
 

@@ -327,7 +327,7 @@ def leaves(group, words=()):
 
 def takes_a_file(command, parameter):
     hint = get_type_hints(inspect.unwrap(command.callback)).get(parameter.name)
-    return "Path" in str(hint) or any(said in (parameter.metavar or "") for said in ("FILE", "OUT"))
+    return "Path" in str(hint) or any(said in (parameter.metavar or "") for said in ("FILE", "OUT", "TARGET"))
 
 
 GOOD = {
@@ -377,7 +377,12 @@ def would_run(*_, **__):
 
 def test_the_sweep_has_every_command_that_takes_a_file():
     swept = {words for words, *_ in (one.values for one in SWEPT)}
-    assert {words for words, _ in leaves(get_command(app))} - swept == {("doctor",), ("bundles",), ("plot", "schema")}
+    assert {words for words, _ in leaves(get_command(app))} - swept == {
+        ("doctor",),
+        ("bundles",),
+        ("new",),
+        ("plot", "schema"),
+    }
 
 
 @pytest.mark.parametrize(("words", "params", "swept"), SWEPT)

@@ -19,6 +19,7 @@ from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import readers
 from planning.cli import bundles_command, doctor_command, plan_command
 from planning.cli.check import check_command
+from planning.cli.new import new_command
 from planning.cli.run import components_of_target, robot_knowledge, run_command
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ app = typer.Typer(
 app.add_typer(plots.app, name="plot")
 app.add_typer(kb_app, name="kb")
 app.add_typer(runs_app, name="runs")
+app.command("new")(new_command)
 app.command("run")(run_command)
 app.command("check")(check_command)
 app.command("plan")(plan_command)

@@ -1,0 +1,78 @@
+"""Command `dsc new`: a running robot project to start from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from importlib.resources.abc import Traversable
+
+TEMPLATE, PACKAGE = "project_template", "my_robot"
+"""The folder of the template in this package, and the name in the template that the new name replaces."""
+_DOTTED = {"gitignore": ".gitignore", "vscode": ".vscode"}
+"""Names in the template without the dot that they have in a project."""
+
+
+def new_command(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The project's name; a new folder with this name.")],
+) -> None:
+    """Make a running robot project: domain, plots, skills, simulation, test, and settings of an editor."""
+    from json import dumps
+
+    from dsc.text.plot_files import json_schema
+    from dsc.text.profiles import profile_schema
+
+    package = _package(name)
+    folder = _free(Path(name))
+    texts = {path: text.replace(PACKAGE, package) for path, text in _template(package)}
+    texts[Path(".vscode/plot.schema.json")] = dumps(json_schema(), indent=1) + "\n"
+    texts[Path(".vscode/profile.schema.json")] = dumps(profile_schema(), indent=1) + "\n"
+    for path, text in texts.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, "utf-8")
+    typer.echo(f"made {folder}: {', '.join(sorted(str(path) for path in texts if path.suffix in {'.py', '.pddl'}))}")
+    typer.echo(f"next:  cd {folder}    dsc check    dsc run .    dsc run . --view    pytest")
+
+
+def _package(name: str) -> str:
+    """Return the name of the package; raise `InputError` for a name that cannot be imported or is taken."""
+    from importlib.util import find_spec
+    from keyword import iskeyword
+
+    from knowledge_base.errors import InputError
+
+    package = Path(name).name.replace("-", "_")
+    if not package.isidentifier() or not package.isascii() or iskeyword(package):
+        form = "letters, digits and '_', and begins with a letter, as in my_robot"
+        raise InputError(f"a project's name has {form}; not '{name}'", found=name)
+    if find_spec(package) is not None and not Path(name).is_dir():
+        raise InputError(f"'{package}' is the name of an installed module; choose another name", found=name)
+    return package
+
+
+def _free(folder: Path) -> Path:
+    from knowledge_base.errors import InputError, Place
+
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        message = "there is something here; a new project needs a new or an empty folder"
+        raise InputError(message, place=Place(str(folder)))
+    return folder
+
+
+def _template(package: str) -> Iterator[tuple[Path, str]]:
+    """Yield path and text of each file of the template."""
+    from importlib.resources import files
+
+    def walk(inside: Traversable, path: Path) -> Iterator[tuple[Path, str]]:
+        for one in sorted(inside.iterdir(), key=lambda one: one.name):
+            name = _DOTTED.get(one.name, one.name.replace(PACKAGE, package))
+            if one.is_dir() and name != "__pycache__":
+                yield from walk(one, path / name)
+            elif one.is_file():
+                yield path / name, one.read_text("utf-8")
+
+    yield from walk(files("planning") / TEMPLATE, Path())
