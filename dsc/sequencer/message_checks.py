@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from dsc.calls import OBSERVED, Outcome
@@ -109,8 +109,8 @@ def _conforming(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
     return Outcome(event, _plain(event, attributes, declared) if attributes or declared else {}, observed)
 
 
-def _plain(event: str, attributes: Mapping[str, Any], declared: Declared) -> dict[str, Any]:
-    """Return a copy of the attributes as plain data.
+def _plain(event: str, attributes: Mapping[str, Any], declared: Declared, what: str = "outcome") -> dict[str, Any]:
+    """Return a copy of the attributes of an outcome or event as plain data.
 
     Raises:
         UnknownNameError: an attribute is not declared.
@@ -118,12 +118,12 @@ def _plain(event: str, attributes: Mapping[str, Any], declared: Declared) -> dic
     """
     for name in attributes:
         if name not in declared:
-            message = f"the outcome '{event}' has no attribute {shown(name)}"
+            message = f"the {what} '{event}' has no attribute {shown(name)}"
             raise UnknownNameError(message, found=str(name), valid=declared)
     for name, kind in declared.items():
         if name not in attributes:
             of_type = f" of type {kind}" if kind else ""
-            raise InputError(f"the outcome '{event}' needs its attribute '{name}'{of_type}")
+            raise InputError(f"the {what} '{event}' needs its attribute '{name}'{of_type}")
         wanted = _FITS.get(kind)
         if wanted is not None and not wanted[1](attributes[name]):
             raise InputError(f"the attribute '{name}' of '{event}' is {wanted[0]}, not {shown(attributes[name])}")
@@ -234,20 +234,35 @@ def require_seconds(after: object) -> None:
         raise InputError(f"a delay is a finite number of seconds, not {shown(after)}")
 
 
-def checked_event(said: object) -> Event:
-    """Return the event with copied attributes.
+def checked_event(said: object, plots: Iterable[ActionPlot], knowledge: KnowledgeBase) -> Event:
+    """Return the event with copied attributes, which fit the declaration under `receives` of at least one plot.
 
     Raises:
         InputError: the value is not an event, only the executive fires the event, or an attribute is not plain data.
+            An attribute may also be missing, have another type, or name a missing object.
+        UnknownNameError: the plots that receive the event do not declare an attribute.
     """
     plain = isinstance(said, Event) and said.attributes is NO_ATTRIBUTES  # the common case
     if not isinstance(said, Event) or not (plain or isinstance(said.attributes, Mapping)):
         raise InputError(f'an event is an Event with its attributes, as Event("stop", {{}}), not {shown(said)}')
     if said.name in RESERVED:
         raise InputError(f"the event '{said.name}' is fired by the executive itself", found=said.name)
+    attributes = {} if plain else dict(said.attributes)
+    errors = []
+    for plot in plots:
+        declared = plot.receives.get(said.name)
+        if declared is not None:
+            try:
+                _plain(said.name, attributes, declared, "event")
+                _require_objects(said.name, attributes, declared, knowledge)
+                break
+            except InputError as error:
+                errors.append(error)
+    else:
+        if errors:
+            raise errors[0]
     if plain:
         return said
-    attributes = dict(said.attributes)
     copied = _copied(attributes, f"the attributes of '{said.name}'") if attributes else NO_ATTRIBUTES
     return said._replace(attributes=copied)
 

@@ -169,10 +169,11 @@ class Sequencer:
             after: seconds until the event arrives; until then, the run does not count as a deadlock.
 
         Raises:
-            InputError: only the executive itself fires the event, e.g. `done`, or an attribute is not plain data.
+            InputError: only the executive itself fires the event, e.g. `done`, or an attribute is not plain data. The
+                error is also raised if the plots that receive the event declare other attributes or types.
             StoreError: the store cannot be written.
         """
-        self._hand_in(message_checks.checked_event(event), after)
+        self._hand_in(message_checks.checked_event(event, self.library, self.knowledge), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
         """Post a change of knowledge from outside; call it in the loop's own thread.

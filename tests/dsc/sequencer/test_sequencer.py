@@ -522,3 +522,41 @@ def test_plots_that_share_knowledge_see_what_the_others_told_with_their_next_eve
     ends, at = run_simulated(main())
     assert [end.finished for end in ends] == [True, True]
     assert at == pytest.approx(3)
+
+
+RECEIVES = """
+    plot: p
+    receives: {deliver: {parcel: item, floor: number}}
+    states:
+      a: {on: {deliver: e}}
+      e: {final: true}
+"""
+
+
+@pytest.mark.parametrize(
+    ("attributes", "said"),
+    [
+        ({"parcel": "cup1"}, "the event 'deliver' needs its attribute 'floor' of type number"),
+        ({"parcel": "cup1", "floor": "two"}, "the attribute 'floor' of 'deliver' is a finite number, not 'two'"),
+        ({"parcel": "cup1", "flor": 2}, "the event 'deliver' has no attribute 'flor'; did you mean 'floor'?"),
+        ({"parcel": "cap1", "floor": 2}, "there is no object 'cap1'; did you mean 'cup1'?"),
+        ({"parcel": "shelf", "floor": 2}, "'shelf' is of type object"),
+        ({}, "the event 'deliver' needs its attribute 'parcel' of type item"),
+    ],
+)
+def test_an_event_from_outside_fits_the_declaration_of_a_plot_that_receives_it(attributes, said):
+    errors = []
+
+    def prepare(sequencer):
+        sequencer.change(Delta(nodes={"shelf": "object"}), "test")
+        sequencer.knowledge.apply(Delta(nodes={"shelf": "object"}), "test")
+        for wrong in (attributes, {"parcel": "cup1", "floor": 2}):
+            try:
+                sequencer.post(Event("deliver", wrong), after=1)
+            except InputError as error:
+                errors.append(str(error))
+
+    ran = Ran(RECEIVES, things=["cup1"], prepare=prepare)
+    (error,) = errors
+    assert said in error
+    assert ran.end.finished
