@@ -6,7 +6,7 @@ BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
-.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer lock-viewer test-viewer screenshots clean
+.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -158,5 +158,15 @@ screenshots: $(VENV)/.test $(NODE_MODULES)   ## the pictures of the page that th
 bench-viewer: $(VENV)/.test $(NODE_MODULES)   ## what the page weighs, what watching costs a run, 100,000 records opened and scrubbed (RUNS=N rounds)
 	$(BIN)/python benchmarks/viewer.py $(if $(RUNS),--rounds $(RUNS))
 
+SITE := .venv-docs
+
+$(SITE)/.made: pyproject.toml   # apart, since the site needs none of the tests' packages
+	$(PYTHON) -m venv $(SITE)
+	$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
+docs: $(SITE)/.made   ## build the pages and the reference as a site into site/; each warning and broken link is an error
+	NO_MKDOCS_2_WARNING=1 $(SITE)/bin/mkdocs build --strict
+
 clean:   ## forget the environment and caches
-	rm -rf $(VENV) $(BENCH) $(LOWER) $(MUTATION) .mutation frontend/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) $(BENCH) $(LOWER) $(MUTATION) $(SITE) site .mutation frontend/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

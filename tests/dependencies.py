@@ -56,6 +56,9 @@ WHY = {
     "pytest": ("tests", BUILD),
     "pytest-xdist": ("tests on all cores", BUILD),
     "mutmut": ("mutants in `make mutation`", BUILD),
+    "mkdocs": ("the site of the pages", BUILD),
+    "mkdocs-material": ("theme and offline search of the site", BUILD),
+    "mkdocstrings-python": ("the reference, from docstrings", BUILD),
     "import-linter": ("the direction of imports, checked", BUILD),
     "mypy": ("types, checked", BUILD),
     "ruff": ("style, checked", BUILD),
@@ -73,14 +76,14 @@ LICENCES = {
     "up-fast-downward": "GPL-3.0 (the engine)", "up-enhsp": "Apache-2.0; the engine GPL-3.0", "up-aries": "MIT",
     "pyoxigraph": "MIT OR Apache-2.0", "python-statemachine": "MIT", "rdflib": "BSD-3-Clause", "sismic": "LGPL-3.0",
     "scipy": "BSD-3-Clause", "transitions": "MIT", "xstate-statemachine": "MIT", "hatchling": "MIT",
-    "mutmut": "BSD-3-Clause",
+    "mutmut": "BSD-3-Clause", "mkdocs": "BSD-2-Clause", "mkdocs-material": "MIT", "mkdocstrings-python": "ISC",
 }  # fmt: skip
 """Of what `make test` does not install, and of a package that says too little."""
 SPELT = {"GPL3+": "GPL-3.0-or-later", "APACHE": "Apache-2.0", "BSD 2-Clause License": "BSD-2-Clause"}
 """Licences as packages say them, and as SPDX does."""
 TITLES = {
     "core": "Core", "viewer": "Extra `viewer`", "bt": "Extra `bt`", "fast": "Extra `fast`", "numeric": "Extra `numeric`",
-    "durations": "Extra `durations`", "test": "Extra `test`", "check": "Extra `check`", "bench": "Extra `bench`",
+    "durations": "Extra `durations`", "test": "Extra `test`", "check": "Extra `check`", "docs": "Extra `docs`", "bench": "Extra `bench`",
     "mutation": "Extra `mutation`",
     "build": "To build the package",
 }  # fmt: skip
