@@ -190,7 +190,7 @@ def skill_and_back() -> Flow:
         "states": {
             "rest": {"on": {"ping": "work"}},
             "work": {"entry": [{"trigger": "robot.work"}], "on": {"did": "next"}},
-            "next": {"entry": [{"trigger": "robot.stop"}], "on": {"stopped": "rest"}},
+            "next": {"entry": [{"trigger": "robot.halt"}], "on": {"stopped": "rest"}},
         },
     })  # fmt: skip
     return lambda counter: run_simulated(_worked(plot, counter))
@@ -225,7 +225,7 @@ class _Worker(Component):
         return Outcome("did")
 
     @skill(outcomes={"stopped": {}})
-    async def stop(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+    async def halt(self, call: SkillCall) -> Outcome:  # noqa: ARG002
         if self.counting:
             self._counter.stop()
         return Outcome("stopped")

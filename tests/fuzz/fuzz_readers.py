@@ -17,6 +17,7 @@ from fuzz_mutation import mutated, reset
 
 from domains.clean_up_table.deployment import bundle, deploy
 from domains.clean_up_table.scenario import Scenario
+from dsc.calls import Outcome, SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import LocalTransport
 from dsc.components.host import Host
@@ -326,9 +327,9 @@ class _Arm(Component):
     name = "arm"
 
     @skill(outcomes={"moved": {"to": None}})
-    async def move(self, to: str) -> Any:
+    async def move(self, call: SkillCall, to: str) -> Outcome:
         """Be there at once."""
-        return "moved", {"to": to}
+        return Outcome("moved", {"to": to})
 
 
 def read_frames(data: bytes, folder: Path) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from dsc import ProgrammingError
 from knowledge_base import Delta, InputError, UnknownNameError, fact
 from planning import Bundle, Simulation, Task, deploy
 from planning.deployment import own_task, plot_task
@@ -288,7 +289,7 @@ def test_a_simulation_without_components_cannot_be_made():
     class Empty(Simulation):
         pass
 
-    with pytest.raises(TypeError, match="components"):
+    with pytest.raises(ProgrammingError, match="abstract method components"):
         deploy(Bundle("empty", goal="(and)", simulation=Empty))
 
 
