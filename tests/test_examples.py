@@ -5,8 +5,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import tutorial
 
-EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
+EXAMPLES = sorted((Path(__file__).parent.parent / "examples").rglob("*.py"))
 MARK = "# Expected output:\n"
 
 
@@ -26,3 +27,11 @@ def test_an_example_prints_its_expected_output(example):
 
 def test_there_are_examples():
     assert len(EXAMPLES) >= 4
+
+
+def test_the_tutorial_page_has_the_present_programs():
+    assert tutorial.PAGE.read_text("utf-8") == tutorial.page(), "run python tests/tutorial.py"
+
+
+def test_the_steps_are_numbered_without_a_gap():
+    assert [file.stem.partition("_")[0] for file in tutorial.STEPS] == [f"step{n}" for n in range(1, 9)]
