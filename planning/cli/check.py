@@ -19,10 +19,16 @@ def check_command(
     Nothing is executed except the Python modules themselves. Exit status: 0 without findings, or with warnings only; 2
     with findings.
     """
+    import logging
+
     from dsc.cli.plots import BAD_INPUT, print_findings
     from planning.checking import check_project
 
-    findings = check_project(target)
+    logging.disable()  # each programming error is a finding
+    try:
+        findings = check_project(target)
+    finally:
+        logging.disable(logging.NOTSET)
     print_findings([(target, finding) for finding in findings], as_json=json, nothing=f"{target}: nothing found")
     wrong = [finding for finding in findings if strict or finding.level == "error"]
     raise typer.Exit(BAD_INPUT if wrong else 0)

@@ -129,3 +129,10 @@ def test_our_own_robots_have_no_findings(target, monkeypatch):
     monkeypatch.chdir(ROOT)
     monkeypatch.setattr(sys, "path", [*sys.path])
     assert check_project(target) == []
+
+
+def test_a_programming_error_is_one_line_of_the_list(project):
+    planted(project, [("delivery.py", "[Wheels(self), Gripper(self)]", "[Wheels(self), Griper(self)]", "")])
+    done = subprocess.run([DSC, "check", project], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "")
+    assert len(done.stdout.splitlines()) == 1
