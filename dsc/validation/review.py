@@ -137,7 +137,9 @@ def review_plot(plot: ActionPlot, library: Library) -> list[Finding]:
     if plot.dialect != "dsc":
         return []
     subject = Subject(plot, library)
-    checks = (_rules(subject), _handlers(subject), _transitions(subject), _candidates(subject))
+    checks = (
+        _rules(subject), _handlers(subject), _ignored_outcomes(subject), _transitions(subject), _candidates(subject),
+    )  # fmt: skip
     return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
 
 
@@ -163,6 +165,22 @@ def _handlers(subject: Subject) -> Iterator[Finding]:
         if why is not None:
             message = f"the '{handler.label}' can never answer: {why}{_listed(earlier)}"
             yield subject.finding(("handlers", number), "handlers", message, _LEFT_OUT, level="warning")
+
+
+def _ignored_outcomes(subject: Subject) -> Iterator[Finding]:
+    """Yield warnings about outcomes of plots in handlers and rules after which the run continues as after `done`.
+
+    After the plot of a rule that leaves or repeats the step, the outcome makes no difference.
+    """
+    reactions: list[tuple[Path, Rule | Handler]] = [
+        (("handlers", n), one) for n, one in enumerate(subject.plot.handlers)
+    ]
+    continuing = [(n, one) for n, one in enumerate(subject.plot.rules) if one.then in {CONTINUE, ENTER}]
+    for path, one in (*reactions, *((("rules", n), one) for n, one in continuing)):
+        for outcome in () if one.do.use is None else subject.library.plot(one.do.use).emits:
+            message = f"'{one.label}' ignores the outcome '{outcome}' of its plot '{one.do.use}'"
+            fix = f"let '{one.do.use}' handle '{outcome}' itself, or use the plot in a state with a transition on it"
+            yield subject.finding((*path, "do", "use"), "ignored outcomes", message, fix, level="warning")
 
 
 def _all_answer(event: str, subject: Subject) -> bool:
