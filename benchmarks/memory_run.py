@@ -54,7 +54,7 @@ WATCH = ActionPlot.model_validate({
             },
         },
     },
-    "rules": [{"on": "slipped", "do": {"then": "retry"}}],
+    "rules": [{"on": "slipped", "do": {"then": "retry"}}, {"on": "slipped", "do": {"then": "continue"}}],
 })  # fmt: skip
 
 

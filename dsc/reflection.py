@@ -103,7 +103,7 @@ def _rule(plot: str, name: str, rule: Rule) -> Iterator[_Said]:
         yield fact("answers", plot, rule.on, rule.label)
         yield fact("reacts-to", name, rule.on)
     yield from (fact("concerns", name, step) for step in rule.steps)
-    yield fact("leads-to", name, rule.then)
+    yield from (fact("leads-to", name, then) for then in sorted({one.then for one in rule.continuations}))
     yield from _run(plot, name, rule.do.use)
 
 

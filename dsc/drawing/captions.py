@@ -23,7 +23,7 @@ from dsc.model.actions import (
     Withdraw,
 )
 from dsc.model.plot import ActionPlot, PlotParameter, PlotVariable
-from dsc.model.rules import Handler, Rule
+from dsc.model.rules import Handler, Reaction, Rule
 from dsc.model.states import State
 from dsc.model.transitions import CHOICE, SelectState, TimedTransition, Transition, TransitionSource, case_value
 from knowledge_base.language.syntax.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable
@@ -272,7 +272,8 @@ def rule_text(rule: Rule) -> str:
     guard = f" [{to_text(rule.when)}]" if rule.when is not None else ""
     about = rule.on or f"{rule.place} {', '.join(rule.steps)}"
     of = f" of {', '.join(rule.of)}" if rule.of else ""
-    return f"{about}{of} → {', '.join([*steps, rule.then.replace('_', ' ')])}{passed}{limit}{guard}"
+    steps.append(rule.then.replace("_", " "))
+    return f"{about}{of} → {', '.join(steps)}{_other_outcomes(response)}{passed}{limit}{guard}"
 
 
 def handler_text(handler: Handler) -> str:
@@ -283,4 +284,8 @@ def handler_text(handler: Handler) -> str:
     steps += ["tell"] if do.tell is not None else []
     kind = "interrupted by" if handler.interrupt else "beside it"
     guard = f" [{to_text(handler.when)}]" if handler.when is not None else ""
-    return f"{kind} {handler.on} → {', '.join(steps)}{guard}"
+    return f"{kind} {handler.on} → {', '.join(steps)}{_other_outcomes(do)}{guard}"
+
+
+def _other_outcomes(do: Reaction) -> str:
+    return "".join(f"; {outcome} → {then.replace('_', ' ')}" for outcome, then in do.on.items())

@@ -15,11 +15,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from dsc.dynamic.responses import FreshNames
-from dsc.dynamic.steps import Plots, mentioned_in
-from dsc.events import DONE, FAILURES
+from dsc.dynamic.steps import mentioned_in
+from dsc.events import DONE
 from dsc.model.actions import Emit, Internal, Tell
 from dsc.model.plot import ActionPlot, initial_of
-from dsc.model.rules import Handler
+from dsc.model.rules import RESUME, Handler
 from dsc.model.states import AnyState, CompositeState, FinalState, OrthogonalState, Region, State, SubmachineState
 from dsc.model.transitions import Transition, TransitionSource
 from knowledge_base.language.syntax.expression import Variable
@@ -30,37 +30,32 @@ BESIDE = "active"
 """Name of the orthogonal state that contains the plot and its handlers; a number follows if the name is in use."""
 
 
-def with_handlers(
-    plot: ActionPlot, written: ActionPlot, plots: Plots, added: FreshNames, entrances: Mapping[str, str]
-) -> ActionPlot:
+def with_handlers(plot: ActionPlot, written: ActionPlot, added: FreshNames, entrances: Mapping[str, str]) -> ActionPlot:
     """Return the plot with the handlers of the written plot as states and transitions.
 
     Args:
         plot: the plot with its rules already expanded.
         written: the plot before any expansion, with its handlers.
-        plots: provider of the plots that handlers use.
         added: generator of names for added elements.
         entrances: for a step with insertions before it, the connector through which the step is entered.
-
-    Raises:
-        UnknownNameError: a handler uses a missing plot.
     """
     interrupting = [one for one in written.handlers if one.interrupt]
     listening = {one.on: added.event(f"{one.on}_heard") for one in written.handlers if one.listen is not None}
-    handling = _Handling(plots, added, listening)
+    handling = _Handling(added, listening)
     if interrupting:
         states = handling.interrupted(plot.states, interrupting, entrances)
         plot = plot.model_copy(update={"states": states})
+    plot = plot.model_copy(update={"states": handling.left(plot.states, written.handlers, entrances)})
     if listening or len(interrupting) < len(written.handlers):
         return handling.around(plot, written.handlers)
     return plot
 
 
 class _Handling:
-    def __init__(self, plots: Plots, added: FreshNames, listening: Mapping[str, str]) -> None:
-        self._plots = plots
+    def __init__(self, added: FreshNames, listening: Mapping[str, str]) -> None:
         self._added = added
         self._listening = listening
+        self._leading: dict[str, str] = {}
 
     def interrupted(
         self, states: Mapping[str, AnyState], handlers: list[Handler], entrances: Mapping[str, str]
@@ -84,10 +79,28 @@ class _Handling:
         on, more = dict(state.on), dict[str, AnyState]()
         for handler in handlers:
             handled = self._added.state(f"{name}_{handler.on}_handled")
-            more[handled] = self._handled(handler, back)
+            more[handled] = self._handled(handler, back, waiting=None)
             heard = self._heard(handler.on)
             on[heard] = (*on.get(heard, ()), _way(handler, handled))
         return {name: state.model_copy(update={"on": on}), **more}
+
+    def left(self, states: Mapping[str, AnyState], handlers: Iterable[Handler], entrances: Mapping[str, str]) -> States:
+        """Return the states at the top level with transitions for outcomes that continue at a named state.
+
+        A handler may end deep inside a state or in another region, so an internal event carries the outcome.
+        """
+        targets = {target for handler in handlers for target in handler.do.on.values()} - {RESUME}
+        ways = {self._leaving(one): (Transition(target=entrances.get(one, one)),) for one in sorted(targets)}
+        return {
+            name: state.model_copy(update={"on": {**state.on, **ways}}) if isinstance(state, State) else state
+            for name, state in states.items()
+        }
+
+    def _leaving(self, target: str) -> str:
+        """Return the name of the internal event that leads to the state `target`."""
+        if target not in self._leading:
+            self._leading[target] = self._added.event(f"then_{target}")
+        return self._leading[target]
 
     def around(self, plot: ActionPlot, handlers: Iterable[Handler]) -> ActionPlot:
         """Return a plot with one orthogonal state: a region with `plot`, and a region for each handled event."""
@@ -115,19 +128,28 @@ class _Handling:
             handled = None
             if handler.do.acts:
                 handled = self._added.state(f"{event}_handled")
-                more[handled] = self._handled(handler, awaited)
+                more[handled] = self._handled(handler, awaited, waiting=awaited)
             ways.append(_way(handler, handled))
         return {awaited: State(on={self._heard(event): tuple(ways)}), **more}
 
     def _heard(self, event: str) -> str:
         return self._listening.get(event, event)
 
-    def _handled(self, handler: Handler, back: str) -> AnyState:
+    def _handled(self, handler: Handler, back: str, waiting: str | None) -> AnyState:
+        """Return the state with a handler's actions.
+
+        Args:
+            handler: the handler.
+            back: target after the handler.
+            waiting: target if the handler's plot ends with an outcome that leads to another state; `None` to stay.
+        """
         do, onward = handler.do, (Transition(target=back),)
         if do.use is None:
             return State(entry=do.command, on={DONE: onward}, about=handler.label)
-        ends = (DONE, *self._plots.plot(do.use).emits, *sorted(FAILURES))
-        on = dict.fromkeys(ends, onward)
+        on = {DONE: onward}
+        for outcome, then in do.on.items():
+            leading = Transition(target=waiting, do=(Emit(emit=self._leaving(then)),)) if then != RESUME else onward[0]
+            on[outcome] = (leading,)
         return SubmachineState(use=do.use, arguments=do.arguments, entry=do.command, on=on, about=handler.label)
 
 

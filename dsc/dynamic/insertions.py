@@ -10,8 +10,9 @@ The condition of a `before` rule is evaluated at each entry into the step, from 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 
-from dsc.dynamic.responses import FreshNames, Responses, States
+from dsc.dynamic.responses import FreshNames, Onward, Responses, States
 from dsc.dynamic.steps import Plots, Step, about_step, concerns
 from dsc.events import DONE
 from dsc.model.actions import Assign
@@ -125,16 +126,11 @@ class Insertions:
         following = last
         for number, rule in reversed(rules):
             key = f"{mark}_{number}"
-            if rule.then != by_default:
-                onward = self._responses.onward(rule, number, name, state)
-            elif rule.do.passed:  # only the transition into the step passes arguments
-                onward = [last.model_copy(update={"passed": {**last.passed, **rule.do.passed}})]
-            else:
-                onward = [following]
-            self._leads_on(rule, number, name, onward)
+            default = partial(self._default, by_default=by_default, following=following, last=last)
+            onward = partial(self._onward, number=number, name=name, state=state, default=default)
             connector = self._added.state(key)
             made: States = {}
-            branches = self._responses.carried_out(rule, key, onward, made)
+            branches = self._responses.carried_out(rule, name, key, onward, made)
             if branches[-1].guard is not None:
                 branches.append(following)
             states[connector] = ChoiceState(choice=tuple(branches))
@@ -142,12 +138,23 @@ class Insertions:
             following = Transition(target=connector)
         return following
 
-    def _leads_on(self, rule: Rule, number: int, name: str, onward: list[Transition]) -> None:
+    @staticmethod
+    def _default(rule: Rule, by_default: str, following: Transition, last: Transition) -> list[Transition]:
+        """Return the transition to the next insertion if the rule continues so by default; else an empty list."""
+        if rule.then != by_default:
+            return []
+        if rule.do.passed:  # only the transition into the step passes arguments
+            return [last.model_copy(update={"passed": {**last.passed, **rule.do.passed}})]
+        return [following]
+
+    def _onward(self, rule: Rule, number: int, name: str, state: Step, default: Onward) -> list[Transition]:
+        onward = default(rule) or self._responses.onward(rule, number, name, state)
         if any(way.target is None for way in onward):
             raise SchemaError(
                 f"a rule cannot '{rule.then}' at state '{name}', which stays where it is then",
                 place=self._plot.place(("rules", number, "do")),
             )
+        return onward
 
 
 def _handing_over(way: Transition, target: str, kept: Mapping[str, Term]) -> dict[str, object]:

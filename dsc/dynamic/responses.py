@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 from collections import ChainMap
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Callable, Container, Mapping
 from typing import Any
 
 from dsc.dynamic.steps import Plots, filled
-from dsc.events import DONE, GAVE_UP, SKILL_FAILURES
+from dsc.events import DONE, FAILURES, GAVE_UP, SKILL_FAILURES
 from dsc.model.actions import Assign, Emit, Internal, Tell
 from dsc.model.plot import ActionPlot, PlotVariable
 from dsc.model.rules import CONTINUE, ENTER, GIVE_UP, REPLAN, RETRY, Rule
@@ -23,6 +23,7 @@ DEFAULT_RETRIES = 3
 
 States = dict[str, AnyState]
 Terms = Mapping[str, lang.Term]
+Onward = Callable[[Rule], list[Transition]]
 
 
 class Responses:
@@ -44,27 +45,40 @@ class Responses:
         self._ends: dict[tuple[int, str], str] = {}
         self._endings: dict[tuple[str, str], Transition] = {}
 
-    def carried_out(self, rule: Rule, key: str, onward: Iterable[Transition], states: States) -> list[Transition]:
-        """Return transitions that execute a rule's response and then continue with `onward`.
+    def carried_out(self, rule: Rule, step: str, key: str, onward: Onward, states: States) -> list[Transition]:
+        """Return transitions that execute a rule's response and then continue.
 
         A response with commands or a plot needs a recovery state, which is added to `states`.
 
         Args:
             rule: the rule, with the step's arguments already substituted.
+            step: name of the step.
             key: common part of the names of added elements.
-            onward: transitions to take after the response.
+            onward: function that returns the transitions for the continuation of a rule.
             states: mapping to which the recovery state is added.
         """
         guard, counting = self._limit(rule, key)
-        onward = list(onward)
         if not rule.do.acts:
-            return [_joined(rule, guard, counting, self._handed_out(after)) for after in onward]
+            return [_joined(rule, guard, counting, self._handed_out(after)) for after in onward(rule)]
         name = self._added.state(f"{key}_{rule.do.use or 'command'}")
         kept: dict[str, lang.Term] = {}
-        kept_onward = [one.model_copy(update={"passed": self._kept(one.passed, key, kept)}) for one in onward]
-        onward = list(map(self._handed_out, kept_onward))
-        states[name] = self._acting(rule, key, onward, kept)
+        ways = {DONE: onward(rule), **{outcome: onward(rule.after_outcome(outcome)) for outcome in rule.do.on}}
+        on = {event: tuple(self._afterwards(way, key, kept) for way in found) for event, found in ways.items()}
+        states[name] = self._acting(rule, key, {**self._replanning(rule, step), **on}, kept)
         return [_joined(rule, guard, {**counting, **kept}, Transition(target=name))]
+
+    def _afterwards(self, way: Transition, key: str, kept: dict[str, lang.Term]) -> Transition:
+        """Return a transition out of a recovery state; `kept` receives the values that it can no longer read."""
+        return self._handed_out(way.model_copy(update={"passed": self._kept(way.passed, key, kept)}))
+
+    def _replanning(self, rule: Rule, step: str) -> dict[str, tuple[Transition, ...]]:
+        """Return transitions for all outcomes and failures of a rule's plot inside a plan, which need a new plan."""
+        if rule.do.use is None:
+            return {}
+        events = (*self._plots.plot(rule.do.use).emits, *sorted(FAILURES))
+        if not self._plot.generated:
+            return {}
+        return {event: (self.ending(step, REPLAN, reason_of(event)),) for event in events}
 
     def onward(self, rule: Rule, number: int, name: str, state: State) -> list[Transition]:
         """Return the transitions for the continuation of a rule at a step.
@@ -136,13 +150,13 @@ class Responses:
         lost = {name: term for name, term in terms.items() if reads_event(term)}
         return {**terms, **self.remembered(lost, key, kept)}
 
-    def _acting(self, rule: Rule, key: str, onward: Iterable[Transition], kept: dict[str, lang.Term]) -> AnyState:
+    def _acting(
+        self, rule: Rule, key: str, on: Mapping[str, tuple[Transition, ...]], kept: dict[str, lang.Term]
+    ) -> AnyState:
         do, about = rule.do, f"rule: {_spoken(rule)} {rule.do.use or 'command'}, then {rule.then}"
         if do.use is None:
-            return State(entry=do.command, on={DONE: tuple(onward)}, about=about)
+            return State(entry=do.command, on=on, about=about)
         arguments = self._kept(do.arguments, key, kept) if self._interrupted else do.arguments
-        ends = (DONE, *self._plots.plot(do.use).emits)
-        on = {end: tuple(onward) for end in ends}
         return SubmachineState(use=do.use, arguments=arguments, entry=do.command, on=on, about=about)
 
     def _limit(self, rule: Rule, key: str) -> tuple[lang.Expression | None, dict[str, lang.Term]]:
@@ -166,7 +180,8 @@ class Responses:
 
 def limit_of(rule: Rule, *, generated: bool = False) -> int | None:
     """Return the upper bound of a rule's responses for one state; `None` means no bound."""
-    bounded = rule.then == RETRY or (rule.then == REPLAN and not generated)
+    repeating = {RETRY} if generated else {RETRY, REPLAN}
+    bounded = any(one.then in repeating for one in rule.continuations)
     return rule.do.limit or (DEFAULT_RETRIES if bounded else None)
 
 

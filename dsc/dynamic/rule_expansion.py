@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, MutableMapping, Sequence
+from functools import partial
 
 from dsc.dynamic.event_handlers import with_handlers
 from dsc.dynamic.insertions import Insertions
@@ -30,7 +31,7 @@ def expand(plot: ActionPlot, plots: Plots) -> ActionPlot:
     added = expansion.added
     expanded = plot.model_copy(update={**expansion.scope(plot), "rules": (), "handlers": ()})
     if plot.handlers:
-        expanded = with_handlers(expanded, plot, plots, added, expansion.detours.entrances)
+        expanded = with_handlers(expanded, plot, added, expansion.detours.entrances)
     return expanded.model_copy(update={"variables": {**plot.variables, **added.variables}})
 
 
@@ -39,7 +40,8 @@ class _Expansion:
         self._plot, self._plots = plot, plots
         self.added = FreshNames(plot)
         self._responses = Responses(plot, plots, self.added)
-        self._in_plans = [rule for rule in plot.rules if rule.leads_away and answers_in_plans(rule, plots)]
+        answering = [rule for rule in plot.rules if answers_in_plans(rule, plots)]
+        self._in_plans = [one for rule in answering for one in rule.continuations if one.leads_away]
         self._given_up: dict[str, str] = {}  # reasons, by the event with which an inner state reports `gave_up`
         self.detours = Insertions(plot, plots, self.added, self._responses)
 
@@ -82,8 +84,8 @@ class _Expansion:
             for number, rule in enumerate(self._plot.rules):
                 if rule.on == event and concerns(rule, name, state, self._plots):
                     about = about_step(rule, state, self._plot)
-                    onward = self._responses.onward(about, number, name, state)
-                    own += self._responses.carried_out(about, f"{name}_{event}_{number}", onward, recoveries)
+                    onward = partial(self._responses.onward, number=number, name=name, state=state)
+                    own += self._responses.carried_out(about, name, f"{name}_{event}_{number}", onward, recoveries)
             if self._plot.generated and event != PROGRAMMING_ERROR:
                 reason = "no candidate fits" if event == NO_CANDIDATE else reason_of(event)
                 own.append(self._responses.ending(name, REPLAN, reason))

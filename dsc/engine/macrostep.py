@@ -19,6 +19,7 @@ from dsc.engine.tables import TransitionEdge
 from dsc.engine.transition_selection import Addressed, Enabled, Trigger, select
 from dsc.errors import RunawayError
 from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event, goes_outwards
+from dsc.model.states import FinalState
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.expression import Expression
 
@@ -91,8 +92,26 @@ class Macrostep:
             if not internal:
                 return
             event = internal.popleft()
-            if not self._take(event) and event.name in ERRORS:
-                self._unhandled(event)
+            if not self._take(event):
+                if event.name in ERRORS:
+                    self._unhandled(event)
+                elif event.to is not None:
+                    self._refuse_lost_outcome(event, event.to)
+
+    def _refuse_lost_outcome(self, event: Event, host: int) -> None:
+        """Record an error if a plot has ended with this outcome, because its host state would wait without end."""
+        found = self._find(host)
+        if found is None:
+            return
+        frame, state = found
+        inner = frame.children.get(state)
+        if inner is None or inner.compiled.scxml:
+            return
+        plot = inner.compiled.plot
+        ended = any(isinstance(plot.states.get(name), FinalState) for name in inner.configuration.names)
+        if ended and event.name in plot.emits:
+            state = frame.prefix + state
+            self._performer.errors.append(f"state '{state}' does not handle '{event.name}' of plot '{plot.name}'")
 
     def _unhandled(self, error: Event) -> None:
         """Record an error event that no transition handles.

@@ -14,6 +14,8 @@ from dsc.model.language import ConditionField, EffectField, Frozen, TermField, b
 from dsc.model.transitions import as_tuple
 
 RETRY, CONTINUE, REPLAN, GIVE_UP, ENTER = "retry", "continue", "replan", "give_up", "enter"
+RESUME = "resume"
+"""Continuation after an outcome of a handler's plot: as after `done`, return to the previous activity."""
 
 RESPONSES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -43,12 +45,20 @@ class Reaction(Frozen):
         tell: change of the knowledge base.
         command: commands to components: set a parameter, switch a mode, send a message.
         use, arguments: name of the plot to run, and values for its parameters (`with`).
+        on: continuation after each outcome of the plot other than `done`, by the outcome.
     """
 
     tell: EffectField | None = None
     command: Commands = ()
     use: str | None = None
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
+    on: dict[str, str] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _has_outcomes_of_a_plot(self) -> Reaction:
+        if self.on and self.use is None:
+            raise ValueError("`on` names outcomes of the plot under `use`; here is no `use`")
+        return self
 
     @property
     def acts(self) -> bool:
@@ -60,9 +70,9 @@ class Response(Reaction):
     """The response of a rule: actions and a continuation.
 
     Attributes:
-        then: the continuation, independent of the used plot's outcome; see `Rule.then` for the default. `retry` enters
-            the step again, which chooses among its candidates. `continue` treats the step as done. `enter` enters the
-            step after a `before` rule. `replan` and `give_up` concern the plan. Any other word is a state's name.
+        then: the continuation; with `use`, after the plot is done. See `Rule.then` for the default. `retry` enters the
+            step again, which chooses among its candidates. `continue` treats the step as done. `enter` enters the step
+            after a `before` rule. `replan` and `give_up` concern the plan. Any other word is a state's name.
         passed: arguments for the step or state that is entered next (`pass`); they override that state's `with`.
         limit: upper bound of this rule's responses for one state while the plot is active; `None` means the default.
     """
@@ -119,6 +129,17 @@ class Rule(Frozen):
         return self.do.then or RESPONSES[self.place][0]
 
     @property
+    def continuations(self) -> tuple[Rule, ...]:
+        """The rule, and for each other outcome of its plot the rule with the continuation after this outcome."""
+        return (self, *map(self.after_outcome, self.do.on))
+
+    def after_outcome(self, outcome: str) -> Rule:
+        """Return the rule with the continuation after an outcome of its plot, which passes no arguments."""
+        return self.model_copy(
+            update={"do": self.do.model_copy(update={"then": self.do.on[outcome], "passed": {}, "on": {}})}
+        )
+
+    @property
     def leads_away(self) -> bool:
         """Whether the continuation is a named state; a plan has no such state, so the rule leaves the plan."""
         return self.then not in RESPONSES[self.place]
@@ -139,8 +160,10 @@ class Rule(Frozen):
 class Handler(Frozen):
     """An event handler: a plot's response to an event at any time while the plot is active (S1.14).
 
-    A rule responds to the outcome of a step and decides the continuation. A handler decides none: after an interrupting
-    handler, the interrupted state is entered again.
+    A rule responds to the outcome of a step and decides the continuation. After a handler, the plot continues as
+    before: after an interrupting handler, the interrupted state is entered again. Under `on`, the word `resume` asks
+    for the same after an outcome of the handler's plot. Any other word is a state at the top level of the plot, which
+    is entered instead.
 
     Attributes:
         on: name of an event that the plot `receives`, that a part of the plot fires, or that `listen` activates.

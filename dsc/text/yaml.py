@@ -270,7 +270,8 @@ def _quoted(data: Any) -> Any:
         return {_quoted(key): _quoted(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
         return [_quoted(one) for one in data]
-    if isinstance(data, str) and (_plain(data) != data or not data.isprintable()):  # single quotes fold line breaks
+    # YAML reads ':0' as a mapping, and single quotes fold line breaks.
+    if isinstance(data, str) and (_plain(data) != data or not data.isprintable() or data.startswith(":")):
         return DoubleQuotedScalarString(data)
     return data
 

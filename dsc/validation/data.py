@@ -215,7 +215,7 @@ class _Data:
         if rule.do.passed:
             entered = entered_by(rule, self._plot, self._library)
             yield from self._given(rule.do.passed, scope, (*path, "do", "pass"), entered)
-        if rule.on is not None and rule.then == CONTINUE:
+        if rule.on is not None and any(one.then == CONTINUE for one in rule.continuations):
             yield from self._continued(rule, {**self._own, **scope}, (*path, "do", "then"))
 
     def _handler(self, handler: Handler, path: Path) -> Iterator[Finding]:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from dsc.dynamic.responses import limit_of
 from dsc.dynamic.steps import Step, answerable, answers_in_plans, concerns, is_planned, outcomes_of
 from dsc.errors import Finding
-from dsc.events import DONE, EXECUTIVES, NO_CANDIDATE, RESERVED, TIMERS
+from dsc.events import DONE, EXECUTIVES, NO_CANDIDATE, RESERVED, SKILL_FAILURES, TIMERS
 from dsc.model.actions import Trigger
 from dsc.model.plot import ActionPlot, Path
+from dsc.model.rules import GIVE_UP, RESUME, Rule
 from dsc.model.states import AnyState, FinalState, State, SubmachineState
 from dsc.model.transitions import Connector
 from dsc.validation.reach import check_completion, circle_of
@@ -35,6 +36,7 @@ def check_wiring(subject: Subject) -> Iterator[Finding]:
     yield from (_reserved(subject, event, ("receives", event)) for event in receives if event in RESERVED)
     yield from _rule_targets(subject)
     yield from _left_out_in_a_circle(subject, expanded)
+    yield from _outcomes_of_reactions(subject)
     for name, state, path in subject.states:
         if isinstance(state, FinalState):
             yield from _final(subject, state, path)
@@ -61,7 +63,8 @@ def _reserved(subject: Subject, event: str, path: Path) -> Finding:
 def _rule_targets(subject: Subject) -> Iterator[Finding]:
     """Yield findings about rules whose target is not in the scope of a state to which the rule applies."""
     library, plot = subject.library, subject.plot
-    leading = [(n, rule) for n, rule in enumerate(plot.rules) if rule.leads_away and not plot.generated]
+    rules = [] if plot.generated else plot.rules
+    leading = [(n, one) for n, rule in enumerate(rules) for one in rule.continuations if one.leads_away]
     for scope in plot.scopes() if leading else ():
         steps = [(name, state) for name, state in scope.states.items() if isinstance(state, Step)]
         for number, rule in leading:
@@ -75,6 +78,36 @@ def _rule_targets(subject: Subject) -> Iterator[Finding]:
                         f"the rule's way from {where} to '{rule.then}' crosses a border",
                         "name the states of the rule with `of`", found=rule.then, valid=scope.states,
                     )  # fmt: skip
+
+
+def _outcomes_of_reactions(subject: Subject) -> Iterator[Finding]:
+    """Yield findings about unknown and unhandled outcomes of the plots that rules and handlers use.
+
+    In a plan, an unhandled outcome causes a new plan, so a rule only for steps of plans may omit it.
+    """
+    for path, do in subject.reactions():
+        if do.use is None or do.use not in subject.library:
+            continue
+        outcomes = subject.library.plot(do.use).emits
+        valid = {*outcomes, *SKILL_FAILURES}
+        for event in do.on.keys() - valid:
+            message = f"plot '{do.use}' has no outcome '{event}'"
+            yield subject.finding((*path, "on", event), "known outcome", message, found=event, valid=valid)
+        if path[0] == "rules" and not _answers_here(subject, subject.plot.rules[int(path[1])]):
+            continue
+        for event in outcomes.keys() - do.on.keys():
+            message = f"nothing handles the outcome '{event}' of plot '{do.use}'"
+            then = RESUME if path[0] == "handlers" else GIVE_UP
+            fix = f"add `on: {{{event}: {then}}}` here, or the name of a state instead of `{then}`"
+            yield subject.finding((*path, "use"), "every outcome is wired", message, fix)
+
+
+def _answers_here(subject: Subject, rule: Rule) -> bool:
+    """Return whether a rule may respond to a state that the plot's author wrote."""
+    if subject.plot.generated:
+        return False
+    here = (state for name, state, _ in subject.steps if concerns(rule, name, state, subject.library))
+    return any(rule.on is None or rule.on in answerable(state, subject.library) for state in here)
 
 
 def _left_out_in_a_circle(subject: Subject, expanded: ActionPlot) -> Iterator[Finding]:

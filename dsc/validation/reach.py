@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
+from itertools import chain
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Step, concerns
@@ -90,7 +91,8 @@ def _unreached(subject: Subject) -> Iterator[Finding]:
     except InputError:  # another check reports rules that cannot be applied
         return
     ways = subject if expanded is subject.plot else Subject(expanded, subject.library)
-    responses = {rule.then for rule in subject.plot.rules}  # only steps of plans may have the outcomes of these rules
+    continuations = chain.from_iterable(rule.continuations for rule in subject.plot.rules)
+    responses = {one.then for one in continuations}  # only steps of plans may have the outcomes of these rules
     for name in _unreached_in(expanded, (), ways, responses):
         if name in subject.names:
             yield _nothing_leads_to(name, subject)

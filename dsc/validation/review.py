@@ -6,10 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, combinations, groupby, islice
 
 from dsc.dynamic.library import Library
+from dsc.dynamic.responses import limit_of
 from dsc.dynamic.steps import answerable, concerns
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Path
-from dsc.model.rules import CONTINUE, ENTER, REPLAN, RETRY, Handler, Rule
+from dsc.model.rules import CONTINUE, ENTER, Handler, Rule
 from dsc.model.states import CompositeState, DynamicState, State
 from dsc.validation.library import MAX_FINDINGS
 from dsc.validation.subject import Subject
@@ -39,6 +40,8 @@ Conditions = Mapping[str, Expression]
 
 
 _LEFT_OUT = "remove it, or change its condition"
+_ONWARD = {"before": frozenset({ENTER}), "after": frozenset({CONTINUE})}
+"""Continuations that lead to the next rule of the step, by the place of the rule."""
 
 
 def _candidates(subject: Subject) -> Iterator[Finding]:
@@ -137,9 +140,7 @@ def review_plot(plot: ActionPlot, library: Library) -> list[Finding]:
     if plot.dialect != "dsc":
         return []
     subject = Subject(plot, library)
-    checks = (
-        _rules(subject), _handlers(subject), _ignored_outcomes(subject), _transitions(subject), _candidates(subject),
-    )  # fmt: skip
+    checks = (_rules(subject), _handlers(subject), _transitions(subject), _candidates(subject))
     return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
 
 
@@ -167,22 +168,6 @@ def _handlers(subject: Subject) -> Iterator[Finding]:
             yield subject.finding(("handlers", number), "handlers", message, _LEFT_OUT, level="warning")
 
 
-def _ignored_outcomes(subject: Subject) -> Iterator[Finding]:
-    """Yield warnings about outcomes of plots in handlers and rules after which the run continues as after `done`.
-
-    After the plot of a rule that leaves or repeats the step, the outcome makes no difference.
-    """
-    reactions: list[tuple[Path, Rule | Handler]] = [
-        (("handlers", n), one) for n, one in enumerate(subject.plot.handlers)
-    ]
-    continuing = [(n, one) for n, one in enumerate(subject.plot.rules) if one.then in {CONTINUE, ENTER}]
-    for path, one in (*reactions, *((("rules", n), one) for n, one in continuing)):
-        for outcome in () if one.do.use is None else subject.library.plot(one.do.use).emits:
-            message = f"'{one.label}' ignores the outcome '{outcome}' of its plot '{one.do.use}'"
-            fix = f"let '{one.do.use}' handle '{outcome}' itself, or use the plot in a state with a transition on it"
-            yield subject.finding((*path, "do", "use"), "ignored outcomes", message, fix, level="warning")
-
-
 def _all_answer(event: str, subject: Subject) -> bool:
     """Return whether each interruptible state always handles the event itself."""
     resting = [state for _, state, _ in subject.states if isinstance(state, State)]
@@ -200,9 +185,8 @@ def _comes_before(earlier: Rule, later: Rule) -> bool:
         return False
     if earlier.steps and not (later.steps and set(later.steps) <= set(earlier.steps)):
         return False
-    bounded = earlier.do.limit is not None or earlier.then in {RETRY, REPLAN}
-    goes_on = (earlier.place, earlier.then) in {("before", ENTER), ("after", CONTINUE)}
-    return not (bounded or goes_on)
+    goes_on = {one.then for one in earlier.continuations} & _ONWARD.get(earlier.place, frozenset())
+    return limit_of(earlier) is None and not goes_on
 
 
 def _settled(subject: Subject, rule: Rule, event: str) -> bool:

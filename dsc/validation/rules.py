@@ -10,7 +10,7 @@ from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model.actions import Trigger
 from dsc.model.plot import Path
-from dsc.model.rules import ENTER, RESPONSES, RETRY, STEP, Handler, Rule
+from dsc.model.rules import ENTER, RESPONSES, RESUME, RETRY, STEP, Handler, Rule
 from dsc.model.states import State
 from dsc.validation.subject import Subject, Types
 
@@ -26,17 +26,32 @@ def check_rules(subject: Subject) -> Iterator[Finding]:
             yield subject.unknown_plot((*path, "use"), do.use)
     steps = subject.names.keys() | {other.implements for other in subject.library if other.implements}
     for number, rule in enumerate(plot.rules):
-        if not (plot.generated and rule.outcome in plot.emits):  # otherwise the plot with the goal contains the state
-            yield from _response(subject, rule, ("rules", number, "do"))
-        key = "of" if rule.on is not None else rule.place
-        for position, name in enumerate(rule.steps):
-            if name not in steps:
-                yield _no_step(subject, name, ("rules", number, key, position), steps)
+        yield from _rule(subject, rule, ("rules", number), steps)
     for number, handler in enumerate(plot.handlers):
-        if handler.interrupt and not handler.do.acts:
-            message = "a handler that only tells something interrupts nothing"
-            fix = "remove `interrupt`, or name a plot to `use`"
-            yield subject.finding(("handlers", number), "handler", message, fix)
+        yield from _handler(subject, handler, ("handlers", number))
+
+
+def _rule(subject: Subject, rule: Rule, path: Path, steps: set[str]) -> Iterator[Finding]:
+    plot = subject.plot
+    places: list[Path] = [("then",), *(("on", event) for event in rule.do.on)]
+    for place, one in zip(places, rule.continuations, strict=True):
+        if not (plot.generated and one.outcome in plot.emits):  # otherwise the plot with the goal contains the state
+            yield from _response(subject, one, (*path, "do"), place)
+    key = "of" if rule.on is not None else rule.place
+    for position, name in enumerate(rule.steps):
+        if name not in steps:
+            yield _no_step(subject, name, (*path, key, position), steps)
+
+
+def _handler(subject: Subject, handler: Handler, path: Path) -> Iterator[Finding]:
+    if handler.interrupt and not handler.do.acts:
+        message = "a handler that only tells something interrupts nothing"
+        yield subject.finding(path, "handler", message, "remove `interrupt`, or name a plot to `use`")
+    valid = {RESUME, *subject.plot.states}
+    for outcome, then in handler.do.on.items():
+        if then not in valid:
+            message = f"a handler cannot '{then}' after its plot"
+            yield subject.finding((*path, "do", "on", outcome), "rule response", message, found=then, valid=valid)
 
 
 def _no_step(subject: Subject, name: str, path: Path, steps: set[str]) -> Finding:
@@ -54,12 +69,12 @@ def _no_step(subject: Subject, name: str, path: Path, steps: set[str]) -> Findin
     return subject.finding(path, "rule", message, found=name)
 
 
-def _response(subject: Subject, rule: Rule, path: Path) -> Iterator[Finding]:
+def _response(subject: Subject, rule: Rule, path: Path, key: Path) -> Iterator[Finding]:
     valid = subject.names.keys() | set(RESPONSES[rule.place])
     if rule.then not in valid:
         where = "" if rule.on is not None else f" {rule.place} a step"
         message = f"a rule cannot '{rule.then}'{where}"
-        yield subject.finding((*path, "then"), "rule response", message, found=rule.then, valid=valid)
+        yield subject.finding((*path, *key), "rule response", message, found=rule.then, valid=valid)
     elif rule.do.passed and rule.then not in subject.names.keys() | {RETRY, ENTER}:
         message = f"arguments are passed by a rule whose response is '{rule.then}'"
         fix = "pass them with `retry`, or to a state"

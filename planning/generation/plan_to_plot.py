@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 
 from dsc.dynamic.library import Library
 from dsc.events import GAVE_UP, SKILL_FAILURES
@@ -105,7 +105,8 @@ def plot_of(plan: Plan, layout: Layout, name: str, *, watched: bool) -> ActionPl
     """Return the plot of a layout; with `watched`, its states report the progress to the planning component."""
     steps, lanes, rules = layout.steps, layout.lanes, layout.rules
     left_out = [n for n, step in enumerate(plan.steps, start=1) if any(_leaves_out(rule, step) for rule in rules)]
-    leading = {rule.outcome: dict.fromkeys(rule.do.passed, "symbol") for rule in rules if rule.leads_away}
+    continuations = chain.from_iterable(rule.continuations for rule in rules)
+    leading = {one.outcome: dict.fromkeys(one.do.passed, "symbol") for one in continuations if one.leads_away}
     writer = Writer(steps, layout.order, lanes, name if watched else None, left_out, leading)
     ends = {FINISHED: {"final": True}}
     if len(lanes) == 1:

@@ -57,8 +57,10 @@ def innermost(run):
     return [path for path in run.active if not any(other.startswith(path + "/") for other in run.active)]
 
 
-BESIDE = "{on: low, do: {tell: (low), use: say, with: {level: ?event.level}}}"
-INTERRUPT = "{on: low, interrupt: true, do: {tell: (low), use: say, with: {level: ?event.level}}}"
+BESIDE = "{on: low, do: {tell: (low), use: say, on: {unheard: resume}, with: {level: ?event.level}}}"
+INTERRUPT = (
+    "{on: low, interrupt: true, do: {tell: (low), use: say, on: {unheard: resume}, with: {level: ?event.level}}}"
+)
 
 
 # -- beside ------------------------------------------------------------------------------------------------
@@ -158,13 +160,51 @@ def test_a_recovery_is_interrupted_too_and_keeps_its_arguments():
 
 def test_coming_back_leads_through_what_is_inserted_before_a_step():
     text = HOLDER.replace("    handlers:", "    rules: [{before: one, when: (p), do: {use: say}}]\n    handlers:")
-    run = run_of("{on: low, interrupt: true, do: {use: say}}", text=text)
+    run = run_of("{on: low, interrupt: true, do: {use: say, on: {unheard: resume}}}", text=text)
     run.send("low", level=1)
     run.facts.add(Fact("p"))
     step = run.send("said")
     assert step.entered("saying")
     run.send("said")
     assert run.active == ["one", "one/work"]
+
+
+# -- outcomes of the handlers' plots -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("handler", [BESIDE, INTERRUPT])
+def test_an_outcome_of_a_handlers_plot_leads_to_the_named_state(handler):
+    for deep in (False, True):
+        run = run_of(handler.replace("unheard: resume", "unheard: ended_well"))
+        run.send("ok" if deep else "other")
+        run.send("low", level=7)
+        assert [each.name for each in run.send("deaf").emitted] == ["good"]
+        assert run.machine.state.finished
+
+
+@pytest.mark.parametrize("handler", [BESIDE, INTERRUPT])
+def test_an_outcome_of_a_handlers_plot_leads_through_what_is_inserted_before_the_named_state(handler):
+    text = HOLDER.replace(
+        "    handlers:", "    rules: [{before: one, when: (p), do: {use: step, then: two}}]\n    handlers:"
+    )
+    run = run_of(handler.replace("unheard: resume", "unheard: one"), text=text)
+    run.send("low", level=7)
+    run.facts.add(Fact("p"))
+    run.send("deaf")
+    run.send("ok")
+    assert run.machine.state.is_active("two")
+
+
+@pytest.mark.parametrize("handler", [BESIDE, INTERRUPT])
+def test_an_outcome_of_a_handlers_plot_that_nothing_handles_is_an_error(handler):
+    unhandled = handler.replace(", on: {unheard: resume}", "")
+    run = run_of(unhandled)
+    run.send("low", level=7)
+    (error,) = run.send("deaf").errors
+    assert "does not handle 'unheard' of plot 'say'" in error
+    (finding,) = findings_of(unhandled)
+    assert "nothing handles the outcome 'unheard' of plot 'say'" in finding
+    assert "add `on: {unheard: resume}` here" in finding
 
 
 # -- events of components ----------------------------------------------------------------------------------
@@ -253,20 +293,35 @@ def test_a_right_handler_has_no_findings(handler):
 @pytest.mark.parametrize(
     ("handler", "message"),
     [
-        ("{on: lwo, do: {use: say}}", "nothing here fires the event 'lwo'"),
+        ("{on: lwo, do: {use: say, on: {unheard: resume}}}", "nothing here fires the event 'lwo'"),
         ("{on: low, do: {use: sya}}", "there is no plot 'sya'"),
-        ("{on: low, do: {use: say, with: {txt: a}}}", "has no parameter 'txt'"),
-        ("{on: low, do: {use: say, with: {text: ?event.lvel}}}", "no variable '?event.lvel'"),
-        ("{on: low, when: (< ?event.lvel 3), do: {use: say}}", "event.lvel"),
+        ("{on: low, do: {use: say, on: {unheard: resume}, with: {txt: a}}}", "has no parameter 'txt'"),
+        ("{on: low, do: {use: say, on: {unheard: resume}, with: {text: ?event.lvel}}}", "no variable '?event.lvel'"),
+        ("{on: low, when: (< ?event.lvel 3), do: {use: say, on: {unheard: resume}}}", "event.lvel"),
         (
-            "{on: low, do: {use: say, with: {text: ?event.level}}}",
+            "{on: low, do: {use: say, on: {unheard: resume}, with: {text: ?event.level}}}",
             "'text' is of type text, and ?event.level is of type number",
         ),
-        ("{on: low, do: {use: say, with: {text: a, loud: 3}}}", "'loud' is of type boolean, and 3 is of type number"),
-        ("{on: poor, do: {use: say}}", "nothing here fires the event 'poor'"),
+        (
+            "{on: low, do: {use: say, on: {unheard: resume}, with: {text: a, loud: 3}}}",
+            "'loud' is of type boolean, and 3 is of type number",
+        ),
+        (
+            "{on: low, do: {use: say, on: {unheard: resume, unherd: resume}}}",
+            "no outcome 'unherd'; did you mean 'unheard'",
+        ),
+        ("{on: low, do: {use: say, on: {unheard: resum}}}", "cannot 'resum' after its plot; did you mean 'resume'"),
+        ("{on: low, do: {use: say, on: {unheard: a}}}", "cannot 'a' after its plot"),
+        ("{on: poor, do: {use: say, on: {unheard: resume}}}", "nothing here fires the event 'poor'"),
         ("{on: low, interrupt: true, do: {tell: (p)}}", "interrupts nothing"),
-        ("{on: low, listen: {trigger: battery.lo}, do: {use: say}}", "no component offers the skill 'battery.lo'"),
-        ("{on: weak, listen: {trigger: battery.low}, do: {use: say}}", "does not bring the event 'weak'"),
+        (
+            "{on: low, listen: {trigger: battery.lo}, do: {use: say, on: {unheard: resume}}}",
+            "no component offers the skill 'battery.lo'",
+        ),
+        (
+            "{on: weak, listen: {trigger: battery.low}, do: {use: say, on: {unheard: resume}}}",
+            "does not bring the event 'weak'",
+        ),
     ],
 )
 def test_a_wrong_handler_is_one_finding(handler, message):

@@ -67,7 +67,7 @@ READING = """
       elsewhere:
     rules:
       - {on: failed, when: (> ?most 1), do: {then: elsewhere}}
-      - {on: failed, when: (and (< ?done ?most) (on cup3 ?what)), do: {use: recover, with: {item: ?what}, then: continue}}
+      - {on: failed, when: (and (< ?done ?most) (on cup3 ?what)), do: {use: recover, with: {item: ?what}, on: {stuck: continue}, then: continue}}
 """
 
 
@@ -117,7 +117,7 @@ def test_a_rule_that_answers_only_so_often_is_said_to(rule, often):
 
 def test_a_step_that_a_rule_always_replaces_is_said_to_be():
     ends = ("{on: failed, do: {then: continue}}", "{on: broken, do: {then: continue}}")
-    said, _ = said_of("{before: do_it, do: {use: recover, then: continue}}", *ends)
+    said, _ = said_of("{before: do_it, do: {use: recover, on: {stuck: continue}, then: continue}}", *ends)
     assert "the rule 'before do_it: recover, continue' always replaces step 'do_it', which is never entered" in said
 
 
@@ -338,11 +338,51 @@ def test_a_recovery_gets_its_arguments_from_the_event_and_then_the_response_foll
     assert run.active == ["fine"]
 
 
-def test_whatever_a_recovery_ends_with_the_response_follows():
-    run = run_of(["{on: failed, do: {use: recover, then: elsewhere}}"])
+@pytest.mark.parametrize(
+    ("then", "active"),
+    [
+        ("elsewhere", ["elsewhere"]),
+        ("give_up", ["given_up"]),
+        ("continue", ["fine"]),
+        ("retry", ["do_it", "do_it/work"]),
+    ],
+)
+def test_an_outcome_of_a_recovery_has_its_own_continuation(then, active):
+    run = run_of([f"{{on: failed, do: {{use: recover, on: {{stuck: {then}}}, then: elsewhere}}}}"])
     run.send("bad")
+    run.send("bad")
+    assert run.active == active
+
+
+def test_retries_after_an_outcome_of_a_recovery_are_bounded():
+    run = run_of(
+        ["{on: failed, do: {use: recover, on: {stuck: retry}, then: continue}}", "{on: failed, do: {then: elsewhere}}"]
+    )
+    for _ in range(DEFAULT_RETRIES):
+        run.send("bad")
+        run.send("bad")
+        assert run.active == ["do_it", "do_it/work"]
     run.send("bad")
     assert run.active == ["elsewhere"]
+
+
+@pytest.mark.parametrize(("place", "by_default"), [("before", "{then: enter}"), ("after", "{}")])
+def test_an_outcome_of_an_inserted_plot_has_its_own_continuation(place, by_default):
+    text = HOLDER.replace("states:", "initial: zero\n    states:\n      zero: {on: {go: do_it}}")
+    run = run_of([f"{{{place}: do_it, do: {{use: recover, on: {{stuck: elsewhere}}}}}}"], text)
+    for event in ("go", "bad") if place == "before" else ("go", "ok", "bad"):
+        run.send(event)
+    assert run.active == ["elsewhere"]
+
+
+def test_an_outcome_of_a_recovery_that_nothing_handles_is_an_error():
+    rule = "{on: failed, do: {use: recover, then: elsewhere}}"
+    run = run_of([rule])
+    run.send("bad")
+    (error,) = run.send("bad").errors
+    assert error == "state 'do_it_failed_0_recover' does not handle 'stuck' of plot 'recover'"
+    (found,) = said_of(rule.replace("elsewhere", "fine"), "{on: broken, do: {then: continue}}")
+    assert "nothing handles the outcome 'stuck' of plot 'recover' (add `on: {stuck: give_up}` here" in found
 
 
 # -- which rule answers ------------------------------------------------------------------------------------
@@ -437,6 +477,15 @@ def test_in_a_plan_rules_come_before_replanning():
     assert run.active == ["again"]
 
 
+@pytest.mark.parametrize(("on", "active", "why"), [("{}", ["again"], "stuck"), ("{stuck: give_up}", ["sad"], "failed")])
+def test_in_a_plan_an_outcome_of_a_recovery_leads_to_replanning_or_to_its_continuation(on, active, why):
+    run = run_generated([f"{{on: failed, do: {{use: recover, on: {on}, then: retry}}}}"])
+    run.send("bad")
+    run.send("bad")
+    assert run.active == active
+    assert run.variables()["why"] == why
+
+
 def test_a_rule_may_replan_or_give_up_a_plan():
     run = run_generated(["{on: failed, do: {then: replan}}", "{on: broken, do: {then: give_up}}"])
     run.send("bad")
@@ -463,7 +512,7 @@ def test_a_plan_without_failure_is_done():
 
 
 def test_recoveries_are_states_like_all_others():
-    holder = plot(HOLDER + "      - {on: failed, do: {use: recover, then: retry}}\n")
+    holder = plot(HOLDER + "      - {on: failed, do: {use: recover, on: {stuck: retry}, then: retry}}\n")
     expanded = Library([holder, plot(STEP), plot(RECOVER)]).expanded(holder)
     recoveries = {n: s for n, s in expanded.states.items() if n not in holder.states}
     ((name, state),) = recoveries.items()

@@ -39,7 +39,7 @@ def warnings_of(text, *others):
     made = parse_plot(text, "p.yaml")
     found = review_plot(made, Library([made, STEP, *others]))
     assert all(finding.level == "warning" for finding in found)
-    return [str(finding) for finding in found if finding.rule != "ignored outcomes"]
+    return [str(finding) for finding in found]
 
 
 def about_rules(*rules, holder=HOLDER):
@@ -322,27 +322,3 @@ def test_a_handler_that_interrupts_is_never_asked_where_every_state_answers_itse
     assert about_handlers("{on: low, do: {use: step}}", text=text) == []
     guarded = text.replace("b: {on: {low: e}", "b: {on: {low: {to: e, when: (p)}}")
     assert about_handlers("{on: low, interrupt: true, do: {use: step}}", text=guarded) == []
-
-
-RECHARGE = "plot: recharge\nreceives: {go: , off: }\nemits: {lost: }\nstates:\n  a: {on: {go: e, off: f}}\n  e: {final: true}\n  f: {final: true, emit: lost}\n"
-DAY = "plot: p\nreceives: {low: , go: , off: }\nemits: {late: }\nstates:\n  a: {use: walk, on: {done: e}}\n  e: {final: true}\n"
-WALK = "plot: walk\nreceives: {go: }\nstates:\n  a: {on: {go: e}}\n  e: {final: true}\n"
-
-
-@pytest.mark.parametrize(
-    ("reaction", "ignored"),
-    [
-        ("handlers:\n  - {on: low, do: {use: recharge}}\n", True),
-        ("handlers:\n  - {on: low, interrupt: true, do: {use: recharge}}\n", True),
-        ("handlers:\n  - {on: low, do: {use: walk}}\n", False),
-        ("rules:\n  - {before: a, do: {use: recharge}}\n", True),
-        ("rules:\n  - {after: a, do: {use: recharge}}\n", True),
-        ("rules:\n  - {after: a, do: {use: recharge, then: e}}\n", False),
-    ],
-)
-def test_an_outcome_that_a_handler_or_a_continuing_rule_ignores_is_named(reaction, ignored):
-    made = parse_plot(DAY + reaction, "p.yaml")
-    found = review_plot(made, Library([made, plot(RECHARGE), plot(WALK)]))
-    named = [one for one in found if "ignores the outcome 'lost' of its plot 'recharge'" in str(one)]
-    assert bool(named) is ignored
-    assert all(one.level == "warning" and one.place is not None and one.place.line for one in named)

@@ -244,7 +244,7 @@ WRONG = [
     (
         "declared variable",
         ITEM + "  a:\n" + GRASP + "    on: {done: e, failed: e}\n" + E
-        + "rules:\n  - on: lost\n    do: {use: grasp, with: {item: ?itm}, then: e}\n",
+        + "rules:\n  - on: lost\n    do: {use: grasp, with: {item: ?itm}, on: {failed: e, lost: e}, then: e}\n",
         11, "no variable '?itm' here; did you mean 'item'", "",
     ),
     (
@@ -266,7 +266,7 @@ WRONG = [
     ),
     (
         "parameters are given",
-        ITEM + "  a:\n" + GRASP + "    on: {done: e, failed: e}\n" + E + "rules:\n  - on: lost\n    do: {use: grasp, then: e}\n",
+        ITEM + "  a:\n" + GRASP + "    on: {done: e, failed: e}\n" + E + "rules:\n  - on: lost\n    do: {use: grasp, on: {failed: e, lost: e}, then: e}\n",
         11, "'grasp' needs its parameter 'item'", "add `item",
     ),
     (
