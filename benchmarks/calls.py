@@ -212,6 +212,18 @@ async def _worked(plot: ActionPlot, counter: Counter) -> None:
     await asyncio.wait([running])
 
 
+class Did(Outcome):
+    """The event `did`."""
+
+
+class Stopped(Outcome):
+    """The event `stopped`."""
+
+
+class Begun(Outcome):
+    """The event `begun`."""
+
+
 class _Worker(Component):
     name = "robot"
 
@@ -220,15 +232,15 @@ class _Worker(Component):
         self.counting = False
         self._counter = counter
 
-    @skill(outcomes={"did": {}})
-    async def work(self, call: SkillCall) -> Outcome:  # noqa: ARG002
-        return Outcome("did")
+    @skill
+    async def work(self, call: SkillCall) -> Did:  # noqa: ARG002
+        return Did()
 
-    @skill(outcomes={"stopped": {}})
-    async def halt(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+    @skill
+    async def halt(self, call: SkillCall) -> Stopped:  # noqa: ARG002
         if self.counting:
             self._counter.stop()
-        return Outcome("stopped")
+        return Stopped()
 
 
 def fired() -> Flow:
@@ -330,16 +342,16 @@ class _TableRobot(Component):
         self._steps = 0
         self.counted = False
 
-    @skill(outcomes={"begun": {}})
-    async def begin(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+    @skill
+    async def begin(self, call: SkillCall) -> Begun:  # noqa: ARG002
         if not self._disturbed:
             self._counter.start()
-        return Outcome("begun")
+        return Begun()
 
-    @skill(outcomes={"did": {}})
+    @skill
     async def act(
         self, call: SkillCall, action: str, a: str = "", b: str = "", c: str = "", d: str = "", e: str = ""
-    ) -> Outcome:
+    ) -> Did:
         self._steps += 1
         if not self.counted and self._steps == (2 if self._disturbed else 1):
             self._counter.stop()
@@ -351,7 +363,7 @@ class _TableRobot(Component):
             self._counter.start()
             _disturb(self._world)
             await call.clock.sleep(1)
-        return Outcome("did", observed=self._domain.effects(step, self._world))
+        return Did(observed=self._domain.effects(step, self._world))
 
 
 def _disturb(world: KnowledgeBase) -> None:

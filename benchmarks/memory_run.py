@@ -6,11 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
 from dsc.model.plot import ActionPlot
+from dsc.outcomes import Outcome
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
@@ -61,6 +62,24 @@ WATCH = ActionPlot.model_validate({
 ENOUGH = "the wanted number of events is reached"
 
 
+class Looked(Outcome):
+    """The event `looked`."""
+
+
+class LookStep(Outcome, event="step"):
+    """The event `step`."""
+
+    n: float
+
+
+class Slipped(Outcome):
+    """The event `slipped`."""
+
+
+class Grasped(Outcome):
+    """The event `grasped`."""
+
+
 class Robot(Component):
     """Looks, reports moving objects, and slips periodically."""
 
@@ -70,18 +89,18 @@ class Robot(Component):
         super().__init__()
         self._grasps = 0
 
-    @skill(outcomes={"looked": {}, "step": {"n": "number"}})
-    async def look(self, call: SkillCall, seconds: float) -> Outcome:
+    @skill
+    async def look(self, call: SkillCall[LookStep], seconds: float) -> Looked:
         for n in range(REPORTS):
             await call.clock.sleep(seconds / REPORTS)
-            call.report(Outcome("step", {"n": n}))
+            call.report(LookStep(n=n))
         place = ("here", "there")[self._grasps % 2]
-        return Outcome("looked", observed=Delta(replaced=(fact("at", "cup", place),)))
+        return Looked(observed=Delta(replaced=(fact("at", "cup", place),)))
 
-    @skill(outcomes={"grasped": {}, "slipped": {}})
-    async def grasp(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+    @skill
+    async def grasp(self, call: SkillCall) -> Grasped | Slipped:  # noqa: ARG002
         self._grasps += 1
-        return Outcome("slipped" if self._grasps % 100 == 0 else "grasped")
+        return Slipped() if self._grasps % 100 == 0 else Grasped()
 
 
 LIBRARY = Library([WATCH, primitive_plot(Robot().skills()["grasp"], done="grasped")])

@@ -71,6 +71,14 @@ class _Clocked:
         return outcome
 
 
+class Did(Outcome):
+    """The event `did`."""
+
+
+class Failed(Outcome):
+    """The event `failed`."""
+
+
 class _Robot(Component):
     """Finishes each step immediately; stacking fails the first and second time."""
 
@@ -82,7 +90,7 @@ class _Robot(Component):
         self._failed, self._since = 0, 0.0
         self.found: dict[str, float] | None = None
 
-    @skill(outcomes={"did": {}, "failed": {}})
+    @skill
     async def act(
         self,
         call: SkillCall,  # noqa: ARG002
@@ -92,7 +100,7 @@ class _Robot(Component):
         c: str = "",
         d: str = "",
         e: str = "",
-    ) -> Outcome:
+    ) -> Did | Failed:
         now = time.process_time()
         if self._since and self._failed == 2 and self.found is None:
             self._note(now - self._since)
@@ -101,8 +109,8 @@ class _Robot(Component):
             self._failed += 1
             self._planner.spent.clear()
             self._since = time.process_time()
-            return Outcome("failed", observed=Delta(removed=(fact("fits", *step.args[:2]),)))
-        return Outcome("did", observed=self._domain.effects(step, self._world))
+            return Failed(observed=Delta(removed=(fact("fits", *step.args[:2]),)))
+        return Did(observed=self._domain.effects(step, self._world))
 
     def _note(self, seconds: float) -> None:
         spent = {part: self._planner.spent.get(part, 0.0) for part in PARTS}

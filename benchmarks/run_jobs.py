@@ -12,7 +12,7 @@ from typing import Any
 
 from timing import Job
 
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
@@ -20,6 +20,7 @@ from dsc.engine.machine import Machine
 from dsc.engine.steps import Start
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
+from dsc.outcomes import Outcome
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_real
 from dsc.sequencer.sequencer import Sequencer
@@ -55,6 +56,10 @@ ROW = "x" * 400
 """About as much as a macrostep writes."""
 
 
+class Did(Outcome):
+    """The event `did`."""
+
+
 class Robot(Component):
     """Finishes its work immediately.
 
@@ -68,10 +73,10 @@ class Robot(Component):
         super().__init__()
         self.called: list[float] = []
 
-    @skill(outcomes={"did": {}}, after_crash="repeat")
-    async def work(self, call: SkillCall) -> Outcome:  # noqa: ARG002
+    @skill(after_crash="repeat")
+    async def work(self, call: SkillCall) -> Did:  # noqa: ARG002
         self.called.append(perf_counter())
-        return Outcome("did")
+        return Did()
 
 
 def bare(durability: Durability) -> str:

@@ -24,10 +24,11 @@ from typing import Any
 from rows import Target, number
 from run_jobs import PING, SCHEMA, STOP
 
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
+from dsc.outcomes import Outcome
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_real
 from dsc.sequencer.sequencer import Sequencer
@@ -52,6 +53,10 @@ MOST = 20.0
 """Maximum ratio of the p99 of all plots to the p50 of one."""
 
 
+class Did(Outcome):
+    """The event `did`."""
+
+
 class Robot(Component):
     """Records the delays of its calls."""
 
@@ -62,10 +67,10 @@ class Robot(Component):
         self.due = 0.0
         self.waits: list[float] = []
 
-    @skill(outcomes={"did": {}}, after_crash="repeat")
-    async def work(self, call: SkillCall) -> Outcome:
+    @skill(after_crash="repeat")
+    async def work(self, call: SkillCall) -> Did:
         self.waits.append(call.clock.now() - self.due)
-        return Outcome("did")
+        return Did()
 
 
 @dataclass(frozen=True, slots=True)

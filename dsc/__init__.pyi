@@ -1,6 +1,5 @@
 from dsc.blocking import BlockingCall as BlockingCall
 from dsc.calls import Ended as Ended
-from dsc.calls import Outcome as Outcome
 from dsc.calls import SkillCall as SkillCall
 from dsc.calls import Status as Status
 from dsc.chance import uniform as uniform
@@ -29,6 +28,7 @@ from dsc.errors import SkillError as SkillError
 from dsc.errors import UncertainActionError as UncertainActionError
 from dsc.events import Event as Event
 from dsc.model.plot import ActionPlot as ActionPlot
+from dsc.outcomes import Outcome as Outcome
 from dsc.profiles import configure as configure
 from dsc.reflection import MODELS as MODELS
 from dsc.reflection import design_facts as design_facts

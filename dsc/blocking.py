@@ -23,10 +23,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from typing import Any
+from typing import Any, Generic, cast
 
-from dsc.calls import OBSERVED, Outcome, SkillCall
+from dsc.calls import OBSERVED, Reported_contra, SkillCall
 from dsc.errors import ProgrammingError, SkillError
+from dsc.outcomes import Outcome
 from knowledge_base.errors import described
 from knowledge_base.facts import Delta
 from knowledge_base.tracebacks import raised_at, whole_traceback
@@ -54,7 +55,7 @@ class StoppedError(BaseException):
 
 
 @dataclass(frozen=True, slots=True)
-class BlockingCall:
+class BlockingCall(Generic[Reported_contra]):
     """One execution of a skill, as its blocking body receives it.
 
     Attributes:
@@ -66,13 +67,13 @@ class BlockingCall:
     """
 
     action_id: str
-    report: Callable[[Outcome], None]
+    report: Callable[[Reported_contra], None]
     seconds: float
     stopping: threading.Event = field(default_factory=threading.Event)
 
     def observe(self, observed: Delta) -> None:
         """Report observed facts immediately, as `SkillCall.observe` does."""
-        self.report(Outcome(OBSERVED, observed=observed))
+        self.report(cast(Any, Outcome(OBSERVED, observed=observed)))
 
     def sleep(self, seconds: float = 0.0) -> None:
         """Wait for `seconds` of real time; with 0, only check for a stop request.
@@ -84,7 +85,7 @@ class BlockingCall:
             raise StoppedError
 
 
-async def in_thread(body: Callable[..., Outcome], call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def in_thread(body: Callable[..., Outcome], call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
     """Run `body(BlockingCall, **arguments)` in a thread, and return its outcome.
 
     Raises:
@@ -94,7 +95,9 @@ async def in_thread(body: Callable[..., Outcome], call: SkillCall, arguments: Ma
     return await _supervised(lambda: body(blocking, **arguments), blocking, call, "thread", STOPPING)
 
 
-async def in_process(body: Callable[..., Outcome], name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def in_process(
+    body: Callable[..., Outcome], name: str, call: SkillCall[Any], arguments: Mapping[str, Any]
+) -> Outcome:
     """Run `body(BlockingCall, **arguments)` in a fresh process, and return its outcome.
 
     Raises:
@@ -107,7 +110,7 @@ async def in_process(body: Callable[..., Outcome], name: str, call: SkillCall, a
     return await _supervised(work, blocking, call, "process", _KILLING * STOPPING)
 
 
-def _blocking(call: SkillCall) -> BlockingCall:
+def _blocking(call: SkillCall[Any]) -> BlockingCall:
     loop = asyncio.get_running_loop()
     room = threading.BoundedSemaphore(MOST_REPORTED)
 
@@ -125,7 +128,7 @@ def _blocking(call: SkillCall) -> BlockingCall:
 
 
 async def _supervised(
-    work: Callable[[], Outcome], blocking: BlockingCall, call: SkillCall, what: str, stopping: float
+    work: Callable[[], Outcome], blocking: BlockingCall, call: SkillCall[Any], what: str, stopping: float
 ) -> Outcome:
     """Run `work` in a daemon thread; request its stop when the skill is cancelled or reaches its deadline.
 
@@ -199,7 +202,7 @@ def _later(seconds: float, do: Callable[[], None]) -> threading.Timer:
     return timer
 
 
-def _hold(call: SkillCall) -> AbstractContextManager[None]:
+def _hold(call: SkillCall[Any]) -> AbstractContextManager[None]:
     hold: Callable[[], AbstractContextManager[None]] = getattr(call.clock, "hold", nullcontext)
     return hold()
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any, Generic, Never, Protocol, cast
 
+from typing_extensions import TypeVar
+
+from dsc.outcomes import Outcome
 from knowledge_base.facts import Delta
 
 OBSERVED = "(observed)"
@@ -26,21 +29,13 @@ class Clock(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """The end of a skill: its outcome event, the event's attributes, and its observations.
-
-    Before the event is handled, `observed` is applied to the knowledge base, with the component as author.
-    """
-
-    event: str
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-    observed: Delta = field(default_factory=Delta)
+Reported_contra = TypeVar("Reported_contra", bound=Outcome, contravariant=True, default=Never)
+"""Outcome classes that a skill reports before its end."""
 
 
 @dataclass(frozen=True, slots=True)
-class SkillCall:
-    """One execution of a skill.
+class SkillCall(Generic[Reported_contra]):
+    """One execution of a skill; `SkillCall[Progress]` is the call of a skill that reports `Progress`.
 
     Attributes:
         action_id: identifies this execution; the id is stable across restarts and never used for another execution.
@@ -56,13 +51,13 @@ class SkillCall:
 
     action_id: str
     clock: Clock
-    report: Callable[[Outcome], None]
+    report: Callable[[Reported_contra], None]
     deadline: float = math.inf
     give_up: Callable[[str], None] = lambda _: None
 
     def observe(self, observed: Delta) -> None:
         """Report observed facts immediately, before the outcome and without an event for the chart."""
-        self.report(Outcome(OBSERVED, observed=observed))
+        self.report(cast(Any, Outcome(OBSERVED, observed=observed)))
 
     @property
     def remaining(self) -> float:

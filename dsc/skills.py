@@ -1,29 +1,42 @@
 """Skills: typed actions of components, and the smallest plot around one skill (S0.7, S0.8, S1.1).
 
 A skill ends with an outcome event and observations, which the plot interprets. A skill is one decorated coroutine
-function:
+function; its annotations declare its parameters and outcomes:
 
 ```python
+Item = NewType("Item", str)
+
+
+class Grasped(Outcome): ...
+
+
+class Slipped(Outcome):
+    item: Item
+
+
 class Gripper(Component):
-    @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}})
-    async def grasp(self, call: SkillCall, item: str) -> Outcome:
+    @skill
+    async def grasp(self, call: SkillCall[Any], item: Item) -> Grasped | Slipped:
         await call.clock.sleep(2.0)
-        return Outcome("grasped", observed=Delta(added=(fact("holding", item),)))
+        return Grasped(observed=Delta(added=(fact("holding", item),)))
 ```
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal, TypeVar, cast
+from typing import Any, Literal, TypeVar, cast, get_args, overload
 
+from dsc.annotations import Namespace, evaluated, names_around, parameter_types
 from dsc.blocking import in_process, in_thread
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.events import EXECUTIVES
 from dsc.model.plot import ActionPlot
+from dsc.outcomes import Outcome, declared_outcomes
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
 from knowledge_base.language.checking.inputs import shown
 
@@ -37,6 +50,7 @@ which the component acts only one time. `sense` observes the world first, withou
 SkillBody = Callable[..., Any]
 """The decorated function, which returns an `Outcome`: a coroutine function or, if the body blocks, a plain function."""
 _Body = TypeVar("_Body", bound=SkillBody)
+_Returning = TypeVar("_Returning", bound=Callable[..., Awaitable[Outcome | None]] | Callable[..., Outcome | None])
 Pattern = Literal["skill", "query", "event"]
 """The communication pattern of a `trigger` (S1.1).
 
@@ -69,7 +83,7 @@ class SkillSignature:
     place: str = ""
 
 
-CarryOut = Callable[[Any, SkillBody, SkillCall, Mapping[str, Any]], Awaitable[Outcome]]
+CarryOut = Callable[[Any, SkillBody, SkillCall[Any], Mapping[str, Any]], Awaitable[Outcome]]
 """Function that executes a decorated body; receives the component, the bound body, the call and the arguments."""
 
 
@@ -78,7 +92,7 @@ class Declared:
     """The declaration of a decorated body.
 
     Attributes:
-        types: types of parameters by name; the annotations `int`, `float` and `bool` declare the other types.
+        types: types of parameters by name; `None` accepts any value.
         outcomes: as in `SkillSignature`.
         carry_out: executes a call with the body.
         own: number of leading parameters of the body that charts do not set.
@@ -86,7 +100,7 @@ class Declared:
         after_crash: see `AfterCrash`.
     """
 
-    types: Mapping[str, str]
+    types: Mapping[str, str | None]
     outcomes: Mapping[str, Mapping[str, str | None]]
     carry_out: CarryOut
     own: int = 2
@@ -101,53 +115,110 @@ class Declared:
                 for the call. The error is also raised if the body is not a coroutine function, or is one and blocks.
             UnknownNameError: `types` has a name that is not a parameter.
         """
-        named = body.__qualname__.rpartition("<locals>.")[2]
-        with tolerated():
-            try:
-                refuse_reserved(named, self.outcomes)
-                _require_form(named, body, self)
-            except InputError as error:
-                error.place = error.place or Place(*_line_of(body))
-                raise
+        with refused_at(body) as named:
+            refuse_reserved(named, self.outcomes)
+            _require_form(named, body, self)
         setattr(body, DECLARED, self)
         return body
 
 
+def require_function(body: object, decorator: str) -> None:
+    """Raise `InputError` unless a decorator is applied to a function."""
+    if not inspect.isfunction(inspect.unwrap(body) if callable(body) else body):
+        raise InputError(f"`@{decorator}` decorates a function, whose annotations declare it, not {shown(body)}")
+
+
+@contextmanager
+def refused_at(body: SkillBody) -> Iterator[str]:
+    """Give errors of the block the place of a decorated body; the value is the body's name in messages."""
+    with tolerated():
+        try:
+            yield named(body)
+        except InputError as error:
+            error.place = error.place or Place(*_line_of(body))
+            raise
+
+
+def named(body: SkillBody) -> str:
+    """Return the name of a body in messages: the class and the method."""
+    return body.__qualname__.rpartition("<locals>.")[2]
+
+
 DECLARED = "__dsc_skill__"
 """Name of the attribute in which a body stores its declaration."""
-_ANNOTATED: Mapping[Any, str] = {"int": "number", "float": "number", "bool": "boolean"} | {
-    int: "number", float: "number", bool: "boolean",
-}  # fmt: skip
 
 
+@overload
+def skill(body: _Returning, /) -> _Returning: ...
+@overload
 def skill(
-    outcomes: Mapping[str, Mapping[str, str | None]],
-    types: Mapping[str, str] | None = None,
+    *, blocking: Literal["thread", "process"] | None = None, after_crash: AfterCrash = "sense"
+) -> Callable[[_Returning], _Returning]: ...
+def skill(
+    body: SkillBody | None = None,
+    /,
     *,
     blocking: Literal["thread", "process"] | None = None,
     after_crash: AfterCrash = "sense",
-) -> Callable[[_Body], _Body]:
+) -> SkillBody:
     """Declare a component's method, or a function (see `dsc.components.robot`), as a skill.
 
+    The annotations are the declaration. The returned classes are the outcomes: `-> Grasped | Slipped`. The classes in
+    the annotation of the call are events that the skill reports before its end: `call: SkillCall[Progress]`. The
+    annotations of parameters are their types, see `dsc.annotations.type_of`.
+
     Args:
-        outcomes: every event that the skill may end with or report, with the event's attributes and their types.
-        types: types of the skill's parameters by name. The annotations `int`, `float` and `bool` declare other types; a
-            parameter without a type accepts any value.
+        body: the method or function, if the decorator has no options.
         blocking: whether the body is a plain function that blocks, and where it runs. In a thread, the body checks its
             `BlockingCall` periodically. A process is ended instead; its arguments, outcome and component are pickled.
         after_crash: the reaction if a run is resumed and the component cannot report the action's result.
 
     Raises:
-        InputError: the outcomes are not a mapping, or `blocking` has an invalid value.
+        InputError: `blocking` has an invalid value.
+        SchemaError: the annotations do not declare outcomes, or name something that does not exist, or the body does
+            not have the form of a skill.
     """
-    require_names(outcomes, "the outcomes of a skill", "@skill(outcomes={'grasped': {}})")
-    for event, attributes in outcomes.items():
-        require_names(attributes, f"the attributes of '{event}'", "{'item': 'item'}")
+    if body is not None:
+        require_function(body, "skill")
     if blocking not in _CARRIED_OUT:
         message = f"a skill blocks in a thread or a process, not {shown(blocking)}"
         raise InputError(message, found=str(blocking), valid=("thread", "process"))
-    declared = {event: dict(attributes) for event, attributes in outcomes.items()}
-    return Declared(dict(types or {}), declared, _CARRIED_OUT[blocking], after_crash=after_crash)
+
+    def declare(body: SkillBody) -> SkillBody:
+        own, names = 2 if "." in named(body) else 1, names_around(body.__globals__)
+        outcomes, types = dict[str, dict[str, str | None]](), dict[str, str | None]()
+        with refused_at(body):
+            outcomes |= returned(body, names)
+            outcomes |= _reported(body, own, names)
+        with refused_at(body):
+            types |= parameter_types(body, own, names)
+        return Declared(types, outcomes, _CARRIED_OUT[blocking], after_crash=after_crash)(body)
+
+    return declare if body is None else declare(body)
+
+
+def returned(body: SkillBody, names: Namespace) -> dict[str, dict[str, str | None]]:
+    """Return the outcomes in the return annotation of a body.
+
+    Raises:
+        SchemaError: the body has no return annotation, or it names something else than outcome classes.
+    """
+    annotation = inspect.signature(body).return_annotation
+    what = f"the returned value of '{named(body)}'"
+    if annotation is inspect.Signature.empty:
+        raise SchemaError(f"'{named(body)}' has no return annotation; write its outcomes, as in `-> Grasped | Slipped`")
+    return declared_outcomes(annotation, names, what)
+
+
+def _reported(body: SkillBody, own: int, names: Namespace) -> dict[str, dict[str, str | None]]:
+    """Return the outcomes in the annotation of the call, `SkillCall[Progress]`; usually there are none."""
+    parameters = list(inspect.signature(body).parameters.values())[:own]
+    annotation = parameters[-1].annotation if parameters else inspect.Parameter.empty
+    if isinstance(annotation, str) and "[" not in annotation:  # the name may exist only for a type checker
+        return {}
+    what = f"the call of '{named(body)}'"
+    found = [declared_outcomes(one, names, what) for one in get_args(evaluated(annotation, names, what))]
+    return {event: attributes for one in found for event, attributes in one.items()}
 
 
 def require_names(declared: object, what: str, example: str) -> None:
@@ -156,18 +227,18 @@ def require_names(declared: object, what: str, example: str) -> None:
         raise InputError(f"{what} are a mapping of names, as in {example}, not {shown(declared)}")
 
 
-async def _awaited(_: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _awaited(_: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
     coming = body(call, **arguments)
     if not inspect.isawaitable(coming):
         raise SchemaError("it is not a coroutine: write `async def`, or declare it `blocking`")
     return cast(Outcome, await coming)
 
 
-async def _in_thread(_: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _in_thread(_: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
     return await in_thread(body, call, arguments)
 
 
-async def _in_process(component: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _in_process(component: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
     return await in_process(body, component.name, call, arguments)
 
 
@@ -216,7 +287,7 @@ def signature_of(component: str, name: str, body: SkillBody, declared: Declared)
     return SkillSignature(
         component=component,
         name=name,
-        parameters={p.name: declared.types.get(p.name, _ANNOTATED.get(p.annotation)) for p in given},
+        parameters={p.name: declared.types.get(p.name) for p in given},
         defaults={p.name: p.default for p in given if p.default is not inspect.Parameter.empty},
         outcomes=declared.outcomes,
         pattern=declared.pattern,

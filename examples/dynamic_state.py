@@ -1,5 +1,7 @@
 """A dynamic state with two designed candidates and a planner behind them, in Python and the same in YAML."""
 
+from typing import NewType
+
 from dsc import ActionPlot, Component, Outcome, Record, SkillCall, parse_plot, primitive_plot, skill
 from knowledge_base import Delta, fact
 from planning import Executive, PlanningDomain
@@ -47,15 +49,21 @@ states:
 """)
 
 
+Room = NewType("Room", str)
+
+
+class Arrived(Outcome): ...
+
+
 class Base(Component):
     name = "base"
 
-    @skill(outcomes={"arrived": {}}, types={"to": "room"})
-    async def drive(self, call: SkillCall, to: str) -> Outcome:
+    @skill
+    async def drive(self, call: SkillCall, to: Room) -> Arrived:
         await call.clock.sleep(10.0)
         here = self.parameters.get("here", "hall")
         self.parameters["here"] = to
-        return Outcome("arrived", observed=Delta(removed=(fact("robot-in", here),), added=(fact("robot-in", to),)))
+        return Arrived(observed=Delta(removed=(fact("robot-in", here),), added=(fact("robot-in", to),)))
 
 
 def show(record: Record) -> None:

@@ -3,6 +3,8 @@
 `dsc run examples/own_domain.py` runs it, too.
 """
 
+from typing import NewType
+
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from knowledge_base import Delta, fact
 from planning import Bundle, PlanningDomain, deploy
@@ -23,21 +25,31 @@ WATERING = PlanningDomain.parse("""
 """)
 
 
+Room = NewType("Room", str)
+Plant = NewType("Plant", str)
+
+
+class Arrived(Outcome): ...
+
+
+class Watered(Outcome): ...
+
+
 class Gardener(Component):
     name = "gardener"
 
-    @skill(outcomes={"arrived": {}}, types={"to": "room"})
-    async def go(self, call: SkillCall, to: str) -> Outcome:
+    @skill
+    async def go(self, call: SkillCall, to: Room) -> Arrived:
         await call.clock.sleep(20.0)  # simulated seconds: the run does not wait for them
         print(f"{call.clock.now():5.1f} s  in the {to}")
-        return Outcome("arrived")
+        return Arrived()
 
-    @skill(outcomes={"watered": {}}, types={"plant": "plant"})
-    async def water(self, call: SkillCall, plant: str) -> Outcome:
+    @skill
+    async def water(self, call: SkillCall, plant: Plant) -> Watered:
         await call.clock.sleep(5.0)
         print(f"{call.clock.now():5.1f} s  watered the {plant}")
         # What a skill observes is told to the knowledge base together with its outcome.
-        return Outcome("watered", observed=Delta(added=(fact("watered", plant),)))
+        return Watered(observed=Delta(added=(fact("watered", plant),)))
 
 
 SKILLS = Gardener().skills()

@@ -1,5 +1,7 @@
 """Tests of a plot without its robot: rehearse it, answer it by hand, replace a branch, see what was missed."""
 
+from typing import NewType
+
 from dsc import Component, Library, Outcome, SkillCall, parse_plot, skill
 from dsc.testing import Answer, Coverage, DryRun, ends_with, rehearse, started, told, took, world
 
@@ -59,17 +61,33 @@ LIBRARY = Library([SERVE, MIX])
 coverage = Coverage(LIBRARY)
 
 
+Drink = NewType("Drink", str)
+Guest = NewType("Guest", str)
+
+
+class Poured(Outcome): ...
+
+
+class Spilled(Outcome): ...
+
+
+class Empty(Outcome): ...
+
+
+class Taken(Outcome): ...
+
+
 class Arm(Component):
     """The real one. Tests only take its word for what it can do, and end with."""
 
     name = "arm"
 
-    @skill(outcomes={"poured": {}, "spilled": {}, "empty": {}}, types={"drink": "drink"})
-    async def pour(self, call: SkillCall, drink: str) -> Outcome:
+    @skill
+    async def pour(self, call: SkillCall, drink: Drink) -> Poured | Spilled | Empty:
         raise NotImplementedError
 
-    @skill(outcomes={"taken": {}}, types={"to": "guest"})
-    async def hand(self, call: SkillCall, to: str) -> Outcome:
+    @skill
+    async def hand(self, call: SkillCall, to: Guest) -> Taken:
         raise NotImplementedError
 
 

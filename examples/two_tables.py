@@ -1,6 +1,7 @@
 """Two robots clear two tables at the same time: one plan, carried out side by side where nobody has to wait."""
 
 from pathlib import Path
+from typing import NewType
 
 from dsc import ActionPlot, Component, Outcome, Record, SkillCall, skill, uniform
 from knowledge_base import Delta, Fact, fact
@@ -11,6 +12,15 @@ ROBOTS = ("anna", "bert")
 GOAL = "(and (forall (?i - item) (disposed ?i)) (forall (?b - bin) (closed ?b)))"
 
 
+Place = NewType("Place", str)
+Item = NewType("Item", str)
+Table = NewType("Table", str)
+Bin = NewType("Bin", str)
+
+
+class Acted(Outcome): ...
+
+
 class Robot(Component):
     """One robot; `seed` decides how long each of its actions takes."""
 
@@ -18,31 +28,31 @@ class Robot(Component):
         super().__init__(name)
         self.seed = seed
 
-    async def act(self, call: SkillCall, seconds: float, removed: list[Fact], added: list[Fact]) -> Outcome:
+    async def act(self, call: SkillCall, seconds: float, removed: list[Fact], added: list[Fact]) -> Acted:
         """Take about `seconds`; what is different then is what the robot observes."""
         await call.clock.sleep(seconds * (0.75 + 0.5 * uniform(self.seed, call.action_id, "duration")))
-        return Outcome("acted", observed=Delta(removed=tuple(removed), added=tuple(added)))
+        return Acted(observed=Delta(removed=tuple(removed), added=tuple(added)))
 
-    @skill(outcomes={"acted": {}}, types={"start": "place", "to": "place"})
-    async def drive(self, call: SkillCall, start: str, to: str) -> Outcome:
+    @skill
+    async def drive(self, call: SkillCall, start: Place, to: Place) -> Acted:
         return await self.act(call, 8.0, [fact("robot-at", self.name, start)], [fact("robot-at", self.name, to)])
 
-    @skill(outcomes={"acted": {}}, types={"item": "item", "table": "table"})
-    async def pick_up(self, call: SkillCall, item: str, table: str) -> Outcome:
+    @skill
+    async def pick_up(self, call: SkillCall, item: Item, table: Table) -> Acted:
         gone = [fact("hand-free", self.name), fact("lies-at", item, table)]
         return await self.act(call, 4.0, gone, [fact("holding", self.name, item)])
 
-    @skill(outcomes={"acted": {}}, types={"item": "item"})
-    async def throw_away(self, call: SkillCall, item: str) -> Outcome:
+    @skill
+    async def throw_away(self, call: SkillCall, item: Item) -> Acted:
         come = [fact("hand-free", self.name), fact("disposed", item)]
         return await self.act(call, 3.0, [fact("holding", self.name, item)], come)
 
-    @skill(outcomes={"acted": {}}, types={"bin": "bin"})
-    async def open_lid(self, call: SkillCall, bin: str) -> Outcome:  # noqa: A002
+    @skill
+    async def open_lid(self, call: SkillCall, bin: Bin) -> Acted:  # noqa: A002
         return await self.act(call, 2.0, [fact("closed", bin)], [fact("open", bin)])
 
-    @skill(outcomes={"acted": {}}, types={"bin": "bin"})
-    async def close_lid(self, call: SkillCall, bin: str) -> Outcome:  # noqa: A002
+    @skill
+    async def close_lid(self, call: SkillCall, bin: Bin) -> Acted:  # noqa: A002
         return await self.act(call, 2.0, [fact("open", bin)], [fact("closed", bin)])
 
 

@@ -38,6 +38,7 @@ WHY = {
     "rich": ("trees, tables and progress on a terminal", IN_PROCESS),
     "ruamel.yaml": ("YAML 1.2 with places and comments", IN_PROCESS),
     "typer": ("the command line", IN_PROCESS),
+    "typing-extensions": ("defaults of type variables, for Python before 3.13", IN_PROCESS),
     "unified-planning": (
         "other planning engines, and problems in its form (`to_unified`)",
         "imported by `planning.unified` and in the engines' processes",

@@ -15,12 +15,13 @@ from typing import Any
 
 import pytest
 
-from dsc.calls import Outcome, SkillCall, Status
+from dsc.calls import SkillCall, Status
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, LocalTransport, encoded
 from dsc.components.host import Host, HostedActions
 from dsc.components.remote import RemoteComponent
 from dsc.dynamic.library import Library
+from dsc.outcomes import Outcome
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
@@ -99,6 +100,9 @@ def a_push_of_an_earlier_life_is_not_heard():
     assert heard_of(("x", 1, "one"), ("y", 1, "new"), ("x", 2, "late")) == ["one", "new"]
 
 
+class Did(Outcome): ...
+
+
 class Arm(Component):
     """Takes its time to stop."""
 
@@ -108,8 +112,8 @@ class Arm(Component):
         super().__init__()
         self.log = []
 
-    @skill(outcomes={"did": {}})
-    async def work(self, call: SkillCall, seconds: float = 1.0) -> Outcome:
+    @skill
+    async def work(self, call: SkillCall, seconds: float = 1.0) -> Did:
         """Work, and put things in order when cancelled."""
         self.log.append("begun")
         try:
@@ -119,7 +123,7 @@ class Arm(Component):
             self.log.append("in order")
             raise
         self.log.append("done")
-        return Outcome("did")
+        return Did()
 
 
 def remotely(judge):
@@ -174,11 +178,11 @@ class Remembering(Component):
         super().__init__()
         self.ends = []
 
-    @skill(outcomes={"did": {}}, after_crash="same_id")
-    async def work(self, call: SkillCall) -> Outcome:
+    @skill(after_crash="same_id")
+    async def work(self, call: SkillCall) -> Did:
         """End at once."""
         self.ends.append(call.action_id)
-        return Outcome("did")
+        return Did()
 
     async def forget(self, action_id: str) -> None:
         """It has been taken and is kept."""

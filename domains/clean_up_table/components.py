@@ -9,52 +9,51 @@ skills have the names and outcomes that the plots expect, with other implementat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from domains.clean_up_table.items import PLACES, distance
-from domains.clean_up_table.observations import Result, learned
-from dsc.calls import Ended, Outcome, SkillCall
+from domains.clean_up_table.outcomes import (
+    Arrived,
+    Destination,
+    Gone,
+    GraspFailed,
+    Item,
+    Looked,
+    NoIk,
+    NoIkInside,
+    NoPath,
+    NothingFound,
+    NotPossible,
+    OutOfReach,
+    PickedUp,
+    Place,
+    PutDown,
+    Recognised,
+    Said,
+    Slipped,
+    Stacked,
+    StackFell,
+    Surface,
+    TakenOut,
+    ThrownAway,
+    Vented,
+    outcome_of,
+    untyped_outcome,
+)  # fmt: skip
+from dsc.calls import Ended, SkillCall
 from dsc.components.component import Component
 from dsc.components.parameters import Parameter
 from dsc.skills import skill
 
 if TYPE_CHECKING:
+    from domains.clean_up_table.observations import Result
     from domains.clean_up_table.table_world import TableWorld
 
 
 def seconds(default: float) -> Parameter:
     """Return a parameter for a duration in seconds, which the profile of the integrator sets, and not a plot."""
     return Parameter("number", default=default, least=0.1, most=60.0, changed_by="profile")
-
-
-Body = TypeVar("Body", bound=Callable[..., Coroutine[Any, Any, Outcome]])
-Attributes = Mapping[str, str | None]
-
-TO = {"to": "place"}
-AT = {"surface": "surface"}
-ITEM_AT = {"item": "item", **AT}
-ITEM_IN = {"item": "item", "carrier": "item", **AT}
-CARRIER_AT = {"carrier": "item", **AT}
-THROWN = {"item": "item", "destination": "destination"}
-
-
-def acts(types: Mapping[str, str], **outcomes: Attributes) -> Callable[[Body], Body]:
-    """Declare a skill that acts on the world, with the types of its parameters and its outcomes.
-
-    The skill may also end with `not_possible`. The world executes each action id once.
-    """
-    return skill({**outcomes, "not_possible": {"reason": None}}, types, after_crash="same_id")
-
-
-drives = acts(TO, arrived=TO, no_path=TO, slipped={**ITEM_AT, **TO})
-"""Declares the skill `drive` of every base."""
-picks_up = acts(ITEM_AT, picked_up=ITEM_AT, grasp_failed=ITEM_AT, no_ik=ITEM_AT, gone=ITEM_AT)
-"""Declares the skill `pick_up` of every arm."""
-takes_out = acts(ITEM_IN, taken_out=ITEM_IN, grasp_failed=ITEM_IN, no_ik=ITEM_IN, gone=ITEM_AT)
-"""Declares the skill `take_out` of every arm."""
-recognises = acts(AT, recognised={**AT, "count": None}, nothing_found=AT)
-"""Declares the skill `recognise` of every camera."""
 
 
 class TablePart(Component):
@@ -73,7 +72,7 @@ class TablePart(Component):
         """Return the outcome of an executed action; `None` otherwise, since no action continues in the world."""
         self.world.catch_up()
         results = [self.world.done.get(one) for one in (again(action_id), action_id)]
-        return next((Ended(outcome_of(result)) for result in results if result is not None), None)
+        return next((Ended(untyped_outcome(result)) for result in results if result is not None), None)
 
 
 class Base(TablePart):
@@ -86,12 +85,12 @@ class Base(TablePart):
         "starting": seconds(1.0),  # the time before the base moves
     }
 
-    @drives
-    async def drive(self, call: SkillCall, to: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def drive(self, call: SkillCall, to: Place) -> Arrived | NoPath | Slipped | NotPossible:
         """Drive to a place; if the held item slips, the robot and the item are at the floor."""
         metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
         await call.clock.sleep(self.parameters["starting"] + metres / self.parameters["speed"])
-        return outcome_of(self.world.drive(call.action_id, to))
+        return outcome_of(self.world.drive(call.action_id, to), Arrived, NoPath, Slipped, NotPossible)
 
 
 class Arm(TablePart):
@@ -106,35 +105,52 @@ class Arm(TablePart):
         "throwing": seconds(3.0),
     }
 
-    @picks_up
-    async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def pick_up(
+        self, call: SkillCall, item: Item, surface: Surface
+    ) -> PickedUp | GraspFailed | NoIk | Gone | NotPossible:
         """Pick up an item, with all items in it, from a surface."""
         await call.clock.sleep(self.parameters["grasping"])
-        return outcome_of(self.world.pick_up(call.action_id, item, surface))
+        return outcome_of(
+            self.world.pick_up(call.action_id, item, surface), PickedUp, GraspFailed, NoIk, Gone, NotPossible
+        )
 
-    @acts(ITEM_AT, put_down=ITEM_AT)
-    async def put_down(self, call: SkillCall, item: str, surface: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def put_down(self, call: SkillCall, item: Item, surface: Surface) -> PutDown | NotPossible:
         """Put the held item on a surface."""
         await call.clock.sleep(self.parameters["putting"])
-        return outcome_of(self.world.put_down(call.action_id, item, surface))
+        return outcome_of(self.world.put_down(call.action_id, item, surface), PutDown, NotPossible)
 
-    @acts(ITEM_IN, stacked=ITEM_IN, stack_fell={**ITEM_IN, "items": None}, gone=ITEM_AT)
-    async def stack(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def stack(
+        self, call: SkillCall, item: Item, carrier: Item, surface: Surface
+    ) -> Stacked | StackFell | Gone | NotPossible:
         """Put the held item into a carrier on a surface; the outcome `gone` contains the carrier."""
         await call.clock.sleep(self.parameters["stacking"])
-        return outcome_of(self.world.stack(call.action_id, item, carrier, surface))
+        return outcome_of(
+            self.world.stack(call.action_id, item, carrier, surface), Stacked, StackFell, Gone, NotPossible
+        )
 
-    @takes_out
-    async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def take_out(
+        self, call: SkillCall, item: Item, carrier: Item, surface: Surface
+    ) -> TakenOut | OutOfReach | NoIkInside | Gone | NotPossible:
         """Take an item out of its carrier on a surface; the outcome `gone` contains the carrier."""
         await call.clock.sleep(self.parameters["grasping"])
-        return outcome_of(self.world.take_out(call.action_id, item, carrier, surface))
+        return outcome_of(
+            self.world.take_out(call.action_id, item, carrier, surface),
+            TakenOut,
+            OutOfReach,
+            NoIkInside,
+            Gone,
+            NotPossible,
+        )
 
-    @acts(THROWN, thrown_away=THROWN)
-    async def throw_away(self, call: SkillCall, item: str, destination: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def throw_away(self, call: SkillCall, item: Item, destination: Destination) -> ThrownAway | NotPossible:
         """Throw the held item, with all items in it, into its destination."""
         await call.clock.sleep(self.parameters["throwing"])
-        return outcome_of(self.world.throw_away(call.action_id, item, destination))
+        return outcome_of(self.world.throw_away(call.action_id, item, destination), ThrownAway, NotPossible)
 
 
 class Camera(TablePart):
@@ -143,17 +159,17 @@ class Camera(TablePart):
     name = "camera"
     declares: ClassVar[Mapping[str, Parameter]] = {"recognising": seconds(2.0), "looking": seconds(1.5)}
 
-    @recognises
-    async def recognise(self, call: SkillCall, surface: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def recognise(self, call: SkillCall, surface: Surface) -> Recognised | NothingFound | NotPossible:
         """Recognise the items on a surface; `count` is the number of visible items that are in no carrier."""
         await call.clock.sleep(self.parameters["recognising"])
-        return outcome_of(self.world.recognise(call.action_id, surface))
+        return outcome_of(self.world.recognise(call.action_id, surface), Recognised, NothingFound, NotPossible)
 
-    @acts(CARRIER_AT, looked=CARRIER_AT, gone=ITEM_AT)
-    async def look_into(self, call: SkillCall, carrier: str, surface: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def look_into(self, call: SkillCall, carrier: Item, surface: Surface) -> Looked | Gone | NotPossible:
         """Look into a carrier on a surface, which closes one unit of its free room; `gone` contains the carrier."""
         await call.clock.sleep(self.parameters["looking"])
-        return outcome_of(self.world.look_into(call.action_id, carrier, surface))
+        return outcome_of(self.world.look_into(call.action_id, carrier, surface), Looked, Gone, NotPossible)
 
 
 class Voice(TablePart):
@@ -164,11 +180,11 @@ class Voice(TablePart):
         "pace": Parameter("number", default=15.0, least=1.0, most=100.0),  # characters a second
     }
 
-    @skill({"said": {"text": None}}, after_crash="same_id")
-    async def say(self, call: SkillCall, text: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def say(self, call: SkillCall, text: str) -> Said:
         """Speak a text to the operator."""
         await call.clock.sleep(1.0 + len(text) / self.parameters["pace"])
-        return outcome_of(self.world.say(call.action_id, text))
+        return outcome_of(self.world.say(call.action_id, text), Said)
 
 
 class Tracks(Base):
@@ -181,8 +197,8 @@ class Tracks(Base):
         "patience": seconds(8.0),
     }
 
-    @drives
-    async def drive(self, call: SkillCall, to: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def drive(self, call: SkillCall, to: Place) -> Arrived | NoPath | Slipped | NotPossible:
         """Turn and drive to a place; if the path is blocked, wait and try a second time."""
         metres = distance(self.world.place_before(call.action_id), to) if to in PLACES else 0.0
         await call.clock.sleep(self.parameters["turning"] + metres / self.parameters["speed"])
@@ -190,7 +206,7 @@ class Tracks(Base):
         if result.outcome == "no_path":
             await call.clock.sleep(self.parameters["patience"])
             result = self.world.drive(again(call.action_id), to)
-        return outcome_of(result)
+        return outcome_of(result, Arrived, NoPath, Slipped, NotPossible)
 
 
 class SuctionArm(Arm):
@@ -203,52 +219,64 @@ class SuctionArm(Arm):
     }
     relations = ("(<= ?lifts (* 0.025 ?vacuum))",)
 
-    @picks_up
-    async def pick_up(self, call: SkillCall, item: str, surface: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def pick_up(
+        self, call: SkillCall, item: Item, surface: Surface
+    ) -> PickedUp | GraspFailed | NoIk | Gone | NotPossible:
         """Pick up an item, with all items in it, from a surface."""
-        return await self._held(call, lambda action_id: self.world.pick_up(action_id, item, surface))
+        return outcome_of(
+            await self._held(call, lambda action_id: self.world.pick_up(action_id, item, surface)),
+            PickedUp,
+            GraspFailed,
+            NoIk,
+            Gone,
+            NotPossible,
+        )
 
-    @takes_out
-    async def take_out(self, call: SkillCall, item: str, carrier: str, surface: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def take_out(
+        self, call: SkillCall, item: Item, carrier: Item, surface: Surface
+    ) -> TakenOut | OutOfReach | NoIkInside | Gone | NotPossible:
         """Take an item out of its carrier on a surface; the outcome `gone` contains the carrier."""
-        return await self._held(call, lambda action_id: self.world.take_out(action_id, item, carrier, surface))
+        return outcome_of(
+            await self._held(call, lambda action_id: self.world.take_out(action_id, item, carrier, surface)),
+            TakenOut,
+            OutOfReach,
+            NoIkInside,
+            Gone,
+            NotPossible,
+        )
 
-    @skill(outcomes={"vented": {}}, after_crash="repeat")
-    async def vent(self, call: SkillCall) -> Outcome:
+    @skill(after_crash="repeat")
+    async def vent(self, call: SkillCall) -> Vented:
         """Let air into the suction cup; the arm then holds no item."""
         await call.clock.sleep(0.5)
-        return Outcome("vented")
+        return Vented()
 
-    async def _held(self, call: SkillCall, grasp: Callable[[str], Result]) -> Outcome:
+    async def _held(self, call: SkillCall, grasp: Callable[[str], Result]) -> Result:
         pumping = self.parameters["vacuum"] / 20.0
         await call.clock.sleep(pumping + self.parameters["grasping"])
         result = grasp(call.action_id)
         if result.outcome == "grasp_failed":
             await call.clock.sleep(pumping)
             result = grasp(again(call.action_id))
-        return outcome_of(result)
+        return result
 
 
 class PatientCamera(Camera):
     """A camera that looks a second time before it reports an empty surface."""
 
-    @recognises
-    async def recognise(self, call: SkillCall, surface: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def recognise(self, call: SkillCall, surface: Surface) -> Recognised | NothingFound | NotPossible:
         """Recognise the items on a surface; `count` is the number of visible items that are in no carrier."""
         await call.clock.sleep(self.parameters["recognising"])
         result = self.world.recognise(call.action_id, surface)
         if result.outcome == "nothing_found":
             await call.clock.sleep(self.parameters["recognising"])
             result = self.world.recognise(again(call.action_id), surface)
-        return outcome_of(result)
+        return outcome_of(result, Recognised, NothingFound, NotPossible)
 
 
 def again(action_id: str) -> str:
     """Return the id of the second attempt in one call, so that faults are drawn separately."""
     return f"{action_id}/again"
-
-
-def outcome_of(result: Result) -> Outcome:
-    """Return the outcome of a skill that corresponds to a result of the world."""
-    attributes = {k: list(v) if isinstance(v, tuple) else v for k, v in result.attributes.items()}
-    return Outcome(result.outcome, attributes, learned(result))

@@ -3,7 +3,7 @@
 ```python
 class Butler(Component):
     @tree_skill(success="served", failure="not_served", outcomes={"not_served": {}, "served": {}})
-    def serve(self, call: SkillCall, item: str) -> Behaviour:
+    def serve(self, call: SkillCall[Any], item: str) -> Behaviour:
         return sequence(
             retry(action("grasp", lambda: self.arm.grasp(call, item), ends={"grasped"}), 3),
             fallback(condition("open", lambda: self.door), action("open", lambda: self.arm.push(call), {"pushed"})),
@@ -25,8 +25,9 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Repeat, Retry
 
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.components.hooks import contained
+from dsc.outcomes import Outcome
 from dsc.skills import AfterCrash, Declared, SkillBody, require_names
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
@@ -69,7 +70,7 @@ def tree_skill(
     for end in (success, failure):
         _require_bare(end, outcomes)
 
-    async def carry_out(_: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    async def carry_out(_: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         _observe.set(call.observe)
         root: Behaviour = body(call, **arguments)
         try:

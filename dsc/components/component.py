@@ -8,11 +8,12 @@ from collections.abc import Awaitable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
-from dsc.calls import Ended, Outcome, SkillCall, Status
+from dsc.calls import Ended, SkillCall, Status
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
 from dsc.components.parameters import Parameter, Parameters, check_declarations
 from dsc.components.ports import TAKES, EventActivations
 from dsc.components.streams import Push, Stream
+from dsc.outcomes import Outcome
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
 from knowledge_base.language.checking.inputs import shown
@@ -179,7 +180,7 @@ class Component(ComponentHooks, RestartHooks):
         """Return the signatures of all decorated methods, by skill name."""
         return dict(signatures(type(self), self.name))  # type: ignore[arg-type]  # mypy: classes are hashable
 
-    def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Awaitable[Outcome]:
+    def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Awaitable[Outcome]:
         """Start the named skill and return its awaitable outcome; the dispatcher awaits and may cancel it.
 
         Raises:

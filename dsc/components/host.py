@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from dsc.calls import OBSERVED, Clock, Outcome, Reports, SkillCall
+from dsc.calls import OBSERVED, Clock, Reports, SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, Transport, encoded
 from dsc.components.heartbeat import Heartbeat
@@ -19,6 +19,7 @@ from dsc.components.hooks import contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import HostedStreams, Publisher
 from dsc.errors import ProgrammingError
+from dsc.outcomes import Outcome
 from knowledge_base.errors import InputError
 from knowledge_base.exchange import delta_form, delta_of
 from knowledge_base.language.checking.inputs import require_delta, require_time, shown

@@ -1,13 +1,22 @@
 """Ports of a component besides its skills: events, queries and one-way messages, as decorators (S1.1).
 
 ```python
-class Battery(Component):
-    @event({"level": "number"})
-    def low(self, level: float, below: float = 20.0) -> dict[str, Any] | None:
-        return {"level": level} if level < below else None
+class Low(Outcome):
+    level: float
 
-    @query({"hours": "number"})
-    async def lasts(self, watts: float) -> dict[str, Any]: ...
+
+class Lasts(Outcome):
+    hours: float
+
+
+class Battery(Component):
+    @event
+    def low(self, level: float, below: float = 20.0) -> Low | None:
+        return Low(level=level) if level < below else None
+
+    @query
+    async def lasts(self, watts: float) -> Lasts:
+        return Lasts(hours=50.0 / watts)
 
     @takes
     async def calibrate(self, full: float) -> None: ...
@@ -21,66 +30,80 @@ from __future__ import annotations
 import asyncio
 import inspect
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from dsc.calls import Outcome, SkillCall
+from dsc.annotations import names_around, parameter_types
+from dsc.calls import SkillCall
 from dsc.components.hooks import contained
-from dsc.skills import Declared, SkillBody, require_names
+from dsc.outcomes import Outcome
+from dsc.skills import Declared, SkillBody, refused_at, require_function, returned
+from knowledge_base.errors import SchemaError
 
 ANSWERED = "answered"
 """The outcome of a query; its attributes are the answer."""
 TAKES = "__dsc_takes__"
 """Name of the attribute in which `takes` stores its declaration."""
 _Body = TypeVar("_Body", bound=Callable[..., Any])
+_Asked = TypeVar("_Asked", bound=Callable[..., Awaitable[Outcome]])
+_Test = TypeVar("_Test", bound=Callable[..., Outcome | None])
 Test = Callable[..., None]
 """Function that receives each new value of an event."""
 
 
-def query(answer: Mapping[str, str | None], types: Mapping[str, str] | None = None) -> Callable[[_Body], _Body]:
-    """Declare a coroutine method as a query, e.g. `async def lasts(self, watts)`.
+def query(body: _Asked) -> _Asked:
+    """Declare a coroutine method as a query, e.g. `async def lasts(self, watts: float) -> Lasts`.
 
-    The method returns the values of the answer by name. A chart starts the query with `trigger` and a time `within`.
-    The event `answered` carries the answer.
+    The method returns an outcome class, whose attributes are the answer. A chart starts the query with `trigger` and a
+    time `within`. The event `answered` carries the answer.
 
-    Args:
-        answer: names and types of the answer's values.
-        types: types of the query's parameters by name, as for `skill`.
+    Raises:
+        SchemaError: the annotation of the method's return value is not one outcome class.
     """
-    require_names(answer, "the values of an answer", "@query({'hours': 'number'})")
-    return Declared(dict(types or {}), {ANSWERED: dict(answer)}, _ask, own=1, pattern="query", after_crash="repeat")
+    require_function(body, "query")
+    with refused_at(body) as name:
+        names = names_around(body.__globals__)
+        answers = list(returned(body, names).values())
+        if len(answers) != 1:
+            raise SchemaError(f"query '{name}' returns one outcome class, the answer, not {len(answers)}")
+        types = parameter_types(body, 1, names)
+        return Declared(types, {ANSWERED: answers[0]}, _ask, own=1, pattern="query", after_crash="repeat")(body)
+    return body
 
 
-def event(attributes: Mapping[str, str | None], types: Mapping[str, str] | None = None) -> Callable[[_Body], _Body]:
+def event(test: _Test) -> _Test:
     """Declare an event that charts activate with parameters, under a name that they choose (S0.6).
 
     The decorated method is the event's test. For each activation, `update` calls the test with the new values and the
-    activation's parameters. The test returns the event's attributes, or `None` if the condition is false. The event is
-    posted each time the test changes from `None` to attributes. A chart activates the event with `trigger`, until the
-    state is left. The event has the method's name unless the chart renames it with `as`. With `within`, the event
-    `timed_out` ends the activation.
+    activation's parameters. The test returns an outcome class, the event, or `None` if the condition is false. The
+    event is posted each time the test changes from `None` to an event. A chart activates the event with `trigger`,
+    until the state is left. The event has the name of the class unless the chart renames it with `as`. With `within`,
+    the event `timed_out` ends the activation.
 
-    Args:
-        attributes: the event's attributes, with types.
-        types: types of the activation's parameters. In the method, the activation's parameters follow those for values,
-            and have defaults.
+    In the method, the activation's parameters follow those for values, and have defaults.
+
+    Raises:
+        SchemaError: the annotation of the method's return value is not one outcome class or `None`.
     """
-    require_names(attributes, "the attributes of an event", "@event({'level': 'number'})")
-
-    def declare(test: _Body) -> _Body:
-        parameters = inspect.signature(test).parameters.values()
-        return Declared(
-            dict(types or {}), {test.__name__: dict(attributes)}, _activate, pattern="event", after_crash="repeat",
-            own=sum(one.default is inspect.Parameter.empty for one in parameters),
-        )(test)  # fmt: skip
-
-    return declare
+    require_function(test, "event")
+    with refused_at(test) as name:
+        names = names_around(test.__globals__)
+        own = sum(one.default is inspect.Parameter.empty for one in inspect.signature(test).parameters.values())
+        events = returned(test, names)
+        if len(events) != 1:
+            raise SchemaError(f"event '{name}' returns one outcome class or None, not {len(events)} classes")
+        types = parameter_types(test, own, names)
+        return Declared(types, events, _activate, own=own, pattern="event", after_crash="repeat")(test)
+    return test
 
 
 def takes(body: _Body) -> _Body:
     """Declare a coroutine method that receives one-way messages, e.g. `send: voice.say` in a chart."""
-    setattr(body, TAKES, Declared({}, {}, _ask, own=1))
+    require_function(body, "takes")
+    with refused_at(body):
+        types = parameter_types(body, 1, names_around(body.__globals__))
+        setattr(body, TAKES, Declared(types, {}, _ask, own=1))
     return body
 
 
@@ -117,11 +140,12 @@ class EventActivations:
             self._tests[event].remove(test)
 
 
-async def _ask(_: Any, body: SkillBody, __: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
-    return Outcome(ANSWERED, await body(**arguments))
+async def _ask(_: Any, body: SkillBody, __: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
+    answer = await body(**arguments)
+    return Outcome(ANSWERED, answer.attributes, answer.observed)
 
 
-async def _activate(component: Any, body: SkillBody, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+async def _activate(component: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
     """Test each new value until the action is cancelled or the test raises an error."""
     held = False
     failed: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
@@ -132,7 +156,7 @@ async def _activate(component: Any, body: SkillBody, call: SkillCall, arguments:
             with contained():
                 found = body(*values, **arguments)
             if found is not None and not held:
-                call.report(Outcome(body.__name__, found))
+                call.report(found)
             held = found is not None
         except Exception as error:  # noqa: BLE001  # the error fails this activation, not the caller of `update`
             if not failed.done():

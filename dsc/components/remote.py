@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
-from dsc.calls import Ended, Outcome, SkillCall, Status
+from dsc.calls import Ended, SkillCall, Status
 from dsc.components.component import Component
 from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedError, Transport
 from dsc.components.heartbeat import Heartbeat
@@ -22,6 +22,7 @@ from dsc.components.host import CONDITION, outcome_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import RENEWED, RemotePush, Subscription
 from dsc.errors import ProgrammingError
+from dsc.outcomes import Outcome
 from dsc.skills import SkillSignature
 from knowledge_base.errors import InputError, described, text_of
 from knowledge_base.language.checking.inputs import require_text
@@ -156,7 +157,7 @@ class RemoteComponent(Component):
             self.life.become(Life(life), reason, ProgrammingError(reason) if bug else None)
         self.life.mode = mode
 
-    async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    async def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         """Execute the skill at the host, and return its outcome.
 
         Raises:
@@ -177,7 +178,7 @@ class RemoteComponent(Component):
         finally:
             self._endpoint.deafen(f"news {call.action_id}")
 
-    async def _end_of(self, call: SkillCall, news: asyncio.Event) -> Outcome:
+    async def _end_of(self, call: SkillCall[Any], news: asyncio.Event) -> Outcome:
         """Pass the action's reports to `call.report`, and return its outcome."""
         received = 0
         while True:

@@ -11,7 +11,6 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from dsc.calls import Outcome
 from dsc.engine.machine_state import NOTHING, FrameState
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import NO_ATTRIBUTES, Event
@@ -24,6 +23,7 @@ from dsc.messages import (
     SkillMessage,
     TimerMessage,
 )
+from dsc.outcomes import Outcome
 from dsc.runs.tables import Form
 from knowledge_base.exchange import delta_form, delta_of
 

@@ -11,10 +11,9 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
-from dsc.calls import Clock, Ended, Outcome, SkillCall, Status
+from dsc.calls import Clock, Ended, SkillCall, Status
 from dsc.components.component import Component
 from dsc.components.hooks import contained, give_up, reason_of
 from dsc.components.life_cycle import Life
@@ -22,6 +21,7 @@ from dsc.components.robot import Wiring, require_instances
 from dsc.engine import steps
 from dsc.errors import UncertainActionError
 from dsc.messages import LateMessage, SkillMessage, TimerMessage
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, PastClock
 from dsc.sequencer.inbox import Timers
 from dsc.sequencer.message_checks import encoded, late, validated
@@ -322,7 +322,7 @@ class Dispatcher:
         work = component.execute(start.skill, call, encoded(start.arguments) if start.arguments else {})
         outcome = validated(await dependencies.carrying(work), start, signature)
         # The observations are true, also if they arrive late.
-        return replace(late(start, running.within), observed=outcome.observed) if running.is_late else outcome
+        return late(start, running.within, observed=outcome.observed) if running.is_late else outcome
 
     async def _forget(self, component: Component, action_id: str) -> None:
         try:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from dsc.calls import OBSERVED, Outcome
+from dsc.calls import OBSERVED
 from dsc.components.component import Component
 from dsc.components.hooks import is_own, running_task
 from dsc.dynamic.library import Library
@@ -16,6 +16,7 @@ from dsc.engine.steps import NO_CHANGE, Start
 from dsc.events import NO_ATTRIBUTES, PROGRAMMING_ERROR, RESERVED, SKILL_ERROR, TIMED_OUT, Event
 from dsc.messages import KnowledgeMessage, ParameterMessage, SkillMessage
 from dsc.model.plot import ActionPlot
+from dsc.outcomes import Outcome
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock
 from dsc.skills import SkillSignature
@@ -68,11 +69,11 @@ def _invalid(start: Start, reason: str, place: str) -> Outcome:
     return outcome
 
 
-def late(start: Start, seconds: float, missing: str = "") -> Outcome:
+def late(start: Start, seconds: float, missing: str = "", observed: Delta = NO_CHANGE) -> Outcome:
     """Return the outcome `timed_out` of a skill. A skill that waited for the component `missing` has not begun."""
     skill = f"{start.component}.{start.skill}"
     reason = f"{skill}: no outcome within {seconds:g} s" + (f", it waited for {missing}" if missing else "")
-    return Outcome(TIMED_OUT, {"skill": skill, "seconds": seconds, "reason": reason})
+    return Outcome(TIMED_OUT, {"skill": skill, "seconds": seconds, "reason": reason}, observed)
 
 
 def validated(outcome: object, start: Start, signature: SkillSignature) -> Outcome:

@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
 from dsc.errors import ProgrammingError, SkillError
 from dsc.model.plot import ActionPlot
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import AfterCrash, SkillSignature, check_arguments
@@ -57,7 +58,7 @@ class PlotComponent(Component):
         """Return a signature for each plot, by name."""
         return dict(self._signatures)
 
-    async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    async def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         """Run the plot to its end, and return its outcome; events that it emits earlier become reports.
 
         A cancelled plot exits its states.

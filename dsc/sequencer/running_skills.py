@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from dsc.blocking import DeadlineError
-from dsc.calls import Outcome, Reports
+from dsc.calls import Reports
 from dsc.components.hooks import GRACE, Classes, give_up, give_up_after, is_own, programming_error
 from dsc.engine.steps import Start
 from dsc.events import PROGRAMMING_ERROR, SKILL_ERROR
 from dsc.messages import SkillMessage
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.message_checks import failed, faulty, late, validated
 from dsc.skills import SkillSignature

@@ -14,9 +14,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.chance import choose, uniform
 from dsc.components.component import Component
+from dsc.outcomes import Outcome
 from dsc.runs.archive import archive
 from dsc.runs.store import Boundary
 from dsc.sequencer.sequencer import Sequencer
@@ -135,7 +136,7 @@ class Crashes(Generic[_Result]):
         """Enable crashes after this component's actions, before their answers are committed; return the component."""
         execute = component.execute
 
-        async def carried_out(skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+        async def carried_out(skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
             outcome = await execute(skill_name, call, arguments)
             await self.reached("after an action")
             return outcome

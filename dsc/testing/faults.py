@@ -18,7 +18,7 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, NoReturn, TypeVar
 
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.chance import choose, uniform
 from dsc.components.component import Component
 from dsc.components.endpoint import LocalTransport
@@ -27,6 +27,7 @@ from dsc.engine.steps import SendLater, Start, Step
 from dsc.errors import SkillError
 from dsc.events import Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
+from dsc.outcomes import Outcome
 from dsc.sequencer.sequencer import Sequencer
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
@@ -185,7 +186,7 @@ class _Injected:
         self._execute = component.execute
         self._faults = faults
 
-    async def __call__(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    async def __call__(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         signature = self._component.skills().get(skill_name)
         if signature is not None and signature.pattern == "event":
             return await self._execute(skill_name, replace(call, report=self._events(call)), arguments)
@@ -202,7 +203,7 @@ class _Injected:
             call.report(outcome)
         return outcome
 
-    async def _before(self, fault: Fault | None, call: SkillCall) -> None:
+    async def _before(self, fault: Fault | None, call: SkillCall[Any]) -> None:
         if fault is Fault.SKILL_FAILS:
             raise InjectedError("it was to fail")
         if fault is Fault.SKILL_HANGS:
@@ -213,7 +214,7 @@ class _Injected:
             life.become(Life.FATAL_ERROR, "it was to die")
             await _never(call)
 
-    def _events(self, call: SkillCall) -> Callable[[Outcome], None]:
+    def _events(self, call: SkillCall[Any]) -> Callable[[Outcome], None]:
         """Return a report function that posts each event with its drawn delay or repetition."""
         number = 0
 
@@ -237,7 +238,7 @@ def _revive(life: LifeCycle) -> None:
         life.become(Life.ALIVE)
 
 
-async def _never(call: SkillCall) -> NoReturn:
+async def _never(call: SkillCall[Any]) -> NoReturn:
     """Wait for the deadline, or for the dispatcher's reaction to the component's death."""
     if math.isinf(call.deadline):
         raise InjectedError("it was to hang, and has no deadline")

@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.components.component import Component
+from dsc.outcomes import Outcome
 from dsc.skills import SkillSignature, check_arguments
 from dsc.testing.fixtures import change_of, require_attributes
 from knowledge_base.errors import InputError, ParseError, UnknownNameError
@@ -81,7 +82,7 @@ class _ScriptedComponent(Component):
         """Return the imitated skills, or the skills of the script that are known so far."""
         return self._signatures
 
-    async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    async def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         """Wait for the scripted duration, and return the scripted outcome."""
         made = Call(f"{self.name}.{skill_name}", dict(arguments), call.clock.now())
         answer = self._reply(skill_name, made)

@@ -20,7 +20,7 @@ from typing import Any, ClassVar
 
 import pytest
 
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError, Transport
 from dsc.components.heartbeat import BEAT, SILENCE, Heartbeat
@@ -32,6 +32,7 @@ from dsc.components.remote import RemoteComponent
 from dsc.components.robot import Wiring
 from dsc.components.streams import Push, Stream
 from dsc.errors import ProgrammingError
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
 from dsc.supervision.activation import ComponentActivation
@@ -42,6 +43,36 @@ from knowledge_base.facts import Delta, fact
 
 PATIENCE = 20.0
 """Seconds of loop time within which each guarantee must be fulfilled."""
+
+
+class There(Outcome):
+    """The event `there`."""
+
+    to: object
+
+
+class Passed(Outcome):
+    """The event `passed`."""
+
+    n: float
+
+
+class Doubled(Outcome):
+    """The event `doubled`."""
+
+    n: float
+
+
+class Low(Outcome):
+    """The event `low`."""
+
+    level: float
+
+
+class Measure(Outcome):
+    """The event `measure`."""
+
+    metres: float
 
 
 class SuiteRobot(Component):
@@ -55,33 +86,33 @@ class SuiteRobot(Component):
         super().__init__()
         self.log: list[Any] = []
 
-    @skill(outcomes={"there": {"to": None}, "passed": {"n": "number"}})
-    async def go(self, call: SkillCall, to: str, steps: int = 3) -> Outcome:
+    @skill
+    async def go(self, call: SkillCall[Passed], to: str, steps: int = 3) -> There:
         """Report each step, and end at the destination."""
         self.log.append(f"go {to}")
         try:
             for n in range(steps):
                 await call.clock.sleep(0.3)
-                call.report(Outcome("passed", {"n": n}))
+                call.report(Passed(n=n))
         except asyncio.CancelledError:
             self.log.append("cancelled")
             raise
-        return Outcome("there", {"to": to}, Delta(added=(fact("at", to),)))
+        return There(to=to, observed=Delta(added=(fact("at", to),)))
 
-    @skill(outcomes={})
-    async def fall(self, call: SkillCall) -> Outcome:
+    @skill
+    async def fall(self, call: SkillCall) -> None:
         """Fail."""
         raise RuntimeError(f"{call.action_id} fell")
 
-    @query({"n": "number"})
-    async def doubled(self, n: float) -> dict[str, Any]:
+    @query
+    async def doubled(self, n: float) -> Doubled:
         """Return the doubled number."""
-        return {"n": 2 * n}
+        return Doubled(n=2 * n)
 
-    @event({"level": "number"})
-    def low(self, level: float, below: float = 20.0) -> dict[str, Any] | None:
+    @event
+    def low(self, level: float, below: float = 20.0) -> Low | None:
         """Return the event's attributes if the level is low."""
-        return {"level": level} if level < below else None
+        return Low(level=level) if level < below else None
 
     @takes
     async def say(self, text: str) -> None:
@@ -100,10 +131,10 @@ class Laser(Component):
     scan = Push({"metres": "number"})
     heat = Push({"celsius": "number"}, period=0.1)
 
-    @query({"metres": "number"})
-    async def measure(self) -> dict[str, Any]:
+    @query
+    async def measure(self) -> Measure:
         """Return the published value."""
-        return {"metres": 9}
+        return Measure(metres=9)
 
 
 class Mapper(Component):

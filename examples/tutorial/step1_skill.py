@@ -1,5 +1,7 @@
 """Step 1, a skill: a coroutine of a component, which ends with an outcome and with what it observed."""
 
+from typing import NewType
+
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from knowledge_base import Delta, fact
 from planning import Executive
@@ -8,16 +10,22 @@ DOMAIN = """(define (domain house) (:types room)
   (:predicates (robot-in ?r - room)))"""
 
 
+Room = NewType("Room", str)
+
+
+class Arrived(Outcome): ...
+
+
 class Base(Component):
     """The wheels of the robot."""
 
     name = "base"
 
-    @skill(outcomes={"arrived": {}}, types={"start": "room", "to": "room"})
-    async def drive(self, call: SkillCall, start: str, to: str) -> Outcome:
+    @skill
+    async def drive(self, call: SkillCall, start: Room, to: Room) -> Arrived:
         await call.clock.sleep(10.0)  # simulated seconds: the run does not wait for them
         print(f"{call.clock.now():4.0f} s  in the {to}")
-        return Outcome("arrived", observed=Delta(removed=(fact("robot-in", start),), added=(fact("robot-in", to),)))
+        return Arrived(observed=Delta(removed=(fact("robot-in", start),), added=(fact("robot-in", to),)))
 
 
 def main() -> None:

@@ -1,6 +1,8 @@
 """Step 2, a plot: a state chart in YAML, which uses skills and other plots and names what can go wrong."""
 
-from step1_skill import Base
+from typing import NewType
+
+from step1_skill import Base, Room
 
 from dsc import Component, Outcome, SkillCall, parse_plot, primitive_plot, skill
 from knowledge_base import Delta, fact
@@ -26,6 +28,15 @@ states:
 """)
 
 
+Parcel = NewType("Parcel", str)
+
+
+class PickedUp(Outcome): ...
+
+
+class NothingThere(Outcome): ...
+
+
 class Gripper(Component):
     """The hand of the robot; it feels whether it holds something."""
 
@@ -35,16 +46,14 @@ class Gripper(Component):
         super().__init__()
         self.shelf = {*shelf}
 
-    @skill(outcomes={"picked_up": {}, "nothing_there": {}}, types={"parcel": "parcel", "room": "room"})
-    async def pick_up(self, call: SkillCall, parcel: str, room: str) -> Outcome:
+    @skill
+    async def pick_up(self, call: SkillCall, parcel: Parcel, room: Room) -> PickedUp | NothingThere:
         await call.clock.sleep(3.0)
         if parcel not in self.shelf:
-            return Outcome("nothing_there", observed=Delta(removed=(fact("lies-in", parcel, room),)))
+            return NothingThere(observed=Delta(removed=(fact("lies-in", parcel, room),)))
         self.shelf.remove(parcel)
         print(f"{call.clock.now():4.0f} s  holds the {parcel}")
-        return Outcome(
-            "picked_up", observed=Delta(removed=(fact("lies-in", parcel, room),), added=(fact("carries", parcel),))
-        )
+        return PickedUp(observed=Delta(removed=(fact("lies-in", parcel, room),), added=(fact("carries", parcel),)))
 
 
 KNOWN = Delta(

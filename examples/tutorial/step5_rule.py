@@ -1,5 +1,6 @@
 """Step 5, a rule: a foreseen failure is answered in one place, for designed plots and for steps of plans alike."""
 
+from step1_skill import Arrived, Room
 from step2_plot import Gripper
 from step4_goal import DOMAIN, KNOWN
 
@@ -28,6 +29,12 @@ states:
 """)
 
 
+class DoorClosed(Outcome): ...
+
+
+class Knocked(Outcome): ...
+
+
 class Doors(Component):
     """Wheels in a house whose doors are closed now and then."""
 
@@ -37,21 +44,21 @@ class Doors(Component):
         super().__init__()
         self.closed = closed
 
-    @skill(outcomes={"arrived": {}, "door_closed": {}}, types={"start": "room", "to": "room"})
-    async def drive(self, call: SkillCall, start: str, to: str) -> Outcome:
+    @skill
+    async def drive(self, call: SkillCall, start: Room, to: Room) -> Arrived | DoorClosed:
         await call.clock.sleep(10.0)
         if self.closed:
             self.closed -= 1
             print(f"{call.clock.now():4.0f} s  the door to the {to} is closed")
-            return Outcome("door_closed")
+            return DoorClosed()
         print(f"{call.clock.now():4.0f} s  in the {to}")
-        return Outcome("arrived", observed=Delta(removed=(fact("robot-in", start),), added=(fact("robot-in", to),)))
+        return Arrived(observed=Delta(removed=(fact("robot-in", start),), added=(fact("robot-in", to),)))
 
-    @skill(outcomes={"knocked": {}})
-    async def knock(self, call: SkillCall) -> Outcome:
+    @skill
+    async def knock(self, call: SkillCall) -> Knocked:
         await call.clock.sleep(2.0)
         print(f"{call.clock.now():4.0f} s  knocked")
-        return Outcome("knocked")
+        return Knocked()
 
 
 def main() -> None:

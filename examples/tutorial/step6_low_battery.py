@@ -2,7 +2,7 @@
 
 from step1_skill import Base
 
-from dsc import Component, Event, Outcome, SkillCall, parse_plot, primitive_plot, skill
+from dsc import Component, Event, Outcome, Sequencer, SkillCall, parse_plot, primitive_plot, skill
 from knowledge_base import Delta, fact
 from planning import Executive
 
@@ -30,16 +30,19 @@ states:
 """)
 
 
+class Charged(Outcome): ...
+
+
 class Battery(Component):
     """The battery, which is charged where the robot stands."""
 
     name = "battery"
 
-    @skill(outcomes={"charged": {}})
-    async def charge(self, call: SkillCall) -> Outcome:
+    @skill
+    async def charge(self, call: SkillCall) -> Charged:
         await call.clock.sleep(30.0)
         print(f"{call.clock.now():4.0f} s  charged")
-        return Outcome("charged")
+        return Charged()
 
 
 def main() -> None:
@@ -48,7 +51,7 @@ def main() -> None:
     with Executive(DOMAIN, plots, [base, Battery()]) as robot:
         robot.knowledge.apply(Delta(nodes={"hall": "room", "office": "room"}, added=(fact("robot-in", "hall"),)), "map")
 
-        def battery_falls(sequencer) -> None:
+        def battery_falls(sequencer: Sequencer) -> None:
             sequencer.post(Event("low_battery", {"level": 60}), after=2)
             sequencer.post(Event("low_battery", {"level": 15}), after=14)
 

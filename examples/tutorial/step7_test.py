@@ -11,7 +11,7 @@ MAP = world(DOMAIN, "hall office - room letter - parcel", "(robot-in hall) (lies
 ARGUMENTS = {"parcel": "letter", "from": "hall", "to": "office"}
 
 
-def test_a_parcel_is_fetched():
+def test_a_parcel_is_fetched() -> None:
     run = rehearse(
         LIBRARY, "fetch", ARGUMENTS, knowledge=MAP, like=[Base(), Gripper()],
         skills={"base.drive": "arrived", "gripper.pick_up": "picked_up"},
@@ -20,7 +20,7 @@ def test_a_parcel_is_fetched():
     assert entered(run, "grasp")
 
 
-def test_a_missing_parcel_is_reported():
+def test_a_missing_parcel_is_reported() -> None:
     run = rehearse(
         LIBRARY, "fetch", ARGUMENTS, knowledge=MAP, like=[Base(), Gripper()],
         skills={"base.drive": "arrived", "gripper.pick_up": "nothing_there"},

@@ -8,12 +8,12 @@ from contextlib import aclosing
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dsc.calls import Outcome
 from dsc.sequencer.clock import PastClock
 from knowledge_base.errors import described
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.execution.monitor import Broken, GoalReached, Monitor, News, Shorter
+from planning.execution.outcomes import GoalHolds, Monitored, PlanInvalid
 from planning.execution.plan_progress import cost_of, shortest_end
 from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, StepEnded, Successor
 from planning.execution.search import Found, NotFound
@@ -61,7 +61,7 @@ class Monitoring:
         self._monitor: Monitor | None = None
         self._tasks: list[asyncio.Task[None]] = []
 
-    async def outcome(self) -> Outcome:
+    async def outcome(self) -> Monitored:
         """Monitor the plan until its end, and return the outcome of the skill `monitor`."""
         try:
             self._begin()
@@ -118,16 +118,16 @@ class Monitoring:
         if self._monitor is not None:
             self._monitor.close()
 
-    def _answer(self, news: Heard) -> Outcome | None:
+    def _answer(self, news: Heard) -> Monitored | None:
         """Handle the news; return the outcome with which monitoring ends, or `None` if monitoring continues."""
         run = self._run
-        outcome: Outcome | None = None
+        outcome: Monitored | None = None
         if isinstance(news, Found | NotFound):
             run.searching_since = None
         match news:
             case GoalReached():
                 self._records.skipped(run.name, run.progress.remaining_steps, "the goal holds")
-                outcome = Outcome("goal_holds")
+                outcome = GoalHolds()
             case Shorter(steps):
                 outcome = self._shorten(steps)
             case StepEnded():
@@ -220,7 +220,7 @@ class Monitoring:
             return None
         return (step, *end)
 
-    def _shorten(self, steps: tuple[PlanStep, ...]) -> Outcome | None:
+    def _shorten(self, steps: tuple[PlanStep, ...]) -> Monitored | None:
         """Omit steps; the running step continues if the shorter plan begins with an equal step."""
         run, why = self._run, "fewer steps lead to the goal"
         skipped = [step for step in run.progress.remaining_steps if step not in steps]
@@ -230,7 +230,7 @@ class Monitoring:
         self._install().update()  # the monitor has just validated these steps
         return None
 
-    def _follow(self, answer: PlanFound, successor: Successor) -> Outcome | None:
+    def _follow(self, answer: PlanFound, successor: Successor) -> Monitored | None:
         """Replace the plan by a new plan; the running step continues if the new plan begins with an equal step."""
         run, name = self._run, self._escalation.runs.new_name()
         self._records.found(answer, name)
@@ -239,10 +239,10 @@ class Monitoring:
         self._look("earlier")
         return None
 
-    def _replaced(self, why: str) -> Outcome:
+    def _replaced(self, why: str) -> Monitored:
         """Return the outcome with the successor's plot; `plan_invalid` if the successor no longer leads to the goal."""
         return self._escalation.succeeded(self._run, why) or _invalid("", why, "earlier")
 
 
-def _invalid(which: str, why: str, author: str) -> Outcome:
-    return Outcome("plan_invalid", {"which": which, "why": why, "author": author})
+def _invalid(which: str, why: str, author: str) -> PlanInvalid:
+    return PlanInvalid(which=which, why=why, author=author)

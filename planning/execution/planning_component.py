@@ -6,8 +6,9 @@ import asyncio
 from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
-from dsc.calls import Ended, Outcome, SkillCall, Status
+from dsc.calls import Ended, SkillCall, Status
 from dsc.components.component import Component
+from dsc.outcomes import Outcome
 from dsc.sequencer.reactor import CHART
 from dsc.skills import skill
 from knowledge_base.errors import InputError
@@ -15,6 +16,15 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.syntax.text import parse_condition
 from planning.execution.monitoring import Monitoring
+from planning.execution.outcomes import (
+    GoalHolds,
+    GoalOpen,
+    Held,
+    Monitored,
+    NoPlan,
+    PlotFound,
+    Repaired,
+)  # fmt: skip
 from planning.execution.plan_progress import PlanProgress
 from planning.execution.plan_records import PlanRecords
 from planning.execution.plan_run import Attempt, PlanRun, PlanRuns
@@ -31,8 +41,6 @@ if TYPE_CHECKING:
     from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
     from planning.execution.search import Foresight
-
-_PLAN_FOUND = {"plot": "plot", "name": "symbol", "steps": "number"}
 
 
 class PlanningComponent(Component):
@@ -115,7 +123,7 @@ class PlanningComponent(Component):
         self._choices.recall(memory["chosen"])
         self._answers = {one: Outcome(event, attributes) for one, (event, attributes) in memory["answers"].items()}
 
-    async def execute(self, skill_name: str, call: SkillCall, arguments: Mapping[str, Any]) -> Outcome:
+    async def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         """Execute a skill, and keep its outcome until `forget`, so that `status` can return it after a restart."""
         answer = self._answers[call.action_id] = await super().execute(skill_name, call, arguments)
         return answer
@@ -136,14 +144,7 @@ class PlanningComponent(Component):
         if run is not None:
             run.begin(int(value))
 
-    @skill(
-        outcomes={
-            "plan_found": _PLAN_FOUND,
-            "goal_holds": {},
-            "no_plan": {"reason": "text", "kind": "symbol"},
-        },
-        after_crash="repeat",
-    )
+    @skill(after_crash="repeat")
     async def plan(
         self,
         call: SkillCall,
@@ -152,7 +153,7 @@ class PlanningComponent(Component):
         seconds: float,
         replans: int,
         after: str,
-    ) -> Outcome:
+    ) -> PlotFound | GoalHolds | NoPlan:
         """Find a plan for the goal and generate the plot of the plan.
 
         `after` is the name of the plan that the new one replaces; empty for the first plan. The attribute `kind` of
@@ -163,28 +164,21 @@ class PlanningComponent(Component):
         finally:  # at the end, since an interrupted search needs the replaced plan again
             self._runs.over(after)
 
-    @skill(outcomes={"goal_holds": {}, "goal_open": {"reason": "text"}}, after_crash="repeat")
-    async def judge(self, call: SkillCall, goal: str, plan: str = "") -> Outcome:  # noqa: ARG002
+    @skill(after_crash="repeat")
+    async def judge(self, call: SkillCall, goal: str, plan: str = "") -> GoalHolds | GoalOpen:  # noqa: ARG002
         """Test the goal after the end of `plan`; `goal_open` contains the part of the goal that does not hold."""
         try:
             wanted = self._derivation.at(self._knowledge).condition(parse_condition(goal))
             why = explain(wanted, self._knowledge)
         except InputError as error:  # an object of the goal no longer exists
-            return Outcome("goal_open", {"reason": str(error)})
+            return GoalOpen(reason=str(error))
         if not why.truth:
-            return Outcome("goal_open", {"reason": str(why.deciding)})
+            return GoalOpen(reason=str(why.deciding))
         self._runs.over(plan)
-        return Outcome("goal_holds")
+        return GoalHolds()
 
-    @skill(
-        outcomes={
-            "goal_holds": {},
-            "plan_found": _PLAN_FOUND,
-            "plan_invalid": {"which": "text", "why": "text", "author": "symbol"},
-        },
-        after_crash="repeat",
-    )
-    async def monitor(self, call: SkillCall, plan: str) -> Outcome:
+    @skill(after_crash="repeat")
+    async def monitor(self, call: SkillCall, plan: str) -> Monitored:
         """Monitor a plan until another plan replaces it, its goal holds, or it no longer leads to the goal.
 
         The monitor validates a change by another author immediately. It validates a change by the running step at the
@@ -200,24 +194,16 @@ class PlanningComponent(Component):
             self._runs.over(plan)
         return outcome
 
-    @skill(outcomes={"held": {}}, after_crash="repeat")
-    async def hold(self, call: SkillCall, plan: str) -> Outcome:  # noqa: ARG002
+    @skill(after_crash="repeat")
+    async def hold(self, call: SkillCall, plan: str) -> Held:  # noqa: ARG002
         """End with `held` when no further step of the plan may begin, since a successor follows the running step."""
         run = self._runs.get(plan)
         superseded = asyncio.Event() if run is None else run.superseded
         await superseded.wait()
-        return Outcome("held")
+        return Held()
 
-    @skill(
-        outcomes={
-            "plan_found": _PLAN_FOUND,
-            "goal_holds": {},
-            "replan": {},
-            "gave_up": {"reason": "text"},
-        },
-        after_crash="repeat",
-    )
-    async def repair(self, call: SkillCall, plan: str, why: str) -> Outcome:  # noqa: ARG002
+    @skill(after_crash="repeat")
+    async def repair(self, call: SkillCall, plan: str, why: str) -> Repaired:  # noqa: ARG002
         """Return the answer to the failure of a plan, see `planning.execution.plan_run.EscalationStep`.
 
         `plan_found` contains a plan that needs no planner call; `replan` requests a planner call.
@@ -226,10 +212,10 @@ class PlanningComponent(Component):
 
     async def _planned(
         self, call: SkillCall, goal: str, holder: str, seconds: float, replans: int, before: PlanRun | None
-    ) -> Outcome:
+    ) -> PlotFound | GoalHolds | NoPlan:
         wanted, now = parse_condition(goal), self._derivation.at(self._knowledge)
         if holds(now.condition(wanted), self._knowledge):
-            return Outcome("goal_holds")
+            return GoalHolds()
         self._records.asked(goal, self._knowledge.version)
         try:
             earlier = None if before is None else before.progress
@@ -249,6 +235,6 @@ class PlanningComponent(Component):
             self._records.replaced(before.name, run.name, found.kept)
         return self._escalation.bound(run, order, form)
 
-    def _none(self, kind: str, reason: str) -> Outcome:
+    def _none(self, kind: str, reason: str) -> NoPlan:
         self._records.none(kind, reason)
-        return Outcome("no_plan", {"reason": reason, "kind": kind})
+        return NoPlan(reason=reason, kind=kind)

@@ -7,10 +7,10 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from dsc.calls import Outcome
 from knowledge_base.language.syntax.effect import effect_conditions
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.identity_cache import IdentityCache
+from planning.execution.outcomes import GaveUp, GoalHolds, PlotFound, Repaired, Replan
 from planning.execution.plan_progress import PlanProgress, is_true, shortest_end
 from planning.execution.plan_run import EscalationStep, Failure, PlanRun, PlanRuns, PlanState
 from planning.generation.carried_steps import expectation, implementing
@@ -141,14 +141,14 @@ class Escalation:
     def _knowledge(self) -> KnowledgeBase:
         return self.plotting.knowledge
 
-    def answer(self, run: PlanRun, why: str) -> Outcome:
+    def answer(self, run: PlanRun, why: str) -> Repaired:
         """Handle the failure of a plan.
 
         Returns:
             The outcome of the skill `repair`.
         """
         if self._reached(run):
-            return Outcome("goal_holds")
+            return GoalHolds()
         progress, attempt = run.progress, run.attempt
         end = self._end(run)
         failed = None if run.state is PlanState.STOPPED else self._failed_step(progress)
@@ -165,20 +165,20 @@ class Escalation:
         attempt.replans += 1
         if step is EscalationStep.EXCLUDE and failed is not None:
             self.search.exclude(failed, why)
-        return Outcome("replan")
+        return Replan()
 
-    def succeeded(self, run: PlanRun, why: str) -> Outcome | None:
+    def succeeded(self, run: PlanRun, why: str) -> GoalHolds | PlotFound | None:
         """Return the outcome with the successor's plot; `None` if the successor no longer leads to the goal."""
         if self._reached(run):
-            return Outcome("goal_holds")
+            return GoalHolds()
         end = self._end(run)
         return None if end is None else self._continued(run, end, why)
 
-    def bound(self, run: PlanRun, order: PartialOrder, form: dict[str, Any]) -> Outcome:
+    def bound(self, run: PlanRun, order: PartialOrder, form: dict[str, Any]) -> PlotFound:
         """Add a plan run and record the order of its steps; return the outcome that contains its plot."""
         self.runs.add(run)
         self.records.ordered(run.name, order)
-        return Outcome("plan_found", {"plot": form, "name": run.name, "steps": len(run.progress.steps)})
+        return PlotFound(plot=form, name=run.name, steps=len(run.progress.steps))
 
     def _reached(self, run: PlanRun) -> bool:
         """Return whether the goal holds; delete the plan run if it does."""
@@ -216,7 +216,9 @@ class Escalation:
         expected = expectation(domain.action(step).effect, domain.bindings(step))
         return None if is_true(expected, self._knowledge) else step
 
-    def _continued(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None) -> Outcome:
+    def _continued(
+        self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None
+    ) -> PlotFound:
         """Continue with `steps` without a planner call; the first step tries the candidate `instead_of` last."""
         name = self._recorded(run, steps, why, instead_of)
         found = None if run.successor is None else run.successor.found
@@ -240,10 +242,10 @@ class Escalation:
             self.records.resumed(run.name, name, steps[0], why, instead_of)
         return name
 
-    def _give_up(self, run: PlanRun, reason: str) -> Outcome:
+    def _give_up(self, run: PlanRun, reason: str) -> GaveUp:
         self.runs.over(run.name)
         self.records.gave_up(run.name, reason)
-        return Outcome("gave_up", {"reason": reason})
+        return GaveUp(reason=reason)
 
 
 def situation(domain: PlanningDomain, world: View, goal: Expression) -> str:

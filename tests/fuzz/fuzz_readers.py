@@ -17,7 +17,7 @@ from fuzz_mutation import mutated, reset
 
 from domains.clean_up_table.deployment import bundle, deploy
 from domains.clean_up_table.scenario import Scenario
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import LocalTransport
 from dsc.components.host import Host
@@ -29,6 +29,7 @@ from dsc.engine.machine_state import MachineState
 from dsc.errors import NotExpressibleError, RunawayError
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
+from dsc.outcomes import Outcome
 from dsc.runs.archive import archive
 from dsc.scxml.reader import parse_scxml
 from dsc.scxml.writer import to_scxml
@@ -321,15 +322,19 @@ def _read_runs(file: Path) -> None:
 # -- what comes over a wire ------------------------------------------------------------------------------
 
 
+class Moved(Outcome):
+    to: object
+
+
 class _Arm(Component):
     """Has a skill."""
 
     name = "arm"
 
-    @skill(outcomes={"moved": {"to": None}})
-    async def move(self, call: SkillCall, to: str) -> Outcome:
+    @skill
+    async def move(self, call: SkillCall, to: str) -> Moved:
         """Be there at once."""
-        return Outcome("moved", {"to": to})
+        return Moved(to=to)
 
 
 def read_frames(data: bytes, folder: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib.metadata import EntryPoint
+from typing import Annotated
 
 import pytest
 from typer.testing import CliRunner
@@ -14,15 +15,20 @@ from planning import Bundle, Executive, PlanningDomain, bundles
 from planning.bundles import gathered, installed
 from planning.cli.command import app
 
+Item = Annotated[str, "item"]
+
+
+class Grasped(Outcome): ...
+
 
 class Arm(Component):
     name = "arm"
     domain = """(define (domain arm) (:types item) (:predicates (holding ?item - item))
       (:action grasp :parameters (?item - item) :effect (holding ?item)))"""
 
-    @skill(outcomes={"grasped": {}}, types={"item": "item"})
-    async def grasp(self, call: SkillCall, item: str) -> Outcome:
-        return Outcome("grasped", observed=Delta(added=(fact("holding", item),)))
+    @skill
+    async def grasp(self, call: SkillCall, item: Item) -> Grasped:
+        return Grasped(observed=Delta(added=(fact("holding", item),)))
 
 
 HANDLING = Bundle(

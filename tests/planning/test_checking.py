@@ -33,7 +33,7 @@ PLANTED = [
     ("plots/deliver_all.yaml", "(exists (?r - room)", "(exists (?r - roomm)", "roomm"),
     ("profiles/fast.yaml", "speed: 5", "sped: 5", "no parameter 'sped'; did you mean 'speed'"),
     ("delivery.py", '"wheels"\n', '"wheels"\n    modes = ("fast",)\n    needs = {"fst": ("gripper",)}\n', "'fst'"),
-    ("delivery.py", 'types={"to": "room"}', 'types={"too": "room"}', "no parameter 'too'; did you mean 'to'"),
+    ("delivery.py", "to: Room)", "to: Rom)", "the annotation of 'to' names 'Rom', which does not exist when the class is made; did you mean 'Room'"),
     ("delivery.py", "async def put(", "def put(", "skill 'Gripper.put' is not a coroutine"),
     ("delivery.py", "def grasp(self, call: SkillCall, parcel", "def grasp(self, parcel", "no parameter for its call"),
     ("delivery.py", 'main="deliver_all"', 'main="deliver_al"', "no plot 'deliver_al'; did you mean 'deliver_all'"),
@@ -121,7 +121,7 @@ def test_the_command_prints_the_list_and_has_a_status(project):
     lines = bad.stdout.splitlines()
     assert [line.split(":")[0] for line in lines] == ["delivery.py", "domain.pddl"]
     as_json = subprocess.run([DSC, "check", project, "--json"], capture_output=True, text=True, check=False)
-    assert [one["found"] for one in json.loads(as_json.stdout)] == ["too", "inn"]
+    assert [one["found"] for one in json.loads(as_json.stdout)] == ["Rom", "inn"]
 
 
 @pytest.mark.parametrize("target", ["clean-up-table", "examples/own_domain.py", "tests/support/lasting_robot"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -188,13 +190,19 @@ def merged_sections(parts):
     return [f"({' '.join(words)})" for words in sections.values()]
 
 
+Item = Annotated[str, "item"]
+
+
+class Grasped(Outcome): ...
+
+
 class Gripper(Component):
     domain = """(define (domain gripper) (:predicates (holding ?i - item))
       (:action grasp :parameters (?item - item) :precondition (near ?item) :effect (holding ?item)))"""
 
-    @skill(outcomes={"grasped": {}}, types={"item": "item"})
-    async def grasp(self, call: SkillCall, item: str) -> Outcome:
-        return Outcome("grasped", observed=Delta(added=(fact("holding", item),)))
+    @skill
+    async def grasp(self, call: SkillCall, item: Item) -> Grasped:
+        return Grasped(observed=Delta(added=(fact("holding", item),)))
 
 
 class Spare(Gripper):

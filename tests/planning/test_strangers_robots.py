@@ -213,7 +213,7 @@ def test_other_commands_take_the_same_targets(project):
 
 BUGS = {
     "in a skill": ("room = self.house.at[parcel] =", "room = self.hous.at[parcel] =", "gripper.put: AttributeError"),
-    "in an outcome": ('Outcome("taken",', 'Outcome("takn",', "gripper.grasp: it ended with 'takn'"),
+    "in an outcome": ("Taken(observed", 'Outcome("takn", observed', "gripper.grasp: it ended with 'takn'"),
     "in an observation": ('fact("holding", parcel),)))', 'fact("holds", parcel),)))', "gripper.grasp: there is no predicate 'holds'"),
     "in a fault": ('self.house.fault(call', 'self.house.falt(call', "wheels.drive: AttributeError"),
 }  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
 
@@ -35,11 +35,21 @@ rules:
 """)
 
 
+Lamp = Annotated[str, "lamp"]
+
+
+class Lit(Outcome): ...
+
+
+class Blown(Outcome):
+    lamp: Lamp
+
+
 class Lamps(Component):
     name = "lamps"
 
-    @skill(outcomes={"lit": {}, "blown": {"lamp": "lamp"}}, types={"lamp": "lamp"})
-    async def light(self, call: SkillCall, lamp: str) -> Outcome:
+    @skill
+    async def light(self, call: SkillCall, lamp: Lamp) -> Lit | Blown:
         raise AssertionError("nobody calls the real one")
 
 

@@ -11,14 +11,15 @@ import sqlite3
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from dsc_charts import plot
 from dsc_runs import SCHEMA
 
-from dsc.calls import Outcome
+from dsc import SkillCall
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
+from dsc.outcomes import Outcome
 from dsc.runs.archive import archive
 from dsc.runs.store import RunStore
 from dsc.runs.tables import CHAIN
@@ -29,6 +30,20 @@ from dsc.trace import Record, Trace
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.journal.integrity import Tip, link, put_ends
 from knowledge_base.store import KnowledgeBase
+
+Plot = Annotated[str, "plot"]
+
+
+class Did(Outcome):
+    n: float
+
+
+class Progress(Outcome):
+    n: float
+
+
+class Planned(Outcome):
+    plot: Plot
 
 
 class Robot(Component):
@@ -55,22 +70,22 @@ class Robot(Component):
         self.told.append(("mode", mode))
         await super().switch(mode)
 
-    @skill(outcomes={"did": {"n": "number"}, "progress": {"n": "number"}}, after_crash="same_id")
-    async def work(self, call, seconds=2.0, reports=0, observes="p", sees=False):
+    @skill(after_crash="same_id")
+    async def work(self, call: SkillCall[Progress], seconds=2.0, reports=0, observes="p", sees=False) -> Did:
         for n in range(reports):
             await call.clock.sleep(seconds)
             if sees:
                 call.observe(Delta(added=(Fact("q"),)))
                 continue
-            call.report(Outcome("progress", {"n": n}))
+            call.report(Progress(n=n))
         await call.clock.sleep(seconds)
         if call.action_id not in self.done:
             self.done[call.action_id] = len(self.done) + 1
             self.crash()
-        return Outcome("did", {"n": self.done[call.action_id]}, Delta(added=(Fact(observes),)))
+        return Did(n=self.done[call.action_id], observed=Delta(added=(Fact(observes),)))
 
-    @skill(outcomes={"planned": {"plot": "plot"}}, after_crash="repeat")
-    async def plan(self, call):
+    @skill(after_crash="repeat")
+    async def plan(self, call) -> Planned:
         await call.clock.sleep(1)
         form = {
             "plot": "made",
@@ -79,7 +94,7 @@ class Robot(Component):
                 "n": {"final": True},
             },
         }
-        return Outcome("planned", {"plot": form}, Delta(nodes={"cup": "item"}, added=(fact("seen", "cup"),)))
+        return Planned(plot=form, observed=Delta(nodes={"cup": "item"}, added=(fact("seen", "cup"),)))  # type: ignore[arg-type]
 
 
 class Run:

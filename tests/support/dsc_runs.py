@@ -5,13 +5,15 @@ from __future__ import annotations
 import asyncio
 import sys
 import threading
+from typing import Annotated
 
 from dsc_charts import plot
 
+from dsc import SkillCall
 from dsc.blocking import StoppedError
-from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.dynamic.library import Library
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
@@ -27,6 +29,31 @@ SCHEMA = Schema.parse("""
 """)
 
 SLOW = 1000.0
+
+
+Item = Annotated[str, "item"]
+
+
+class Grasped(Outcome): ...
+
+
+class Slipped(Outcome):
+    item: Item
+
+
+class Found(Outcome):
+    item: Item
+
+
+class Glimpse(Outcome):
+    n: float
+
+
+class Ok(Outcome): ...
+
+
+class Made(Outcome):
+    thing: object
 
 
 class Arm(Component):
@@ -57,26 +84,26 @@ class Arm(Component):
         await super().switch(mode)
         self.note(f"mode {mode}")
 
-    @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}}, types={"item": "item"})
-    async def grasp(self, call, item="cup1", seconds=2.0, ends="grasped"):
+    @skill
+    async def grasp(self, call, item: Item = "cup1", seconds=2.0, ends="grasped") -> Grasped | Slipped:
         self.note(f"grasp {item}")
         try:
             await call.clock.sleep(seconds)
         except asyncio.CancelledError:
             self.note("cancelled")
             raise
-        return Outcome(ends, {"item": item} if ends == "slipped" else {})
+        return Outcome(ends, {"item": item} if ends == "slipped" else {})  # type: ignore[return-value]
 
-    @skill(outcomes={"found": {"item": "item"}, "glimpse": {"n": "number"}})
-    async def look(self, call, glimpses=0, seconds=1.0):
+    @skill
+    async def look(self, call: SkillCall[Glimpse], glimpses=0, seconds=1.0) -> Found:
         for n in range(glimpses):
             await call.clock.sleep(seconds)
-            call.report(Outcome("glimpse", {"n": n}, Delta(added=(Fact("p"),))))
+            call.report(Glimpse(n=n, observed=Delta(added=(Fact("p"),))))
         await call.clock.sleep(seconds)
-        return Outcome("found", {"item": "cup1"}, Delta(nodes={"cup1": "item"}, added=(fact("seen", "cup1"),)))
+        return Found(item="cup1", observed=Delta(nodes={"cup1": "item"}, added=(fact("seen", "cup1"),)))
 
-    @skill(outcomes={"ok": {}, "made": {"thing": None}})
-    async def breaks(self, call, how="raise"):
+    @skill
+    async def breaks(self, call, how="raise") -> Ok | Made:
         await call.clock.sleep(1)
         if how == "raise":
             raise RuntimeError("the gripper is stuck")
@@ -89,18 +116,18 @@ class Arm(Component):
         if how == "cancel":
             raise asyncio.CancelledError
         if how == "undeclared":
-            return Outcome("splendid")
+            return Outcome("splendid")  # type: ignore[return-value]
         if how == "nothing":
-            return None
+            return None  # type: ignore[return-value]
         if how == "no_data":
-            return Outcome("made", {"thing": object()})
-        return Outcome("ok", observed=Delta(added=(fact("nonsense", "x"),)))
+            return Made(thing=object())
+        return Ok(observed=Delta(added=(fact("nonsense", "x"),)))
 
-    @skill(outcomes={"ok": {}})
-    async def waits_for_a_thread(self, call):
+    @skill
+    async def waits_for_a_thread(self, call) -> Ok:
         with call.clock.hold():
             await asyncio.to_thread(threading.Event().wait, 0.02)
-        return Outcome("ok")
+        return Ok()
 
 
 class Ran:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from dsc_charts import plot
 
 from dsc import Component, Outcome, skill
@@ -83,19 +85,40 @@ WAIT = plot("{plot: wait, states: {pause: {after: {seconds: 10, to: over}}, over
 PLOTS = (FETCH, DRIVE, PICK, WAIT)
 
 
+Place = Annotated[str, "place"]
+Item = Annotated[str, "item"]
+
+
+class Arrived(Outcome): ...
+
+
+class NoPath(Outcome): ...
+
+
+class Grasped(Outcome): ...
+
+
+class Slipped(Outcome):
+    item: Item
+
+
+class Felt(Outcome):
+    force: float
+
+
 class Base(Component):
     name = "base"
 
-    @skill(outcomes={"arrived": {}, "no_path": {}}, types={"to": "place"})
-    async def drive(self, call, to):
+    @skill
+    async def drive(self, call, to: Place) -> Arrived | NoPath:
         await call.clock.sleep(5)
-        return Outcome("arrived")
+        return Arrived()
 
 
 class Arm(Component):
     name = "arm"
 
-    @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}, "felt": {"force": "number"}}, types={"item": "item"})
-    async def grasp(self, call, item):
+    @skill
+    async def grasp(self, call, item: Item) -> Grasped | Slipped | Felt:
         await call.clock.sleep(2)
-        return Outcome("grasped")
+        return Grasped()

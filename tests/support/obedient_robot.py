@@ -8,6 +8,12 @@ FAILED = "failed"
 """What a script says when the call ends in the outcome `failed` and changes nothing."""
 
 
+class Failed(Outcome): ...
+
+
+class Did(Outcome): ...
+
+
 class ObedientRobot(Component):
     """Does what it is told.
 
@@ -31,10 +37,10 @@ class ObedientRobot(Component):
         self.done = []
         self.knowledge = None
 
-    @skill(outcomes={"did": {}, "failed": {}})
+    @skill
     async def act(
         self, call: SkillCall, way: str, action: str, one: str = "", two: str = "", three: str = ""
-    ) -> Outcome:
+    ) -> Did | Failed:
         """One planning action, done in one way."""
         await call.clock.sleep(self.seconds)
         if self.until is not None:
@@ -43,9 +49,9 @@ class ObedientRobot(Component):
         self.done.append(f"{step}" if way == action else f"{way}: {step}")
         answers = self.script.get(self.done[-1], [])
         if len(self.done) in self.failing_calls:
-            return Outcome("failed")
+            return Failed()
         observed = answers.pop(0) if answers else self.domain.effects(step, self.knowledge)
-        return Outcome("failed") if observed == FAILED else Outcome("did", observed=observed or Delta())
+        return Failed() if observed == FAILED else Did(observed=observed or Delta())
 
 
 def plots(domain, ways=None):

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from domains.clean_up_table.components import Arm, Base, Camera, Voice
 from domains.clean_up_table.observations import initial_knowledge
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
+from dsc.outcomes import Outcome
 from knowledge_base.facts import Content, Delta, Fact, fact
 
 if TYPE_CHECKING:

@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NewType
 
 from dsc import Component, Outcome, Parameter, SkillCall, skill
 from knowledge_base import Delta, fact
 
 if TYPE_CHECKING:
     from .simulation import House
+
+
+Room = NewType("Room", str)  # objects of the type `room` of the domain
+Parcel = NewType("Parcel", str)
+
+
+class Arrived(Outcome): ...  # the event `arrived` of plots
+
+
+class DoorClosed(Outcome): ...
+
+
+class PickedUp(Outcome): ...
+
+
+class PutDown(Outcome): ...
 
 
 class Base(Component):
@@ -21,14 +37,14 @@ class Base(Component):
         super().__init__()
         self.house = house
 
-    @skill(outcomes={"arrived": {}, "door_closed": {}}, types={"start": "room", "to": "room"})
-    async def drive(self, call: SkillCall, start: str, to: str) -> Outcome:
+    @skill
+    async def drive(self, call: SkillCall, start: Room, to: Room) -> Arrived | DoorClosed:
         await call.clock.sleep(10.0 / self.parameters["speed"])  # run time: simulated, or real with --real-time
         if self.house.fault(call.action_id, "door_closed"):
-            return Outcome("door_closed")
+            return DoorClosed()
         self.house.robot_in = to
         # Observations become knowledge, which conditions and plans read.
-        return Outcome("arrived", observed=Delta(removed=(fact("robot-in", start),), added=(fact("robot-in", to),)))
+        return Arrived(observed=Delta(removed=(fact("robot-in", start),), added=(fact("robot-in", to),)))
 
 
 class Gripper(Component):
@@ -40,16 +56,16 @@ class Gripper(Component):
         super().__init__()
         self.house = house
 
-    @skill(outcomes={"picked_up": {}}, types={"parcel": "parcel", "room": "room"})
-    async def pick_up(self, call: SkillCall, parcel: str, room: str) -> Outcome:
+    @skill
+    async def pick_up(self, call: SkillCall, parcel: Parcel, room: Room) -> PickedUp:
         await call.clock.sleep(3.0)
         self.house.place[parcel] = "gripper"
         gone = (fact("lies-in", parcel, room), fact("empty"))
-        return Outcome("picked_up", observed=Delta(removed=gone, added=(fact("carries", parcel),)))
+        return PickedUp(observed=Delta(removed=gone, added=(fact("carries", parcel),)))
 
-    @skill(outcomes={"put_down": {}}, types={"parcel": "parcel", "room": "room"})
-    async def put_down(self, call: SkillCall, parcel: str, room: str) -> Outcome:
+    @skill
+    async def put_down(self, call: SkillCall, parcel: Parcel, room: Room) -> PutDown:
         await call.clock.sleep(3.0)
         self.house.place[parcel] = room
         seen = (fact("lies-in", parcel, room), fact("empty"))
-        return Outcome("put_down", observed=Delta(removed=(fact("carries", parcel),), added=seen))
+        return PutDown(observed=Delta(removed=(fact("carries", parcel),), added=seen))

@@ -220,12 +220,18 @@ ROBOT = """
 from dsc import Component, Outcome, skill
 
 
+class Grasped(Outcome): ...
+
+
+class Slipped(Outcome): ...
+
+
 class Arm(Component):
     name = "arm"
 
-    @skill(outcomes={"grasped": {}, "slipped": {}})
-    async def grasp(self, call):
-        return Outcome("grasped")
+    @skill
+    async def grasp(self, call) -> Grasped | Slipped:
+        return Grasped()
 
 
 def components():

@@ -13,15 +13,41 @@ import time
 import pytest
 from dsc_runs import Arm, Ran
 
-from dsc import blocking
-from dsc.calls import Outcome, SkillCall
+from dsc import BlockingCall, blocking
+from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.components.robot import component_of
 from dsc.errors import ProgrammingError, SkillError
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.skills import skill
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Fact
+
+
+class Greeted(Outcome):
+    person: str
+
+
+class Ok(Outcome): ...
+
+
+class Added(Outcome):
+    sum: float
+
+
+class Half(Outcome): ...
+
+
+class Pid(Outcome):
+    pid: float
+
+
+class Begun(Outcome):
+    n: float
+
+
+class StubbornBegun(Outcome, event="begun"): ...
 
 
 class Worker(Arm):
@@ -34,35 +60,35 @@ class Worker(Arm):
         self.stopped = threading.Event()
         self.release = threading.Event()
 
-    @skill(outcomes={"added": {"sum": "number"}, "half": {}}, blocking="thread")
-    def add(self, call, a: float, b: float):
-        call.report(Outcome("half"))
-        return Outcome("added", {"sum": a + b})
+    @skill(blocking="thread")
+    def add(self, call: BlockingCall[Half], a: float, b: float) -> Added:
+        call.report(Half())
+        return Added(sum=a + b)
 
-    @skill(outcomes={"ok": {}}, blocking="thread")
-    def sees_and_breaks(self, call):
+    @skill(blocking="thread")
+    def sees_and_breaks(self, call) -> Ok:
         call.observe(Delta(added=(Fact("p"),)))
         raise RuntimeError("the bus is stuck")
 
-    @skill(outcomes={"ok": {}}, blocking="thread")
-    def dawdles(self, call):
+    @skill(blocking="thread")
+    def dawdles(self, call) -> Ok:
         try:
             while True:
                 call.sleep(0.005)
         finally:
             self.stopped.set()
 
-    @skill(outcomes={"ok": {}}, blocking="thread")
-    def deaf(self, call):
+    @skill(blocking="thread")
+    def deaf(self, call) -> Ok:
         self.release.wait()
-        return Outcome("ok")
+        return Ok()
 
-    @skill(outcomes={"ok": {}}, blocking="thread")
-    def raises(self, call):
+    @skill(blocking="thread")
+    def raises(self, call) -> Ok:
         raise RuntimeError("the bus is stuck")
 
-    @skill(outcomes={"ok": {}})
-    async def swallows(self, call):
+    @skill
+    async def swallows(self, call) -> Ok:
         while True:
             try:
                 await asyncio.sleep(1)
@@ -80,38 +106,38 @@ class Far(Component):
 
     name = "far"
 
-    @skill(outcomes={"pid": {"pid": "number"}, "begun": {"n": "number"}}, blocking="process")
-    def whoami(self, call, n: int):
-        call.report(Outcome("begun", {"n": n}))
-        return Outcome("pid", {"pid": os.getpid()})
+    @skill(blocking="process")
+    def whoami(self, call: BlockingCall[Begun], n: int) -> Pid:
+        call.report(Begun(n=n))
+        return Pid(pid=os.getpid())
 
-    @skill(outcomes={"ok": {}}, blocking="process")
-    def raises(self, call):
+    @skill(blocking="process")
+    def raises(self, call) -> Ok:
         raise RuntimeError("the bus is stuck")
 
-    @skill(outcomes={"ok": {}}, blocking="process")
-    def exits(self, call):
+    @skill(blocking="process")
+    def exits(self, call) -> Ok:
         sys.exit("no driver")
 
-    @skill(outcomes={"ok": {}}, blocking="process")
-    def stops(self, call):
+    @skill(blocking="process")
+    def stops(self, call) -> Ok:
         raise BrokenText
 
-    @skill(outcomes={"ok": {}}, blocking="process")
-    def dies(self, call):
+    @skill(blocking="process")
+    def dies(self, call) -> Ok:
         os._exit(7)
 
-    @skill(outcomes={"ok": {}, "begun": {}}, blocking="process")
-    def stubborn(self, call):
+    @skill(blocking="process")
+    def stubborn(self, call: BlockingCall[StubbornBegun]) -> Ok:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        call.report(Outcome("begun"))
+        call.report(StubbornBegun())
         time.sleep(3600)
-        return Outcome("ok")
+        return Ok()
 
-    @skill(outcomes={"ok": {}}, blocking="process")
-    def sleeps(self, call):
+    @skill(blocking="process")
+    def sleeps(self, call) -> Ok:
         time.sleep(3600)
-        return Outcome("ok")
+        return Ok()
 
 
 def execute(component, name, run=run_simulated, seconds=None, cancel_after=None, **arguments):
@@ -221,11 +247,13 @@ import ctypes, math, time
 from dsc import Outcome, SkillCall, component_of, skill
 from dsc.sequencer.clock import LoopClock, run_real
 
-@skill(outcomes={"ok": {}}, blocking="process")
-def moves(call):
+class Ok(Outcome): ...
+
+@skill(blocking="process")
+def moves(call) -> Ok:
     print("begun", flush=True)
     BLOCKS(3600)
-    return Outcome("ok")
+    return Ok()
 
 async def main():
     await component_of("far", moves).execute("moves", SkillCall("a1.0", LoopClock(), print, math.inf), {})
@@ -328,14 +356,14 @@ print("over")
 # -- functions ---------------------------------------------------------------------------------------------
 
 
-@skill(outcomes={"greeted": {"person": "text"}})
-async def greet(call, person, times: int = 1):
-    return Outcome("greeted", {"person": person * times})
+@skill
+async def greet(call, person, times: int = 1) -> Greeted:
+    return Greeted(person=person * times)
 
 
-@skill(outcomes={"ok": {}}, blocking="thread")
-def waits(call):
-    return Outcome("ok")
+@skill(blocking="thread")
+def waits(call) -> Ok:
+    return Ok()
 
 
 def test_a_skill_may_be_a_function():

@@ -8,9 +8,9 @@ import pytest
 from dsc_charts import plot
 from dsc_runs import SCHEMA, Arm, Ran
 
-from dsc.calls import Outcome
 from dsc.components.behaviour_trees import action, condition, fallback, repeat, retry, sequence, tree_skill
 from dsc.dynamic.library import Library
+from dsc.outcomes import Outcome
 from dsc.sequencer.plot_skill import PlotComponent
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dsc import calls
-from dsc.calls import Outcome, SkillCall
+from dsc.calls import SkillCall
 from dsc.components import endpoint as endpoints
 from dsc.components import host as hosts
 from dsc.components.component import Component
@@ -23,10 +23,18 @@ from dsc.components.publication import Subscription
 from dsc.components.remote import RemoteComponent
 from dsc.components.streams import Push, Stream
 from dsc.errors import ProgrammingError
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
 from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
+
+
+class Ok(Outcome): ...
+
+
+class Step(Outcome):
+    n: float
 
 
 class Robot(Component):
@@ -34,27 +42,27 @@ class Robot(Component):
     scan = Push({"metres": "number"})
     other = Stream("peer.scan", {"metres": "number"})
 
-    @skill(outcomes={"ok": {}, "step": {"n": "number"}})
-    async def go(self, call, steps=0):
+    @skill
+    async def go(self, call: SkillCall[Step], steps=0) -> Ok:
         for n in range(steps):
-            call.report(Outcome("step", {"n": n}))
-        return Outcome("ok")
+            call.report(Step(n=n))
+        return Ok()
 
-    @skill(outcomes={"ok": {}})
-    async def exits(self, call):
+    @skill
+    async def exits(self, call) -> Ok:
         sys.exit("the driver")
 
-    @skill(outcomes={"ok": {}})
-    async def closes(self, call):
+    @skill
+    async def closes(self, call) -> Ok:
         raise GeneratorExit
 
-    @skill(outcomes={"ok": {}})
-    async def cancels(self, call):
+    @skill
+    async def cancels(self, call) -> Ok:  # type: ignore[return]
         asyncio.current_task().cancel()
         await asyncio.sleep(0)
 
-    @skill(outcomes={"ok": {}})
-    async def waits(self, call):
+    @skill
+    async def waits(self, call) -> Ok:  # type: ignore[return]
         await asyncio.sleep(1000)
 
 
@@ -283,17 +291,17 @@ class Flooding(Component):
             "step", {"n": n}, Delta(nodes={f"cup{n}": "item"}, added=(fact("seen", f"cup{n}"),) if n % 10 else ())
         )
 
-    @skill(outcomes={"ok": {}, "step": {"n": "number"}})
-    async def floods(self, call):
+    @skill
+    async def floods(self, call) -> Ok | Step:
         for n in range(self.times):
             call.report(self.step(n))
-        return Outcome("ok")
+        return Ok()
 
-    @skill(outcomes={"ok": {}, "step": {"n": "number"}}, blocking="thread")
-    def floods_from_thread(self, call):
+    @skill(blocking="thread")
+    def floods_from_thread(self, call) -> Ok | Step:
         for n in range(self.times):
             call.report(self.step(n))
-        return Outcome("ok")
+        return Ok()
 
 
 @pytest.mark.parametrize("where", ["floods", "floods_from_thread"])

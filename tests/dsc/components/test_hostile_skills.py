@@ -13,13 +13,13 @@ from dsc_charts import plot
 from dsc_runs import SCHEMA, Ran
 
 from dsc.blocking import StoppedError
-from dsc.calls import Outcome
 from dsc.components.behaviour_trees import action, condition, sequence, tree_skill
 from dsc.components.component import Component
 from dsc.components.ports import takes
 from dsc.dynamic.library import Library
 from dsc.errors import SkillError
 from dsc.events import Event
+from dsc.outcomes import Outcome
 from dsc.sequencer import dispatcher, message_checks, running_skills
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.sequencer.plot_skill import PlotComponent
@@ -107,6 +107,9 @@ RETURNED = {
 }
 
 
+class Ok(Outcome): ...
+
+
 class Hostile(Component):
     """Does what it is made for, in a coroutine, a thread, a behaviour tree, or while it is told something."""
 
@@ -116,25 +119,25 @@ class Hostile(Component):
         super().__init__()
         self.does = does
 
-    @skill(outcomes={"ok": {}})
-    async def awaited(self, call):
-        return self.does()
+    @skill
+    async def awaited(self, call) -> Ok:
+        return self.does()  # type: ignore[no-any-return]
 
-    @skill(outcomes={"ok": {}})
-    async def later(self, call):
+    @skill
+    async def later(self, call) -> Ok:
         await call.clock.sleep(1)
-        return self.does()
+        return self.does()  # type: ignore[no-any-return]
 
-    @skill(outcomes={"ok": {}}, blocking="thread")
-    def in_thread(self, call):
-        return self.does()
+    @skill(blocking="thread")
+    def in_thread(self, call) -> Ok:
+        return self.does()  # type: ignore[no-any-return]
 
-    @skill(outcomes={"ok": {}})
-    async def while_cancelled(self, call):
+    @skill
+    async def while_cancelled(self, call) -> Ok:  # type: ignore[return]
         try:
             await call.clock.sleep(1000)
         except asyncio.CancelledError:
-            return self.does()
+            return self.does()  # type: ignore[no-any-return]
 
     @tree_skill(success="ok", failure="no", outcomes={"ok": {}, "no": {}})
     def tree(self, call):
@@ -147,20 +150,20 @@ class Hostile(Component):
     def tests(self, call):
         return sequence(condition("test", self.does))
 
-    @skill(outcomes={"ok": {}})
-    async def goes(self, call):
-        return Outcome("ok")
+    @skill
+    async def goes(self, call) -> Ok:
+        return Ok()
 
-    @skill(outcomes={"ok": {}})
-    async def reports(self, call):
+    @skill
+    async def reports(self, call) -> Ok:
         call.report(self.does())
         await call.clock.sleep(1)
-        return Outcome("ok")
+        return Ok()
 
-    @skill(outcomes={"ok": {}}, blocking="thread")
-    def reports_from_thread(self, call):
+    @skill(blocking="thread")
+    def reports_from_thread(self, call) -> Ok:
         call.report(self.does())
-        return Outcome("ok")
+        return Ok()
 
     @takes
     async def told(self):
@@ -237,11 +240,11 @@ def test_a_task_that_others_cancel_is_a_programming_error():
         sequencer.listen(lambda _: asyncio.get_running_loop().call_soon(cancel_all))
 
     class Cancels(Hostile):
-        @skill(outcomes={"ok": {}})
-        async def itself(self, call):
+        @skill
+        async def itself(self, call) -> Ok:
             asyncio.current_task().cancel()
             await call.clock.sleep(1)
-            return Outcome("ok")
+            return Ok()
 
     for where in ("itself", "goes"):
         arm = Cancels(cancel_all)

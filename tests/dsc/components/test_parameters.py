@@ -249,6 +249,9 @@ def test_a_dependency_that_cannot_be_meant_is_refused(declared, said):
     assert said in str(refused.value)
 
 
+class Rolled(Outcome): ...
+
+
 def test_an_operator_changes_what_others_rely_on_and_the_next_skill_says_what_is_missing():
     class Wheel(Component):
         name = "wheel"
@@ -257,9 +260,9 @@ def test_an_operator_changes_what_others_rely_on_and_the_next_skill_says_what_is
             "slip": Parameter("number", changed_by="operator", depends_on=("tyre",)),
         }
 
-        @skill(outcomes={"rolled": {}})
-        async def roll(self, call):
-            return Outcome("rolled")
+        @skill
+        async def roll(self, call) -> Rolled:
+            return Rolled()
 
     text = """
     plot: p

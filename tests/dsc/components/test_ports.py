@@ -8,13 +8,28 @@ import pytest
 from dsc_charts import plot
 from dsc_runs import Ran
 
-from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.components.ports import event, query, takes
 from dsc.dynamic.library import Library
+from dsc.outcomes import Outcome
 from dsc.skills import skill
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError, UnknownNameError
+
+
+class Low(Outcome):
+    level: float
+
+
+class Lasts(Outcome):
+    seconds: float
+
+
+class Ponders(Outcome):
+    seconds: float
+
+
+class RunRan(Outcome, event="ran"): ...
 
 
 class Battery(Component):
@@ -27,16 +42,16 @@ class Battery(Component):
         self.level = 30.0
         self.told = []
 
-    @event({"level": "number"})
-    def low(self, level: float, below: float = 20.0):
-        return {"level": level} if level < below else None
+    @event
+    def low(self, level: float, below: float = 20.0) -> Low | None:
+        return Low(level=level) if level < below else None
 
-    @query({"seconds": "number"})
-    async def lasts(self, until: float = 0.0):
-        return {"seconds": self.level - until}
+    @query
+    async def lasts(self, until: float = 0.0) -> Lasts:
+        return Lasts(seconds=self.level - until)
 
-    @query({"seconds": "number"})
-    async def ponders(self):
+    @query
+    async def ponders(self) -> Ponders:  # type: ignore[return]
         await asyncio.sleep(1e6)
 
     @takes
@@ -45,12 +60,12 @@ class Battery(Component):
             raise RuntimeError("no ink")
         self.told.append((text, size))
 
-    @skill(outcomes={"ran": {}})
-    async def run(self, call, levels=(25, 15, 14, 40, 10)):
+    @skill
+    async def run(self, call, levels=(25, 15, 14, 40, 10)) -> RunRan:
         for level in levels:
             await call.clock.sleep(1)
             self.update("low", level)
-        return Outcome("ran")
+        return RunRan()
 
 
 def ran(text, battery=None, **more):
@@ -100,9 +115,9 @@ def test_a_value_said_before_counts_for_who_comes_later():
 @pytest.mark.parametrize(("low", "why"), [("raise", "ZeroDivisionError"), ("text", "'low'"), ("number", "17")])
 def test_a_test_of_an_event_that_goes_wrong_fails_the_activation_and_not_who_has_the_value(low, why):
     class Wrong(Battery):
-        @event({"level": "number"})
-        def low(self, level: float, below: float = 20.0):
-            return {"raise": lambda: 1 / 0, "text": lambda: "low", "number": lambda: 17}[low]()
+        @event
+        def low(self, level: float, below: float = 20.0) -> Low | None:
+            return {"raise": lambda: 1 / 0, "text": lambda: "low", "number": lambda: 17}[low]()  # type: ignore[return-value]
 
     done = ran("""
         plot: p

@@ -1,18 +1,29 @@
 """One skill as a plot."""
 
+from typing import Annotated
+
 import pytest
 
 from dsc import Component, Library, Outcome, primitive_plot, skill, validate_plot
 from dsc.skills import SkillSignature
 from knowledge_base import SchemaError, UnknownNameError
 
+Item = Annotated[str, "item"]
+
+
+class Grasped(Outcome): ...
+
+
+class Slipped(Outcome):
+    item: Item
+
 
 class Arm(Component):
     name = "arm"
 
-    @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}}, types={"item": "item"})
-    async def grasp(self, call, item, force=1):
-        return Outcome("grasped")
+    @skill
+    async def grasp(self, call, item: Item, force=1) -> Grasped | Slipped:
+        return Grasped()
 
 
 GRASP = Arm().skills()["grasp"]

@@ -7,13 +7,15 @@ import math
 import re
 import sys
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 from dsc_runs import SLOW, Arm, Ran
 
-from dsc.calls import Outcome
+from dsc import SkillCall
 from dsc.components.component import Component
 from dsc.components.ports import query
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import run_simulated
 from dsc.sequencer.sequencer import RunEnd
 from dsc.skills import check_arguments, skill
@@ -174,6 +176,44 @@ def test_whatever_a_skill_does_wrong_is_a_programming_error(how, reason):
     assert reason in event.attributes["why"]
 
 
+Symbol = Annotated[str, "symbol"]
+Item = Annotated[str, "item"]
+
+
+class Said(Outcome):
+    n: float
+    sure: bool
+    why: str
+    what: Symbol
+    item: Item
+    any: object
+
+
+class Over(Outcome): ...
+
+
+class Held(Outcome): ...
+
+
+class Closed(Outcome): ...
+
+
+class How(Outcome):
+    mode: str
+
+
+class Ok(Outcome): ...
+
+
+class SoFar(Outcome): ...
+
+
+class Grasped(Outcome): ...
+
+
+class Done(Outcome): ...
+
+
 @pytest.mark.parametrize(
     "observed",
     [
@@ -194,15 +234,15 @@ def test_a_skill_that_observes_what_cannot_be_has_failed_and_nothing_of_it_is_kn
     class Dreamer(Component):
         name = "arm"
 
-        @skill(outcomes={"ok": {}})
-        async def says(self, call):
-            return Outcome("ok", observed=observed)
+        @skill
+        async def says(self, call) -> Ok:
+            return Ok(observed=observed)
 
-        @skill(outcomes={"ok": {}, "so_far": {}})
-        async def reports(self, call):
-            call.report(Outcome("so_far", observed=observed))
+        @skill
+        async def reports(self, call: SkillCall[SoFar]) -> Ok:
+            call.report(SoFar(observed=observed))
             await call.clock.sleep(5)
-            return Outcome("ok")
+            return Ok()
 
     text = BREAKS.replace("arm.breaks, with: {how: HOW}", f"arm.{skill_name}")
     ran = Ran(text, arm=Dreamer())
@@ -224,15 +264,15 @@ class Sayer(Component):
         super().__init__()
         self.outcome = Outcome("said", attributes, observed)
 
-    @skill(outcomes={"said": SAID})
-    async def says(self, call):
-        return self.outcome
+    @skill
+    async def says(self, call) -> Said:
+        return self.outcome  # type: ignore[return-value]
 
-    @skill(outcomes={"said": SAID, "over": {}})
-    async def reports(self, call):
+    @skill
+    async def reports(self, call) -> Said | Over:
         call.report(self.outcome)
         await call.clock.sleep(5)
-        return Outcome("over")
+        return Over()
 
 
 FITTING = {"n": 2, "sure": True, "why": "so", "what": "cup", "item": "cup1", "any": [{"deep": 1.5}]}
@@ -288,11 +328,11 @@ def test_a_skill_that_reports_what_is_no_outcome_of_its_own_is_stopped():
     class Chatty(Component):
         name = "arm"
 
-        @skill(outcomes={"ok": {}})
-        async def chats(self, call):
+        @skill
+        async def chats(self, call) -> Ok:
             call.report(Outcome("hello"))
             await call.clock.sleep(5)
-            return Outcome("ok")
+            return Ok()
 
     ran = Ran(BREAKS.replace("arm.breaks, with: {how: HOW}", "arm.chats"), arm=Chatty())
     (event,) = ran.end.emitted
@@ -313,19 +353,19 @@ def test_a_skill_that_has_failed_by_what_it_reported_answers_no_more(what, and_t
     class Chatty(Component):
         name = "arm"
 
-        @skill(outcomes={"ok": {}, "so_far": {}})
-        async def chats(self, call):
+        @skill
+        async def chats(self, call: SkillCall[SoFar]) -> Ok:
             call.report(what)
             if and_then == "reports":
-                call.report(Outcome("so_far"))
-                call.report(Outcome("hello"))
+                call.report(SoFar())
+                call.report(Outcome("hello"))  # type: ignore[arg-type]
             if and_then in ("sleeps", "goes on"):
                 try:
                     await call.clock.sleep(5)
                 except asyncio.CancelledError:
                     if and_then == "sleeps":
                         raise
-            return Outcome("ok", observed=Delta(added=(fact("p"),)))
+            return Ok(observed=Delta(added=(fact("p"),)))
 
     ran = Ran(
         """
@@ -399,9 +439,9 @@ def test_a_skill_cannot_have_an_outcome_that_is_the_executives():
     with pytest.raises(SchemaError, match=r"skill 'Hand\.open' cannot have the outcome 'done'"):
 
         class Hand(Component):
-            @skill(outcomes={"done": {}})
-            async def open(self, call):
-                return Outcome("done")
+            @skill
+            async def open(self, call) -> Done:
+                return Done()
 
 
 def test_a_skill_that_takes_too_long_is_cancelled_and_timed_out():
@@ -429,9 +469,9 @@ def test_a_skill_has_a_bound_even_if_nobody_says_so():
 )
 def test_a_wrong_call_of_a_skill_is_a_programming_error_that_says_so(entry):
     class Strict(Arm):
-        @skill(outcomes={"grasped": {}})
-        async def grasp(self, call, item):  # type: ignore[override]
-            return Outcome("grasped")
+        @skill
+        async def grasp(self, call, item) -> Grasped:  # type: ignore[override]
+            return Grasped()
 
     ran = Ran("{plot: p, states: {a: {entry: " + entry + ", on: {grasped: e}}, e: {final: true}}}", arm=Strict())
     assert not ran.end.finished
@@ -515,9 +555,9 @@ def test_a_component_tells_its_skills():
 
 def test_arguments_are_checked_against_the_signature():
     class Strict(Component):
-        @skill(outcomes={})
-        async def go(self, call, to, speed=1):
-            return Outcome("ok")
+        @skill
+        async def go(self, call, to, speed=1) -> None:
+            return Outcome("ok")  # type: ignore[return-value]
 
     signature = Strict().skills()["go"]
     check_arguments(signature, {"to": 1})
@@ -550,23 +590,23 @@ class Tidy(Arm):
         super().__init__()
         self.seconds = seconds
 
-    @skill(outcomes={"held": {}})
-    async def hold(self, call):
+    @skill
+    async def hold(self, call) -> Held:  # type: ignore[return]
         try:
             await call.clock.sleep(SLOW)
         finally:
             await call.clock.sleep(self.seconds)
             self.note(f"open at {call.clock.now():g}")
 
-    @skill(outcomes={"closed": {}})
-    async def close(self, call):
+    @skill
+    async def close(self, call) -> Closed:
         self.note(f"closes at {call.clock.now():g}")
-        return Outcome("closed")
+        return Closed()
 
-    @query({"mode": "text"})
-    async def how(self):
+    @query
+    async def how(self) -> How:
         self.note("asked")
-        return {"mode": self.mode}
+        return How(mode=self.mode)
 
 
 class AllAtOnce(Tidy):

@@ -9,7 +9,6 @@ from typing import ClassVar
 import pytest
 from dsc_charts import plot
 
-from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component
 from dsc.components.endpoint import LocalTransport, NoAnswerError
 from dsc.components.host import Host
@@ -17,6 +16,7 @@ from dsc.components.life_cycle import Life
 from dsc.components.robot import Wiring
 from dsc.components.streams import Push, Stream
 from dsc.dynamic.library import Library
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
@@ -25,18 +25,28 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 
 
+class Swept(Outcome): ...
+
+
+class Blind(Outcome):
+    why: str
+
+
+class Mapped(Outcome): ...
+
+
 class Laser(Component):
     name = "laser"
     scan = Push({"metres": "number", "points": None})
     heat = Push({"celsius": "number"}, period=0.5)
 
-    @skill(outcomes={"swept": {}})
-    async def sweep(self, call):
+    @skill
+    async def sweep(self, call) -> Swept:
         for n in range(3):
             self.scan.put(metres=n, points=[n, n])
             self.heat.put(celsius=20 + n)
             await call.clock.sleep(0.6)
-        return Outcome("swept")
+        return Swept()
 
 
 class Mapper(Component):
@@ -49,13 +59,13 @@ class Mapper(Component):
         super().__init__()
         self.seen = []
 
-    @skill(outcomes={"mapped": {}, "blind": {"why": "text"}})
-    async def map(self, call):
+    @skill
+    async def map(self, call) -> Mapped | Blind:
         while True:
             try:
                 await self.scan.next(within=1.0)
             except NoAnswerError as silent:
-                return Outcome("blind", {"why": str(silent)})
+                return Blind(why=str(silent))
             self.seen.append((round(call.clock.now(), 3), (self.scan.value or {})["metres"], self.heat.value))
 
 

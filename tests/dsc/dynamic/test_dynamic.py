@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import pytest
 from dsc_charts import FakeSituation, plot
 
-from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.dynamic.knowledge_situation import ACHIEVE, KnowledgeSituation
 from dsc.dynamic.library import MOST_BOUND, Library
@@ -13,6 +14,7 @@ from dsc.dynamic.steps import outcomes_of
 from dsc.engine.machine import Machine
 from dsc.engine.situation import Decision
 from dsc.events import Event
+from dsc.outcomes import Outcome
 from dsc.skills import primitive_plot, skill
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact, fact
@@ -294,12 +296,22 @@ def test_the_outcomes_of_a_state_are_those_of_what_it_uses():
 # -- skills as plots ---------------------------------------------------------------------------------------
 
 
+Item = Annotated[str, "item"]
+
+
+class Grasped(Outcome): ...
+
+
+class Slipped(Outcome):
+    item: Item
+
+
 class Arm(Component):
     name = "arm"
 
-    @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}}, types={"item": "item"})
-    async def grasp(self, call, item):
-        return Outcome("grasped")
+    @skill
+    async def grasp(self, call, item: Item) -> Grasped | Slipped:
+        return Grasped()
 
 
 def test_a_skill_alone_makes_a_plot():

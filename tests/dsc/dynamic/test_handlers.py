@@ -210,21 +210,31 @@ def test_an_outcome_of_a_handlers_plot_that_nothing_handles_is_an_error(handler)
 # -- events of components ----------------------------------------------------------------------------------
 
 
+class Low(Outcome):
+    level: float
+
+
+class Empty(Outcome): ...
+
+
+class Said(Outcome): ...
+
+
 class Battery(Component):
     name = "battery"
     level = 30.0
 
-    @event({"level": "number"})
-    def low(self, level, below=20.0):
-        return {"level": level} if level < below else None
+    @event
+    def low(self, level, below=20.0) -> Low | None:
+        return Low(level=level) if level < below else None
 
-    @skill(outcomes={"empty": {}})
-    async def drain(self, call):
+    @skill
+    async def drain(self, call) -> Empty:
         while self.level > 0:
             await call.clock.sleep(1.0)
             self.level -= 10
             self.update("low", self.level)
-        return Outcome("empty")
+        return Empty()
 
 
 class Voice(Component):
@@ -234,11 +244,11 @@ class Voice(Component):
         super().__init__()
         self.said = []
 
-    @skill(outcomes={"said": {}})
-    async def say(self, call, text):
+    @skill
+    async def say(self, call, text) -> Said:
         await call.clock.sleep(0.1)
         self.said.append(text)
-        return Outcome("said")
+        return Said()
 
 
 WATCH = """

@@ -146,6 +146,9 @@ def test_what_only_the_run_knows_is_checked_when_the_plot_is_entered():
 # -- while the run goes on ---------------------------------------------------------------------------------
 
 
+class Arrived(Outcome): ...
+
+
 class Base(Component):
     name = "base"
     declares: ClassVar = {
@@ -160,11 +163,11 @@ class Base(Component):
         super().__init__()
         self.driven = []
 
-    @skill(outcomes={"arrived": {}})
-    async def drive(self, call) -> Outcome:
+    @skill
+    async def drive(self, call) -> Arrived:
         self.driven.append(self.parameters["speed"])
         await call.clock.sleep(1.0)
-        return Outcome("arrived")
+        return Arrived()
 
 
 DRIVING = """plot: p

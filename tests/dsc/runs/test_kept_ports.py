@@ -11,15 +11,29 @@ from dsc_crashes import Crashes, Robot, Run, copied
 from dsc_runs import SCHEMA
 
 from dsc.blocking import BlockingCall
-from dsc.calls import Outcome
 from dsc.components.behaviour_trees import action, sequence, tree_skill
 from dsc.components.ports import event, query, takes
 from dsc.dynamic.library import Library
 from dsc.events import Event
+from dsc.outcomes import Outcome
 from dsc.sequencer.plot_skill import PlotComponent
 from dsc.skills import skill
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.store import KnowledgeBase
+
+
+class Low(Outcome):
+    level: float
+
+
+class Count(Outcome):
+    n: float
+
+
+class Seen(Outcome): ...
+
+
+class Did(Outcome): ...
 
 
 class Station(Robot):
@@ -55,24 +69,24 @@ class Station(Robot):
         await asyncio.sleep(3)
         self.told.append(("note", text))
 
-    @event({"level": "number"})
-    def low(self, level: float, below: float = 20.0):
-        return {"level": level} if level < below else None
+    @event
+    def low(self, level: float, below: float = 20.0) -> Low | None:
+        return Low(level=level) if level < below else None
 
-    @query({"n": "number"})
-    async def count(self):
-        return {"n": 7}
+    @query
+    async def count(self) -> Count:
+        return Count(n=7)
 
-    @skill(outcomes={"seen": {}}, after_crash="same_id")
-    async def sees_nonsense(self, call):
-        call.report(Outcome("seen", observed=Delta(added=(Fact("nonsense"),))))
+    @skill(after_crash="same_id")
+    async def sees_nonsense(self, call) -> Seen:
+        call.report(Seen(observed=Delta(added=(Fact("nonsense"),))))
         await call.clock.sleep(50)
-        return Outcome("seen")
+        return Seen()
 
-    @skill(outcomes={"did": {}}, blocking="thread", after_crash="repeat")
-    def block(self, call: BlockingCall):
+    @skill(blocking="thread", after_crash="repeat")
+    def block(self, call: BlockingCall) -> Did:
         call.sleep(0.001)
-        return Outcome("did")
+        return Did()
 
     @tree_skill(success="did", failure="failed", outcomes={"did": {}, "failed": {}}, after_crash="repeat")
     def climb(self, call):

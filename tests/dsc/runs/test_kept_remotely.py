@@ -9,13 +9,14 @@ from dsc_charts import plot
 from dsc_crashes import copied
 from dsc_runs import SCHEMA
 
-from dsc.calls import Outcome
+from dsc import SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import LocalTransport
 from dsc.components.host import Host
 from dsc.components.ports import event
 from dsc.components.remote import RemoteComponent
 from dsc.dynamic.library import Library
+from dsc.outcomes import Outcome
 from dsc.runs.archive import archive
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_simulated
@@ -24,6 +25,17 @@ from dsc.skills import skill
 from dsc.trace import Trace
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.store import KnowledgeBase
+
+
+class Did(Outcome): ...
+
+
+class Progress(Outcome):
+    n: float
+
+
+class Low(Outcome):
+    level: float
 
 
 class Robot(Component):
@@ -38,21 +50,21 @@ class Robot(Component):
     async def start(self):
         self.log.append("alive")
 
-    @skill(outcomes={"did": {}, "progress": {"n": "number"}})
-    async def work(self, call, name, observes="p"):
+    @skill
+    async def work(self, call: SkillCall[Progress], name, observes="p") -> Did:
         self.log.append(name)
         try:
             for n in range(3):
                 await call.clock.sleep(0.5)
-                call.report(Outcome("progress", {"n": n}))
+                call.report(Progress(n=n))
         except BaseException:
             self.log.append(f"{name} stopped")
             raise
-        return Outcome("did", observed=Delta(added=(Fact(observes),)))
+        return Did(observed=Delta(added=(Fact(observes),)))
 
-    @event({"level": "number"})
-    def low(self, level: float, below: float = 20.0):
-        return {"level": level} if level < below else None
+    @event
+    def low(self, level: float, below: float = 20.0) -> Low | None:
+        return Low(level=level) if level < below else None
 
 
 class Mortal:

@@ -7,10 +7,10 @@ import json
 
 import pytest
 
-from dsc.calls import Outcome
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
 from dsc.messages import KnowledgeMessage, LateMessage, ParameterMessage, SkillMessage, TimerMessage
+from dsc.outcomes import Outcome
 from dsc.runs.encoding import Shortener, awaited_form, awaited_of, full, message_form, message_of
 from knowledge_base.facts import Delta, fact
 

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_charts import Played, happenings, libraries
 
-from dsc.calls import Outcome
 from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import Cancel, Revoke, SendLater, SetParameter, Start, StartTimer
 from dsc.events import Event
 from dsc.messages import ParameterMessage, SkillMessage, TimerMessage
+from dsc.outcomes import Outcome
 from dsc.runs.encoding import Shortener, frame_form
 from dsc.runs.state import RunState
 from dsc.runs.tables import RunSnapshot, SnapshotRow, latest_snapshot

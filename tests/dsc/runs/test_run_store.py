@@ -11,11 +11,12 @@ from dsc_crashes import Crashes, Robot, Run, copied
 from dsc_kept_charts import CHARTS, handed_in
 from dsc_runs import SCHEMA, Ran
 
-from dsc.calls import Ended, Outcome, Status
+from dsc.calls import Ended, Status
 from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
 from dsc.errors import ChangedError
 from dsc.events import Event
+from dsc.outcomes import Outcome
 from dsc.runs import store as store_module
 from dsc.runs.archive import archive, has_run, records_of
 from dsc.runs.store import RunStore
@@ -102,15 +103,25 @@ def new(folder):
     return made
 
 
+class Fetched(Outcome): ...
+
+
+class Did(Outcome): ...
+
+
+class WorkDid(Outcome, event="did"):
+    n: object
+
+
 def test_nothing_is_started_that_is_not_committed(tmp_path):
     seen = []
 
     class Watching(Robot):
-        @skill(outcomes={"did": {}}, after_crash="same_id")
-        async def work(self, call, seconds=0, observes=""):  # type: ignore[override]
+        @skill(after_crash="same_id")
+        async def work(self, call, seconds=0, observes="") -> Did:  # type: ignore[override]
             with archive(tmp_path / "run.kb") as runs:
                 seen.append((call.action_id, [start.action_id for start, _ in runs.under_way()]))
-            return Outcome("did")
+            return Did()
 
     run_with(tmp_path, TWICE, Watching())
     assert len(seen) == 2
@@ -125,10 +136,10 @@ def test_events_that_let_nothing_leave_are_committed_together_and_with_what_leav
             return len(list(runs.steps(1)))
 
     class Watching(Robot):
-        @skill(outcomes={"did": {}}, after_crash="same_id")
-        async def work(self, call):  # type: ignore[override]
+        @skill(after_crash="same_id")
+        async def work(self, call) -> Did:  # type: ignore[override]
             seen.append(committed())
-            return Outcome("did")
+            return Did()
 
     def prepare(sequencer):
         for name in ("on", "on", "go"):
@@ -262,12 +273,12 @@ def test_a_run_ends_with_an_error_when_it_cannot_be_kept_and_nothing_is_started(
     running: list[Sequencer] = []
 
     class Talkative(Robot):
-        @skill(outcomes={"did": {"n": None}}, after_crash="same_id")
-        async def work(self, call, seconds=0, observes=""):  # type: ignore[override]
+        @skill(after_crash="same_id")
+        async def work(self, call, seconds=0, observes="") -> WorkDid:  # type: ignore[override]
             with running[0].knowledge.together() as connection:
                 connection.execute("PRAGMA max_page_count = 1")  # as large as it is now
             self.done[call.action_id] = 1
-            return Outcome("did", {"n": "so much " * 10_000})
+            return WorkDid(n="so much " * 10_000)
 
     robot = Talkative()
     with pytest.raises(StoreError, match="full"):
@@ -293,9 +304,9 @@ def test_a_run_that_is_cancelled_has_ended_with_its_components_at_rest(tmp_path)
 
 def test_texts_with_any_kind_of_line_break_are_kept_in_their_records(tmp_path):
     class Poet(Robot):
-        @skill(outcomes={"did": {"n": None}}, after_crash="repeat")
-        async def work(self, call, seconds=0, observes=""):  # type: ignore[override]
-            return Outcome("did", {"n": "one\u2028two\x85three\nfour\u2029five"})
+        @skill(after_crash="repeat")
+        async def work(self, call, seconds=0, observes="") -> WorkDid:  # type: ignore[override]
+            return WorkDid(n="one\u2028two\x85three\nfour\u2029five")
 
     run = Run(tmp_path, [TWICE], robot=Poet())
     _, records = records_of(run.path)
@@ -437,11 +448,11 @@ def asked(tmp_path, after_crash, status, failure="skill_error"):
     class Fetcher(Robot):
         begun = 0
 
-        @skill(outcomes={"fetched": {}}, after_crash=after_crash)
-        async def fetch(self, call):
+        @skill(after_crash=after_crash)
+        async def fetch(self, call) -> Fetched:
             Fetcher.begun += 1
             await call.clock.sleep(5)
-            return Outcome("fetched")
+            return Fetched()
 
         async def status(self, action_id, skill_name, arguments):
             assert (skill_name, arguments) == ("fetch", {})
@@ -509,10 +520,10 @@ class Stubborn(Robot):
         self.abandoned = []
         self.fails = fails
 
-    @skill(outcomes={"fetched": {}}, after_crash="same_id")
-    async def fetch(self, call):
+    @skill(after_crash="same_id")
+    async def fetch(self, call) -> Fetched:
         await call.clock.sleep(50)
-        return Outcome("fetched")
+        return Fetched()
 
     async def abandon(self, action_id, skill_name, arguments):
         if self.fails:

@@ -9,13 +9,13 @@ import threading
 import pytest
 from dsc_runs import SCHEMA, Ran
 
-from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.components.endpoint import LocalTransport
 from dsc.components.host import Host
 from dsc.components.remote import RemoteComponent
 from dsc.dynamic.library import Library
 from dsc.errors import SkillError
+from dsc.outcomes import Outcome
 from dsc.sequencer import watchdog
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
@@ -26,6 +26,12 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 
 HERE = "test_programming_errors.py"
+
+
+class Grasped(Outcome): ...
+
+
+class Slipped(Outcome): ...
 
 
 class Arm(Component):
@@ -43,19 +49,19 @@ class Arm(Component):
         if hook == self.where:
             raise self.raises
 
-    @skill(outcomes={"grasped": {}, "slipped": {}})
-    async def grasp(self, call):
+    @skill
+    async def grasp(self, call) -> Grasped | Slipped:
         try:
             await call.clock.sleep(1)
         finally:
             self.pass_by("clean up")
         self.pass_by("grasp")
-        return Outcome("grasped")
+        return Grasped()
 
-    @skill(outcomes={"grasped": {}}, blocking="thread")
-    def grasp_in_thread(self, call):
+    @skill(blocking="thread")
+    def grasp_in_thread(self, call) -> Grasped:
         self.pass_by("grasp_in_thread")
-        return Outcome("grasped")
+        return Grasped()
 
     async def start(self):
         self.pass_by("start")
@@ -174,9 +180,9 @@ def test_a_rule_answers_a_bug_only_by_its_name():
 @pytest.mark.parametrize("observed", [Delta(added=(fact("nonsense", "x"),)), Delta(added=(fact("seen", "ghost"),))])
 def test_an_observation_that_no_world_can_have_is_a_bug_at_the_line_of_its_skill(observed):
     class Dreams(Arm):
-        @skill(outcomes={"grasped": {}})
-        async def grasp(self, call):
-            return Outcome("grasped", observed=observed)
+        @skill
+        async def grasp(self, call) -> Grasped:
+            return Grasped(observed=observed)
 
     end = Ran(GRASP.replace(", slipped: e", ""), arm=Dreams(where="")).end
     assert str(end.programming_error).startswith("arm.grasp: ")
@@ -185,10 +191,10 @@ def test_an_observation_that_no_world_can_have_is_a_bug_at_the_line_of_its_skill
 
 def test_an_observation_of_an_object_that_another_part_has_deleted_is_no_bug():
     class Late(Arm):
-        @skill(outcomes={"grasped": {}})
-        async def grasp(self, call):
+        @skill
+        async def grasp(self, call) -> Grasped:
             await call.clock.sleep(5)
-            return Outcome("grasped", observed=Delta(added=(fact("seen", "cup1"),)))
+            return Grasped(observed=Delta(added=(fact("seen", "cup1"),)))
 
     def prepare(sequencer):
         sequencer.change(Delta(removed_nodes=("cup1",)), "operator", after=1)
@@ -303,10 +309,10 @@ def warned(monkeypatch):
 
 def test_a_skill_that_blocks_the_loop_is_named_with_its_line(warned, caplog):
     class Blocks(Arm):
-        @skill(outcomes={"grasped": {}})
-        async def grasp(self, call):
+        @skill
+        async def grasp(self, call) -> Grasped:
             assert warned.wait(10)
-            return Outcome("grasped")
+            return Grasped()
 
     assert Ran(GRASP.replace(", slipped: e", ""), arm=Blocks(where="")).end.finished
     (said,) = [one.getMessage() for one in caplog.records if "blocks" in one.getMessage()]
@@ -327,10 +333,10 @@ def test_a_listener_that_blocks_the_loop_is_named_with_its_line(warned, caplog):
 
 def test_a_skill_that_waits_blocks_nothing_and_the_watchdog_ends_with_the_run(warned, caplog):
     class Waits(Arm):
-        @skill(outcomes={"grasped": {}}, blocking="thread")
-        def grasp(self, call):
+        @skill(blocking="thread")
+        def grasp(self, call) -> Grasped:  # type: ignore[override]
             call.stopping.wait(0.2)
-            return Outcome("grasped")
+            return Grasped()
 
     assert Ran(GRASP.replace(", slipped: e", ""), arm=Waits(where="")).end.finished
     assert "blocks" not in caplog.text

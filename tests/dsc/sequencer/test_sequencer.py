@@ -9,9 +9,9 @@ import pytest
 from dsc_charts import plot
 from dsc_runs import SCHEMA, SLOW, Arm, Ran
 
-from dsc.calls import Outcome
 from dsc.dynamic.library import Library
 from dsc.events import Event
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
@@ -353,12 +353,16 @@ def test_time_stands_still_while_a_thread_works():
     assert ran.at == 0
 
 
+class Ok(Outcome):
+    things: object
+
+
 def test_arguments_and_answers_are_copies():
     class Greedy(Arm):
-        @skill(outcomes={"ok": {"things": None}})
-        async def collect(self, call, things):
+        @skill
+        async def collect(self, call, things) -> Ok:
             things.append("mine")
-            return Outcome("ok", {"things": things})
+            return Ok(things=things)
 
     made = {"things": ["yours"]}
     ran = Ran(

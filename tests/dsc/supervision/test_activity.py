@@ -8,7 +8,6 @@ import pytest
 from dsc_charts import plot
 from dsc_runs import ran
 
-from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component
 from dsc.components.endpoint import LocalTransport
 from dsc.components.host import Host
@@ -16,6 +15,7 @@ from dsc.components.life_cycle import Life
 from dsc.components.remote import RemoteComponent
 from dsc.dynamic.library import Library
 from dsc.engine.steps import SwitchMode
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
@@ -24,6 +24,9 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 
 Log = list[tuple[float, str]]
+
+
+class Looked(Outcome): ...
 
 
 class Device(Component):
@@ -50,11 +53,11 @@ class Device(Component):
             raise OSError("no power")
         self.note("on" if active else "off")
 
-    @skill(outcomes={"looked": {}})
-    async def look(self, call, seconds: float = 5.0):
+    @skill
+    async def look(self, call, seconds: float = 5.0) -> Looked:
         self.note("looks")
         await call.clock.sleep(seconds)
-        return Outcome("looked")
+        return Looked()
 
 
 LOOK = """
@@ -266,8 +269,8 @@ def test_what_does_not_come_off_does_not_keep_the_run():
 
 def test_a_component_is_on_while_it_puts_things_in_order():
     class Careful(Device):
-        @skill(outcomes={"looked": {}})
-        async def look(self, call):  # type: ignore[override]
+        @skill
+        async def look(self, call) -> Looked:  # type: ignore[override,return]
             try:
                 await call.clock.sleep(100)
             finally:

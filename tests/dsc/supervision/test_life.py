@@ -11,11 +11,11 @@ import pytest
 from dsc_charts import plot
 from dsc_runs import ran
 
-from dsc.calls import Outcome
 from dsc.components.component import ALWAYS, Component, ComponentHooks
 from dsc.components.life_cycle import Life, LifeCycle
 from dsc.dynamic.library import Library
 from dsc.events import Event
+from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
@@ -34,6 +34,9 @@ def test_the_surface_for_builders_is_small_and_documented():
     ]
     assert set(re.findall(r"`(\w+)`", " ".join(rows))) == surface
     assert len(surface) <= 13
+
+
+class Arrived(Outcome): ...
 
 
 class Base(Component):
@@ -56,10 +59,10 @@ class Base(Component):
     async def stop(self):
         self.log.append("stop")
 
-    @skill(outcomes={"arrived": {}})
-    async def drive(self, call, seconds: float = 5.0):
+    @skill
+    async def drive(self, call, seconds: float = 5.0) -> Arrived:
         await call.clock.sleep(seconds)
-        return Outcome("arrived")
+        return Arrived()
 
 
 class Laser(Base):

@@ -33,6 +33,9 @@ states:
 """)
 
 
+class Did(Outcome): ...
+
+
 class Robot(Component):
     """Remembers in a file what it has done, each id once."""
 
@@ -46,24 +49,24 @@ class Robot(Component):
     def done(self):
         return self._file.read_text().split() if self._file.exists() else []
 
-    @skill(outcomes={"did": {}}, after_crash="same_id")
-    async def work(self, call):
+    @skill(after_crash="same_id")
+    async def work(self, call) -> Did:
         await call.clock.sleep(2)
         if call.action_id not in self.done:
             with self._file.open("a") as file:
                 file.write(f"{call.action_id}\n")
-        return Outcome("did", observed=Delta(added=(Fact("p"),)))
+        return Did(observed=Delta(added=(Fact("p"),)))
 
 
 class Forgetful(Robot):
     """Says that it does each id once, and does it whenever it is asked to."""
 
-    @skill(outcomes={"did": {}}, after_crash="same_id")
-    async def work(self, call):
+    @skill(after_crash="same_id")
+    async def work(self, call) -> Did:
         await call.clock.sleep(2)
         with self._file.open("a") as file:
             file.write(f"{call.action_id}\n")
-        return Outcome("did", observed=Delta(added=(Fact("p"),)))
+        return Did(observed=Delta(added=(Fact("p"),)))
 
 
 class Lives:

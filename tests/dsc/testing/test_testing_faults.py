@@ -36,6 +36,13 @@ states:
 """
 
 
+class Did(Outcome): ...
+
+
+class Beat(Outcome):
+    n: float
+
+
 class Robot(Component):
     name = "robot"
 
@@ -44,17 +51,17 @@ class Robot(Component):
         self.done = []
         self.heard = []
 
-    @skill(outcomes={"did": {}})
-    async def work(self, call, times=1):
+    @skill
+    async def work(self, call, times=1) -> Did:
         for n in range(times):
             await call.clock.sleep(2)
             self.done.append(call.action_id)
             self.update("beat", float(n))
-        return Outcome("did", observed=Delta(added=(Fact("p"),)))
+        return Did(observed=Delta(added=(Fact("p"),)))
 
-    @event({"n": "number"})
-    def beat(self, n: float):
-        return {"n": n} if n % 2 else None
+    @event
+    def beat(self, n: float) -> Beat | None:
+        return Beat(n=n) if n % 2 else None
 
 
 def run(faults, text=GO, changes=None, interrupts=None):

@@ -9,7 +9,7 @@ import pytest
 from dsc_charts import plot
 from dsc_runs import SCHEMA
 
-from dsc import Component, Library, Outcome, Sequencer, skill
+from dsc import Component, Library, Outcome, Sequencer, SkillCall, skill
 from dsc.events import Event
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.testing import Interleaving
@@ -37,12 +37,18 @@ states:
 """
 
 
+class Did(Outcome): ...
+
+
+class Said(Outcome): ...
+
+
 class Side(Component):
-    @skill(outcomes={"said": {}, "did": {}})
-    async def work(self, call):
+    @skill
+    async def work(self, call: SkillCall[Said]) -> Did:
         await call.clock.sleep(2)
-        call.report(Outcome("said"))
-        return Outcome("did")
+        call.report(Said())
+        return Did()
 
 
 def heard(interleaving):

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import ast
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 from dsc_charts import plot
 
-from dsc.calls import Outcome
 from dsc.components.component import Component
 from dsc.components.parameters import Parameter
 from dsc.dynamic.library import Library
 from dsc.errors import PlotError
 from dsc.model.plot import ActionPlot
+from dsc.outcomes import Outcome
 from dsc.skills import skill
 from dsc.text.plot_files import load_library, parse_plot
 from dsc.validation import raise_findings, validate_library, validate_plot
@@ -28,16 +29,29 @@ SCHEMA = Schema.parse("""
 """)
 
 
+Item = Annotated[str, "item"]
+
+
+class Grasped(Outcome): ...
+
+
+class Slipped(Outcome):
+    item: Item
+
+
+class Pushed(Outcome): ...
+
+
 class Arm(Component):
     name = "arm"
 
-    @skill(outcomes={"grasped": {}, "slipped": {"item": "item"}}, types={"item": "item"})
-    async def grasp(self, call, item, speed=1):
-        return Outcome("grasped")
+    @skill
+    async def grasp(self, call, item: Item, speed=1) -> Grasped | Slipped:
+        return Grasped()
 
-    @skill(outcomes={"pushed": {}})
-    async def push(self, call):
-        return Outcome("pushed")
+    @skill
+    async def push(self, call) -> Pushed:
+        return Pushed()
 
 
 SKILLS = list(Arm().skills().values())

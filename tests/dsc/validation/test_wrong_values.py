@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 
@@ -14,6 +15,7 @@ from dsc import (
     Library,
     Outcome,
     Sequencer,
+    SkillCall,
     component_of,
     event,
     load_library,
@@ -22,6 +24,7 @@ from dsc import (
     primitive_plot,
     query,
     skill,
+    takes,
 )
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.validation import validate_library, validate_plot
@@ -37,12 +40,22 @@ states: {a: {on: {stop: e}, after: {seconds: 1, to: e}}, e: {final: true}}
 """)
 
 
+Item = Annotated[str, "item"]
+
+
+class Ok(Outcome): ...
+
+
+class Progress(Outcome):
+    share: float
+
+
 class Arm(Component):
     name = "arm"
 
-    @skill(outcomes={"ok": {}})
-    async def go(self, call) -> Outcome:
-        return Outcome("ok")
+    @skill
+    async def go(self, call) -> Ok:
+        return Ok()
 
 
 def sequencer(components=()):
@@ -116,12 +129,12 @@ def sequencer_of(**other):
         (lambda: load_library(None), "a file or folder is named by a text or a Path, not None"),  # type: ignore[arg-type]
         (lambda: load_library("/nowhere"), "there are no plots (*.yaml) in '/nowhere'"),
         (lambda: ActionPlot.model_validate("p"), "a mapping was expected; found 'p'"),
-        (lambda: skill(outcomes=["ok"]), "the outcomes of a skill are a mapping of names, as in @skill(outcomes={'grasped': {}})"),  # type: ignore[arg-type]
-        (lambda: skill(outcomes={"ok": ["item"]}), "the attributes of 'ok' are a mapping of names"),  # type: ignore[dict-item]
-        (lambda: skill(lambda call: None), "the outcomes of a skill are a mapping of names"),  # type: ignore[arg-type]
-        (lambda: skill(outcomes={}, blocking="tread"), "blocks in a thread or a process, not 'tread'; did you mean 'thread'?"),  # type: ignore[arg-type]
-        (lambda: query(["hours"]), "the values of an answer are a mapping of names"),  # type: ignore[arg-type]
-        (lambda: event(5), "the attributes of an event are a mapping of names"),  # type: ignore[arg-type]
+        (lambda: skill({"ok": {}}), "`@skill` decorates a function, whose annotations declare it, not {'ok': {}}"),  # type: ignore[call-overload]
+        (lambda: skill(lambda call: None), "'<lambda>' has no return annotation; write its outcomes"),
+        (lambda: skill(blocking="tread"), "blocks in a thread or a process, not 'tread'; did you mean 'thread'?"),  # type: ignore[call-overload]
+        (lambda: query(["hours"]), "`@query` decorates a function, whose annotations declare it, not ['hours']"),  # type: ignore[type-var]
+        (lambda: event(5), "`@event` decorates a function, whose annotations declare it, not 5"),  # type: ignore[type-var]
+        (lambda: takes(5), "`@takes` decorates a function, whose annotations declare it, not 5"),  # type: ignore[type-var]
         (lambda: component_of("arm", "go"), "'go' is not a skill: decorate a function with `skill`"),  # type: ignore[arg-type]
         (lambda: primitive_plot(Arm().skills()["go"], done="okk"), "no outcome 'okk'; did you mean 'ok'?"),
         (executive([Arm]), "an instance is made by Arm()"),
@@ -145,36 +158,80 @@ def test_a_wrong_value_is_refused_in_words(act, said):
 
 
 def not_a_coroutine():
-    @skill(outcomes={"ok": {}})
-    def go(call) -> Outcome:
-        return Outcome("ok")
+    @skill
+    def go(call) -> Ok:
+        return Ok()
 
 
 def a_blocking_coroutine():
-    @skill(outcomes={"ok": {}}, blocking="thread")
-    async def go(call) -> Outcome:
-        return Outcome("ok")
+    @skill(blocking="thread")
+    async def go(call) -> Ok:
+        return Ok()
 
 
 def without_call():
     class Arm(Component):
-        @skill(outcomes={"ok": {}}, types={"item": "item"})
-        async def go(self, item) -> Outcome:
-            return Outcome("ok")
+        @skill
+        async def go(self, item: Item) -> Ok:
+            return Ok()
 
 
-def a_misspelt_parameter():
+def an_unknown_type():
     class Arm(Component):
-        @skill(outcomes={"ok": {}}, types={"hieght": "number"})
-        async def go(self, call, height) -> Outcome:
-            return Outcome("ok")
+        @skill
+        async def go(self, call, item: Itme) -> Ok:  # type: ignore[name-defined]  # noqa: F821
+            return Ok()
+
+
+def without_outcomes():
+    class Arm(Component):
+        @skill
+        async def go(self, call):
+            return Ok()
+
+
+def any_outcome():
+    class Arm(Component):
+        @skill
+        async def go(self, call) -> Outcome:
+            return Ok()
+
+
+def no_outcome():
+    class Arm(Component):
+        @skill  # type: ignore[type-var]
+        async def go(self, call) -> Ok | str:
+            return Ok()
+
+
+def two_classes_of_one_event():
+    class Fine(Outcome, event="ok"): ...
+
+    class Arm(Component):
+        @skill
+        async def go(self, call) -> Ok | Fine:
+            return Ok()
+
+
+def an_unknown_report():
+    class Arm(Component):
+        @skill
+        async def go(self, call: SkillCall[Progres]) -> Ok:  # type: ignore[name-defined]  # noqa: F821
+            return Ok()
+
+
+def two_answers():
+    class Arm(Component):
+        @query
+        async def free(self) -> Ok | Progress:
+            return Ok()
 
 
 def a_hidden_method():
     class Arm(Component):
-        @skill(outcomes={"ok": {}})
-        async def take(self, call) -> Outcome:  # type: ignore[override]
-            return Outcome("ok")
+        @skill
+        async def take(self, call) -> Ok:  # type: ignore[override]
+            return Ok()
 
 
 @pytest.mark.parametrize(
@@ -183,7 +240,16 @@ def a_hidden_method():
         (not_a_coroutine, "skill 'go' is not a coroutine: write `async def`, or declare it `blocking`"),
         (a_blocking_coroutine, "skill 'go' is a coroutine, and a blocking skill is a plain function: write `def`"),
         (without_call, "skill 'Arm.go' has no parameter for its call: write (self, call, ...), not (self, item)"),
-        (a_misspelt_parameter, "skill 'Arm.go' has no parameter 'hieght'; did you mean 'height'?"),
+        (
+            an_unknown_type,
+            "the annotation of 'item' names 'Itme', which does not exist when the class is made; did you mean 'Item'?",
+        ),
+        (without_outcomes, "'Arm.go' has no return annotation; write its outcomes, as in `-> Grasped | Slipped`"),
+        (any_outcome, "the returned value of 'Arm.go' is any Outcome; name its classes, as in `-> Grasped | Slipped`"),
+        (no_outcome, "the returned value of 'Arm.go' names str, which is not a subclass of Outcome"),
+        (two_classes_of_one_event, "the returned value of 'Arm.go' names two classes for the event 'ok'"),
+        (an_unknown_report, "names 'Progres', which does not exist when the class is made; did you mean 'Progress'?"),
+        (two_answers, "query 'Arm.free' returns one outcome class, the answer, not 2"),
         (a_hidden_method, "'take' of a_hidden_method.<locals>.Arm hides an attribute of every component"),
     ],
 )
@@ -192,4 +258,4 @@ def test_a_skill_that_can_never_work_is_refused_when_it_is_made_with_its_line(ma
         make()
     assert refused.value.place is not None
     line = Path(__file__).read_text().splitlines()[(refused.value.place.line or 0) - 1]
-    assert "@skill" in line
+    assert line.split("#")[0].strip() in {"@skill", "@query", '@skill(blocking="thread")'}

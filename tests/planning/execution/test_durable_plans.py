@@ -6,6 +6,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import pytest
 
@@ -30,6 +31,15 @@ DOMAIN = PlanningDomain.parse(TEXT)
 GOAL = "(and (on a) (on b) (on c))"
 
 
+Lamp = Annotated[str, "lamp"]
+
+
+class Lit(Outcome): ...
+
+
+class Mended(Outcome): ...
+
+
 class Lamps(Component):
     name = "lamps"
 
@@ -37,16 +47,16 @@ class Lamps(Component):
         super().__init__()
         self.switched = []
 
-    @skill(outcomes={"lit": {}}, types={"lamp": "lamp"}, after_crash="repeat")
-    async def light(self, call: SkillCall, lamp: str) -> Outcome:
+    @skill(after_crash="repeat")
+    async def light(self, call: SkillCall, lamp: Lamp) -> Lit:
         await call.clock.sleep(2.0)
         self.switched.append(lamp)
-        return Outcome("lit", observed=Delta(added=(fact("on", lamp),)))
+        return Lit(observed=Delta(added=(fact("on", lamp),)))
 
-    @skill(outcomes={"mended": {}}, types={"lamp": "lamp"}, after_crash="repeat")
-    async def mend(self, call: SkillCall, lamp: str) -> Outcome:
+    @skill(after_crash="repeat")
+    async def mend(self, call: SkillCall, lamp: Lamp) -> Mended:
         await call.clock.sleep(3.0)
-        return Outcome("mended", observed=Delta(added=(fact("works", lamp),)))
+        return Mended(observed=Delta(added=(fact("works", lamp),)))
 
 
 def executive(planner, store=None, domain=DOMAIN, more=()):

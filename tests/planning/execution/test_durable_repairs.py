@@ -20,6 +20,12 @@ from planning import Executive, PlanStep
 from planning.validation import Validation
 
 
+class Failed(Outcome): ...
+
+
+class Did(Outcome): ...
+
+
 class LastingRobot(Component):
     """Does each action id once, and goes on when the program dies; `crash` is called when it has done something."""
 
@@ -40,10 +46,10 @@ class LastingRobot(Component):
         other.script, other.done, other.ended = copy.deepcopy((self.script, self.done, self.ended))
         return other
 
-    @skill(outcomes={"did": {}, "failed": {}}, after_crash="same_id")
+    @skill(after_crash="same_id")
     async def act(
         self, call: SkillCall, way: str, action: str, one: str = "", two: str = "", three: str = ""
-    ) -> Outcome:
+    ) -> Did | Failed:
         """One planning action, done in one way."""
         await call.clock.sleep(1.0)
         if call.action_id not in self.ended:
@@ -51,11 +57,9 @@ class LastingRobot(Component):
             self.done.append(f"{step}" if way == action else f"{way}: {step}")
             answers = self.script.get(self.done[-1], [])
             observed = answers.pop(0) if answers else DOMAIN.effects(step, self.knowledge)
-            self.ended[call.action_id] = (
-                Outcome("failed") if observed == FAILED else Outcome("did", observed=observed or Delta())
-            )
+            self.ended[call.action_id] = Failed() if observed == FAILED else Did(observed=observed or Delta())
             self.crash()
-        return self.ended[call.action_id]
+        return self.ended[call.action_id]  # type: ignore[return-value]
 
 
 class Refuses:

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import pytest
 
@@ -46,6 +46,25 @@ rules:
 """)
 
 
+Lamp = Annotated[str, "lamp"]
+
+
+class Lit(Outcome): ...
+
+
+class BulbBlown(Outcome):
+    lamp: Lamp
+
+
+class Nothing(Outcome): ...
+
+
+class Seen(Outcome): ...
+
+
+class There(Outcome): ...
+
+
 class Lamps(Component):
     name = "lamps"
 
@@ -54,13 +73,13 @@ class Lamps(Component):
         self.switched = []
         self.answer: Callable[[str], Outcome] | None = None
 
-    @skill(outcomes={"lit": {}, "bulb_blown": {"lamp": "lamp"}, "nothing": {}}, types={"lamp": "lamp"})
-    async def light(self, call: SkillCall, lamp: str) -> Outcome:
+    @skill
+    async def light(self, call: SkillCall, lamp: Lamp) -> Lit | BulbBlown | Nothing:
         await call.clock.sleep(1.0)
         self.switched.append(lamp)
         if self.answer is not None:
-            return self.answer(lamp)
-        return Outcome("lit", observed=Delta(added=(fact("on", lamp),)))
+            return self.answer(lamp)  # type: ignore[return-value]
+        return Lit(observed=Delta(added=(fact("on", lamp),)))
 
 
 class Answers:
@@ -247,10 +266,10 @@ states:
 class Watcher(Component):
     name = "watcher"
 
-    @skill(outcomes={"seen": {}})
-    async def look(self, call: SkillCall) -> Outcome:
+    @skill
+    async def look(self, call: SkillCall) -> Seen:
         await call.clock.sleep(0.5)
-        return Outcome("seen", observed=Delta(removed=(fact("works", "b"),)))
+        return Seen(observed=Delta(removed=(fact("works", "b"),)))
 
 
 def test_a_skill_that_works_for_another_state_is_somebody_else_to_the_monitor():
@@ -329,10 +348,10 @@ states:
 class Walker(Component):
     name = "legs"
 
-    @skill(outcomes={"there": {}}, types={"lamp": "lamp"})
-    async def walk(self, call: SkillCall, lamp: str) -> Outcome:
+    @skill
+    async def walk(self, call: SkillCall, lamp: Lamp) -> There:
         await call.clock.sleep(1.0)
-        return Outcome("there", observed=Delta(added=(fact("near", lamp),)))
+        return There(observed=Delta(added=(fact("near", lamp),)))
 
 
 def test_a_plan_is_watched_also_after_one_of_its_steps_has_planned_for_itself():
@@ -390,9 +409,9 @@ def test_an_executive_can_be_closed_inside_a_loop():
 
 
 class Blown(Lamps):
-    @skill(outcomes={"lit": {}, "bulb_blown": {"lamp": "lamp"}, "nothing": {}}, types={"lamp": "lamp"})
-    async def light(self, call, lamp):
-        return Outcome("bulb_blown", {"lamp": lamp})
+    @skill
+    async def light(self, call, lamp: Lamp) -> Lit | BulbBlown | Nothing:
+        return BulbBlown(lamp=lamp)
 
 
 def lit_by_blown_bulbs(rule):
@@ -537,8 +556,8 @@ def test_a_device_that_fails_once_does_not_keep_the_goal_from_being_reached():
 
 def test_a_skill_that_hangs_is_a_failed_step():
     class Deaf(Lamps):
-        @skill(outcomes={"lit": {}}, types={"lamp": "lamp"})
-        async def light(self, call, lamp):
+        @skill
+        async def light(self, call, lamp: Lamp) -> Lit:  # type: ignore[return]
             await asyncio.Event().wait()
 
     deaf = Deaf()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import pytest
 
 from dsc import Component, Event, Outcome, SkillCall, parse_plot, skill
@@ -57,6 +59,21 @@ states:
 """
 
 
+Thing = Annotated[str, "thing"]
+
+
+class Lit(Outcome): ...
+
+
+class Shown(Outcome): ...
+
+
+class Blurred(Outcome): ...
+
+
+class Wiped(Outcome): ...
+
+
 class Studio(Component):
     name = "studio"
 
@@ -66,21 +83,21 @@ class Studio(Component):
         self.blurred = list(blurred)
         self.seconds = {}
 
-    @skill(outcomes={"lit": {}}, types={"thing": "thing"})
-    async def light(self, call: SkillCall, thing: str) -> Outcome:
-        return await self._do(call, "light", thing, "lit", fact("lit", thing))
+    @skill
+    async def light(self, call: SkillCall, thing: Thing) -> Lit:
+        return await self._do(call, "light", thing, "lit", fact("lit", thing))  # type: ignore[return-value]
 
-    @skill(outcomes={"shown": {}, "blurred": {}}, types={"thing": "thing"})
-    async def show(self, call: SkillCall, thing: str, zoom: str) -> Outcome:
+    @skill
+    async def show(self, call: SkillCall, thing: Thing, zoom: str) -> Shown | Blurred:
         if thing in self.blurred and zoom == "wide":
-            return await self._do(call, f"show {zoom}", thing, "blurred")
-        return await self._do(call, f"show {zoom}", thing, "shown", fact("shown", thing))
+            return await self._do(call, f"show {zoom}", thing, "blurred")  # type: ignore[return-value]
+        return await self._do(call, f"show {zoom}", thing, "shown", fact("shown", thing))  # type: ignore[return-value]
 
-    @skill(outcomes={"wiped": {}}, types={"thing": "thing"})
-    async def wipe(self, call: SkillCall, thing: str) -> Outcome:
+    @skill
+    async def wipe(self, call: SkillCall, thing: Thing) -> Wiped:
         await call.clock.sleep(1.0)
         self.done.append(("wipe", thing))
-        return Outcome("wiped", observed=Delta(removed=(fact("dirty", thing),)))
+        return Wiped(observed=Delta(removed=(fact("dirty", thing),)))
 
     async def _do(self, call, what, thing, ends, *seen) -> Outcome:
         await call.clock.sleep(self.seconds.get((what, thing), 1.0))

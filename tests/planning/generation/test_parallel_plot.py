@@ -212,6 +212,9 @@ def test_a_durative_step_needs_its_place_for_itself_though_it_gives_it_back(worl
     assert deordered(twice, DOMAIN, world, parse_condition("(on a)")).before == {(1, 2)}
 
 
+class Acted(Outcome): ...
+
+
 class Worker(Component):
     """Does what its plots ask for, in the time that it is given."""
 
@@ -221,10 +224,10 @@ class Worker(Component):
         super().__init__(name)
         self.seconds, self.observed = seconds, Delta(added=observed)
 
-    @skill(outcomes={"acted": {}})
-    async def act(self, call):
+    @skill
+    async def act(self, call) -> Acted:
         await call.clock.sleep(self.seconds)
-        return Outcome("acted", observed=self.observed)
+        return Acted(observed=self.observed)
 
 
 class Answers:

@@ -14,6 +14,9 @@ from planning import Executive, PlanStep, plot_from_plan
 from planning.ordering.causal_tracing import deordered
 
 
+class Acted(Outcome): ...
+
+
 class Everybody(Component):
     """Carries out any step, any number of them at once, and sees what comes of it."""
 
@@ -24,11 +27,11 @@ class Everybody(Component):
         super().__init__()
         self.planning_domain, self.world, self.seed = domain, world, seed
 
-    @skill(outcomes={"acted": {}})
-    async def act(self, call, action, x=""):
+    @skill
+    async def act(self, call, action, x="") -> Acted:
         await call.clock.sleep(10 * uniform(self.seed, call.action_id, "duration"))
         step = PlanStep(action, (x,) if x else ())
-        return Outcome("acted", observed=self.planning_domain.effects(step, self.world))
+        return Acted(observed=self.planning_domain.effects(step, self.world))
 
 
 def plot_for(action):

@@ -115,15 +115,18 @@ def test_a_slice_of_a_problem_whose_metric_is_ignored_costs_the_same_everywhere(
     assert {action.cost for form in (problem, problem.whole) for action in form.actions} == {1.0}
 
 
+class Finished(Outcome): ...
+
+
 class Robot(Component):
     """Says how much the collector leaves alone while it works, and how often it looks."""
 
     name = "robot"
 
-    @skill(outcomes={"finished": {}})
-    async def act(self, call: SkillCall) -> Outcome:
+    @skill
+    async def act(self, call: SkillCall) -> Finished:
         self.left_alone, self.patience = gc.get_freeze_count(), gc.get_threshold()
-        return Outcome("finished")
+        return Finished()
 
 
 @pytest.mark.parametrize("simulated", [True, False])

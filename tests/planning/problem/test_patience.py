@@ -83,12 +83,15 @@ def test_what_the_work_raises_comes_to_the_one_who_waits():
         asyncio.run(aside(lambda: 1 / 0))
 
 
+class Acted(Outcome): ...
+
+
 class Idle(Component):
     name = "idle"
 
-    @skill(outcomes={"acted": {}})
-    async def act(self, call: SkillCall) -> Outcome:
-        return Outcome("acted")
+    @skill
+    async def act(self, call: SkillCall) -> Acted:
+        return Acted()
 
 
 WORKING = """

@@ -1,8 +1,10 @@
 """A delivery robot in a simulated house, as a user would write it: skills, a world with faults, and a goal."""
 
+from __future__ import annotations
+
 import os
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from dsc import Component, Outcome, Parameter, SkillCall, skill
 from knowledge_base import Delta, fact
@@ -40,6 +42,22 @@ class House(Simulation):
         return {"delivered": [one for one, at in self.at.items() if at == self.goes_to[one]]}
 
 
+Room = Annotated[str, "room"]
+Parcel = Annotated[str, "parcel"]
+
+
+class Arrived(Outcome): ...
+
+
+class Blocked(Outcome): ...
+
+
+class Taken(Outcome): ...
+
+
+class Put(Outcome): ...
+
+
 class Wheels(Component):
     name = "wheels"
     declares: ClassVar = {"speed": Parameter("number", default=1.0, least=0.1, most=5.0)}
@@ -48,15 +66,15 @@ class Wheels(Component):
         super().__init__()
         self.house = house
 
-    @skill(outcomes={"arrived": {}, "blocked": {}}, types={"to": "room"})
-    async def drive(self, call: SkillCall, to: str) -> Outcome:
+    @skill
+    async def drive(self, call: SkillCall, to: Room) -> Arrived | Blocked:
         await call.clock.sleep(10.0 / self.parameters["speed"])
         if os.environ.get("CRASH") == to:
             os._exit(9)
         if self.house.fault(call.action_id, "blocked"):
-            return Outcome("blocked")
+            return Blocked()
         before, self.house.robot_at = self.house.robot_at, to
-        return Outcome("arrived", observed=Delta(removed=(fact("robot-in", before),), added=(fact("robot-in", to),)))
+        return Arrived(observed=Delta(removed=(fact("robot-in", before),), added=(fact("robot-in", to),)))
 
 
 class Gripper(Component):
@@ -66,15 +84,15 @@ class Gripper(Component):
         super().__init__()
         self.house = house
 
-    @skill(outcomes={"taken": {}}, types={"parcel": "parcel"})
-    async def grasp(self, call: SkillCall, parcel: str) -> Outcome:
+    @skill
+    async def grasp(self, call: SkillCall, parcel: Parcel) -> Taken:
         room, self.house.at[parcel] = self.house.robot_at, "robot"
-        return Outcome("taken", observed=Delta(removed=(fact("in", parcel, room),), added=(fact("holding", parcel),)))
+        return Taken(observed=Delta(removed=(fact("in", parcel, room),), added=(fact("holding", parcel),)))
 
-    @skill(outcomes={"put": {}}, types={"parcel": "parcel"})
-    async def put(self, call: SkillCall, parcel: str) -> Outcome:
+    @skill
+    async def put(self, call: SkillCall, parcel: Parcel) -> Put:
         room = self.house.at[parcel] = self.house.robot_at
-        return Outcome("put", observed=Delta(removed=(fact("holding", parcel),), added=(fact("in", parcel, room),)))
+        return Put(observed=Delta(removed=(fact("holding", parcel),), added=(fact("in", parcel, room),)))
 
 
 robot = Bundle.in_folder(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from dsc import Component, Outcome, SkillCall, skill
 from knowledge_base import Delta, KnowledgeBase, fact
@@ -67,6 +67,25 @@ class House(Simulation):
             self.begin()
 
 
+Room = Annotated[str, "room"]
+Parcel = Annotated[str, "parcel"]
+
+
+class Arrived(Outcome): ...
+
+
+class Loaded(Outcome): ...
+
+
+class Jammed(Outcome): ...
+
+
+class Unloaded(Outcome): ...
+
+
+class Beeped(Outcome): ...
+
+
 class Cart(Component):
     name = "cart"
 
@@ -74,39 +93,41 @@ class Cart(Component):
         super().__init__()
         self.house = house
 
-    @skill(outcomes={"arrived": {}}, types={"start": "room", "to": "room"}, after_crash="same_id")
-    async def drive(self, call: SkillCall, start: str, to: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def drive(self, call: SkillCall, start: Room, to: Room) -> Arrived:
         await call.clock.sleep(10.0)
         self.house.cart_in = to
         self.house.executed(call.action_id, "arrived")
-        return Outcome("arrived", observed=Delta(removed=(fact("cart-in", start),), added=(fact("cart-in", to),)))
+        return Arrived(observed=Delta(removed=(fact("cart-in", start),), added=(fact("cart-in", to),)))
 
-    @skill(outcomes={"loaded": {}, "jammed": {}}, types={"parcel": "parcel", "room": "room"}, after_crash="same_id")
-    async def load(self, call: SkillCall, parcel: str, room: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def load(self, call: SkillCall, parcel: Parcel, room: Room) -> Loaded | Jammed:
         await call.clock.sleep(2.0)
         outcome = self.house.act(call.action_id, "loaded", "jammed")
         if outcome == "loaded":
             self.house.lies[parcel] = "cart"
         self.house.executed(call.action_id, outcome)
         here, held = fact("lies-in", parcel, room), fact("loaded", parcel)
-        observed = Delta(removed=(here, fact("empty")), added=(held,)) if outcome == "loaded" else Delta()
-        return Outcome(outcome, observed=observed)
+        if outcome == "jammed":
+            return Jammed()
+        return Loaded(observed=Delta(removed=(here, fact("empty")), added=(held,)))
 
-    @skill(outcomes={"unloaded": {}, "jammed": {}}, types={"parcel": "parcel", "room": "room"}, after_crash="same_id")
-    async def unload(self, call: SkillCall, parcel: str, room: str) -> Outcome:
+    @skill(after_crash="same_id")
+    async def unload(self, call: SkillCall, parcel: Parcel, room: Room) -> Unloaded | Jammed:
         await call.clock.sleep(2.0)
         outcome = self.house.act(call.action_id, "unloaded", "jammed")
         if outcome == "unloaded":
             self.house.lies[parcel] = room
         self.house.executed(call.action_id, outcome)
         here, held = fact("lies-in", parcel, room), fact("loaded", parcel)
-        observed = Delta(removed=(held,), added=(here, fact("empty"))) if outcome == "unloaded" else Delta()
-        return Outcome(outcome, observed=observed)
+        if outcome == "jammed":
+            return Jammed()
+        return Unloaded(observed=Delta(removed=(held,), added=(here, fact("empty"))))
 
-    @skill(outcomes={"beeped": {}}, types={"times": "number", "loud": "boolean"}, after_crash="same_id")
-    async def beep(self, call: SkillCall, times: float, loud: bool = False) -> Outcome:
+    @skill(after_crash="same_id")
+    async def beep(self, call: SkillCall, times: float, loud: bool = False) -> Beeped:
         await call.clock.sleep(float(times))
-        return Outcome("beeped")
+        return Beeped()
 
 
 robot = Bundle.in_folder(

@@ -1,0 +1,150 @@
+"""Outcomes of skills: typed classes whose attributes are the data of the outcome event (S0.7, S2.11).
+
+```python
+Item = NewType("Item", str)  # objects of the type `item`
+
+
+class Grasped(Outcome):  # the event `grasped`
+    item: Item
+
+
+class Slipped(Outcome): ...
+```
+
+A type checker verifies each construction, e.g. `Grasped(item=item, observed=seen)`. The classes that a skill's
+annotations name are the declaration of its outcomes; no second list exists.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from inspect import get_annotations
+from types import MappingProxyType
+from typing import Any, ClassVar, Never, NoReturn, dataclass_transform, get_origin
+
+from dsc.annotations import Namespace, evaluated, lower_name, members, names_around, type_of
+from knowledge_base.errors import Place, SchemaError, UnknownNameError, tolerated
+from knowledge_base.facts import Delta
+
+_UNCHANGED = Delta()
+_NONE: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+class _Typed:
+    """Base class from which type checkers derive the constructors of subclasses; its own attributes do not count."""
+
+    event: str
+    attributes: Mapping[str, Any]
+
+
+class Outcome(_Typed):
+    """The end of a skill: its outcome event, the event's attributes, and its observations.
+
+    Before the event is handled, `observed` is applied to the knowledge base, with the component as author.
+
+    A subclass declares one outcome: its annotations are the attributes, and `event` is by default the name of the class
+    in lower case with underscores. `class Lost(Outcome, event="gave_way")` gives another name. `Outcome` itself
+    represents any outcome, e.g. in tests and in transports: `Outcome("grasped", {"item": "cup"})`.
+    """
+
+    observed: Delta = _UNCHANGED
+    declared: ClassVar[dict[str, str | None]] = {}
+    """Types of the attributes by name; `None` accepts any value."""
+    _defaults: ClassVar[dict[str, Any]] = {}
+
+    def __init__(self, event: str, attributes: Mapping[str, Any] = _NONE, observed: Delta = _UNCHANGED) -> None:
+        vars(self).update(event=event, attributes=attributes, observed=observed)
+
+    def __init_subclass__(cls, event: str | None = None) -> None:
+        """Declare an outcome.
+
+        Raises:
+            SchemaError: an attribute has the name of an attribute of every outcome, or its annotation is not valid.
+        """
+        frame = sys._getframe(1)  # noqa: SLF001  # the line of the class, and the names around it
+        own = {name: one for name, one in get_annotations(cls).items() if not _is_class_variable(one)}
+        cls.declared, cls._defaults = dict(cls.declared), dict(cls._defaults)
+        cls.event = event or lower_name(cls.__name__)
+        cls.__init__ = _filled  # type: ignore[method-assign,assignment]
+        with tolerated():
+            try:
+                cls.declared.update(_types(cls.__qualname__, own, names_around(frame.f_globals)))
+            except SchemaError as error:
+                error.place = Place(frame.f_code.co_filename, frame.f_lineno)
+                raise
+        cls._defaults.update({name: vars(cls)[name] for name in own if name in vars(cls)})
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"an outcome is immutable: '{name}' cannot be set")
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Outcome):
+            return NotImplemented
+        return (self.event, self.attributes, self.observed) == (other.event, other.attributes, other.observed)
+
+    __hash__ = None  # type: ignore[assignment]  # the attributes are a mapping
+
+    def __repr__(self) -> str:
+        given = [f"{name}={value!r}" for name, value in self.attributes.items()]
+        given += [f"observed={self.observed!r}"] if self.observed else []
+        if type(self) is Outcome:
+            return f"Outcome({', '.join([repr(self.event), *given])})"
+        return f"{type(self).__name__}({', '.join(given)})"
+
+
+_TAKEN = frozenset({"event", "attributes", "observed", "declared"})
+
+
+def _filled(self: Outcome, *, observed: Delta = _UNCHANGED, **values: Any) -> None:
+    """Set the attributes of a declared outcome; `__init__` of all subclasses."""
+    kind = type(self)
+    attributes = {**kind._defaults, **values}  # noqa: SLF001  # a method of the class
+    if attributes.keys() != kind.declared.keys():
+        _refuse(kind, attributes)
+    vars(self).update(attributes, attributes=attributes, observed=observed)
+
+
+def _refuse(kind: type[Outcome], given: Mapping[str, Any]) -> None:
+    """Raise an error for an attribute that is missing or not declared."""
+    for name in given.keys() - kind.declared.keys():
+        message = f"outcome {kind.__name__} has no attribute '{name}'"
+        raise UnknownNameError(message, found=name, valid=kind.declared)
+    missing = ", ".join(f"'{name}'" for name in kind.declared if name not in given)
+    raise SchemaError(f"outcome {kind.__name__} needs its attribute {missing}")
+
+
+def declared_outcomes(annotation: object, names: Namespace, what: str) -> dict[str, dict[str, str | None]]:
+    """Return the outcomes that an annotation names: attributes with types, by event.
+
+    Raises:
+        SchemaError: the annotation names something else than outcome classes, or two classes of one event.
+    """
+    found: dict[str, dict[str, str | None]] = {}
+    for kind in members(evaluated(annotation, names, what)):
+        if kind in {None, type(None), Never, NoReturn}:
+            continue
+        if kind is Outcome:
+            raise SchemaError(f"{what} is any Outcome; name its classes, as in `-> Grasped | Slipped`")
+        if not (isinstance(kind, type) and issubclass(kind, Outcome)):
+            shown = getattr(kind, "__name__", repr(kind))
+            raise SchemaError(f"{what} names {shown}, which is not a subclass of Outcome", found=shown)
+        if kind.event in found:
+            raise SchemaError(f"{what} names two classes for the event '{kind.event}'", found=kind.event)
+        found[kind.event] = dict(kind.declared)
+    return found
+
+
+def _types(outcome: str, annotations: Mapping[str, object], names: Namespace) -> Iterator[tuple[str, str | None]]:
+    for name, annotation in annotations.items():
+        if name in _TAKEN:
+            message = f"outcome {outcome} cannot have the attribute '{name}', which every outcome has"
+            raise SchemaError(message, found=name)
+        yield name, type_of(evaluated(annotation, names, f"'{name}' of outcome {outcome}"))
+
+
+def _is_class_variable(annotation: object) -> bool:
+    if isinstance(annotation, str):
+        return annotation.startswith(("ClassVar", "typing.ClassVar"))
+    return annotation is ClassVar or get_origin(annotation) is ClassVar

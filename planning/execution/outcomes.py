@@ -1,0 +1,62 @@
+"""Outcomes of the planning component's skills."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from dsc.outcomes import Outcome
+
+Symbol = Annotated[str, "symbol"]
+
+
+class PlotFound(Outcome, event="plan_found"):
+    """A plan was found, and its plot is generated."""
+
+    plot: Annotated[dict[str, Any], "plot"]
+    name: Symbol
+    steps: int
+
+
+class GoalHolds(Outcome):
+    """The goal holds."""
+
+
+class GoalOpen(Outcome):
+    """A part of the goal does not hold."""
+
+    reason: str
+
+
+class NoPlan(Outcome):
+    """No plan was found; `kind` is `unsolvable`, `timed_out` or `failed`."""
+
+    reason: str
+    kind: Symbol
+
+
+class PlanInvalid(Outcome):
+    """The plan no longer leads to the goal, after a change by `author`."""
+
+    which: str
+    why: str
+    author: Symbol
+
+
+class Held(Outcome):
+    """No further step of the plan may begin."""
+
+
+class Replan(Outcome):
+    """A new plan is necessary, which only the planner can find."""
+
+
+class GaveUp(Outcome):
+    """The budget of the goal is exhausted."""
+
+    reason: str
+
+
+Repaired = PlotFound | GoalHolds | Replan | GaveUp
+"""Answers to the failure of a plan."""
+Monitored = GoalHolds | PlotFound | PlanInvalid
+"""Ends of the monitoring of a plan."""
