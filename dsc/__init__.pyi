@@ -10,7 +10,8 @@ from dsc.components.endpoint import LocalTransport as LocalTransport
 from dsc.components.heartbeat import Heartbeat as Heartbeat
 from dsc.components.host import Host as Host
 from dsc.components.life_cycle import Life as Life
-from dsc.components.parameters import Parameter as Parameter
+from dsc.components.parameters import Parameters as Parameters
+from dsc.components.parameters import parameter as parameter
 from dsc.components.ports import event as event
 from dsc.components.ports import query as query
 from dsc.components.ports import takes as takes

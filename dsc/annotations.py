@@ -12,10 +12,11 @@ import re
 import sys
 from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from types import FrameType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin
 
-from knowledge_base.errors import SchemaError, nearest
+from knowledge_base.errors import InputError, Place, SchemaError, nearest, tolerated
 
 _PLAIN: Mapping[object, str] = {bool: "boolean", int: "number", float: "number", str: "text"}
 Namespace = Mapping[str, Any]
@@ -30,6 +31,24 @@ def names_around(module: dict[str, Any]) -> Namespace:
             around.append(frame.f_locals)
         frame = frame.f_back
     return ChainMap(*around, module, vars(builtins))
+
+
+@contextmanager
+def class_statement(kind: type) -> Iterator[Namespace]:
+    """Yield the names that annotations of a new class may use, and give errors of the block the line of its statement.
+
+    The block runs while Python makes the class.
+    """
+    frame: FrameType | None = sys._getframe(2)  # noqa: SLF001  # the only way to the names around the statement
+    while frame is not None and frame.f_globals.get("__name__") != kind.__module__:
+        frame = frame.f_back  # a metaclass
+    with tolerated():
+        try:
+            yield names_around(sys._getframe(2).f_globals if frame is None else frame.f_globals)  # noqa: SLF001
+        except InputError as error:
+            if frame is not None:
+                error.place = error.place or Place(frame.f_code.co_filename, frame.f_lineno)
+            raise
 
 
 def type_of(annotation: object) -> str | None:
@@ -93,3 +112,10 @@ def parameter_types(body: Callable[..., Any], own: int, names: Namespace) -> dic
 def lower_name(class_name: str) -> str:
     """Return the name of a class in lower case, with underscores between words."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", class_name).lower()
+
+
+def is_class_variable(annotation: object) -> bool:
+    """Return whether an annotation, which may be text, is a `ClassVar`."""
+    if isinstance(annotation, str):
+        return annotation.startswith(("ClassVar", "typing.ClassVar"))
+    return annotation is ClassVar or get_origin(annotation) is ClassVar

@@ -17,14 +17,13 @@ annotations name are the declaration of its outcomes; no second list exists.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from inspect import get_annotations
 from types import MappingProxyType
-from typing import Any, ClassVar, Never, NoReturn, dataclass_transform, get_origin
+from typing import Any, ClassVar, Never, NoReturn, dataclass_transform
 
-from dsc.annotations import Namespace, evaluated, lower_name, members, names_around, type_of
-from knowledge_base.errors import Place, SchemaError, UnknownNameError, tolerated
+from dsc.annotations import Namespace, class_statement, evaluated, is_class_variable, lower_name, members, type_of
+from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.facts import Delta
 
 _UNCHANGED = Delta()
@@ -63,17 +62,12 @@ class Outcome(_Typed):
         Raises:
             SchemaError: an attribute has the name of an attribute of every outcome, or its annotation is not valid.
         """
-        frame = sys._getframe(1)  # noqa: SLF001  # the line of the class, and the names around it
-        own = {name: one for name, one in get_annotations(cls).items() if not _is_class_variable(one)}
+        own = {name: one for name, one in get_annotations(cls).items() if not is_class_variable(one)}
         cls.declared, cls._defaults = dict(cls.declared), dict(cls._defaults)
         cls.event = event or lower_name(cls.__name__)
         cls.__init__ = _filled  # type: ignore[method-assign,assignment]
-        with tolerated():
-            try:
-                cls.declared.update(_types(cls.__qualname__, own, names_around(frame.f_globals)))
-            except SchemaError as error:
-                error.place = Place(frame.f_code.co_filename, frame.f_lineno)
-                raise
+        with class_statement(cls) as names:
+            cls.declared.update(_types(cls.__qualname__, own, names))
         cls._defaults.update({name: vars(cls)[name] for name in own if name in vars(cls)})
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -115,16 +109,26 @@ def _refuse(kind: type[Outcome], given: Mapping[str, Any]) -> None:
     raise SchemaError(f"outcome {kind.__name__} needs its attribute {missing}")
 
 
-def declared_outcomes(annotation: object, names: Namespace, what: str) -> dict[str, dict[str, str | None]]:
+def declared_outcomes(
+    annotation: object, names: Namespace, what: str, *, optional: bool = False
+) -> dict[str, dict[str, str | None]]:
     """Return the outcomes that an annotation names: attributes with types, by event.
+
+    Args:
+        annotation: the annotation, which may be text.
+        names: the names that the annotation may use.
+        what: the annotated value, for messages.
+        optional: whether the value may be `None`.
 
     Raises:
         SchemaError: the annotation names something else than outcome classes, or two classes of one event.
     """
     found: dict[str, dict[str, str | None]] = {}
     for kind in members(evaluated(annotation, names, what)):
-        if kind in {None, type(None), Never, NoReturn}:
+        if kind in {Never, NoReturn} or (optional and kind in {None, type(None)}):
             continue
+        if kind in {None, type(None)}:
+            raise SchemaError(f"{what} may be None, which is not an outcome; a skill that never ends has `-> Never`")
         if kind is Outcome:
             raise SchemaError(f"{what} is any Outcome; name its classes, as in `-> Grasped | Slipped`")
         if not (isinstance(kind, type) and issubclass(kind, Outcome)):
@@ -142,9 +146,3 @@ def _types(outcome: str, annotations: Mapping[str, object], names: Namespace) ->
             message = f"outcome {outcome} cannot have the attribute '{name}', which every outcome has"
             raise SchemaError(message, found=name)
         yield name, type_of(evaluated(annotation, names, f"'{name}' of outcome {outcome}"))
-
-
-def _is_class_variable(annotation: object) -> bool:
-    if isinstance(annotation, str):
-        return annotation.startswith(("ClassVar", "typing.ClassVar"))
-    return annotation is ClassVar or get_origin(annotation) is ClassVar

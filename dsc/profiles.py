@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dsc.components.component import Component
-from dsc.components.parameters import known
+from dsc.components.declarations import known
 from dsc.model.plot import ActionPlot
 from dsc.model.ranges import refuse_change
 from dsc.text.profiles import Profile
@@ -33,7 +33,7 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
             raise _unknown(profile, "components", "component", name, by_name)
     values = {name: _configured(component, profile) for name, component in by_name.items()}
     for name, component in by_name.items():
-        component.parameters.replace(values[name])
+        component.configuration.replace(values[name])
 
 
 def adapted(plots: Iterable[ActionPlot], profile: Profile | None = None) -> tuple[ActionPlot, ...]:
@@ -57,14 +57,14 @@ def _configured(component: Component, profile: Profile | None) -> dict[str, Valu
     settings = {} if profile is None else profile.components.get(component.name, {})
     for parameter, value in settings.items():
         try:
-            declared = known(component.name, parameter, component.declares)
+            declared = known(component.name, parameter, component.parameters.declared)
             declared.range.check(f"{component.name}.{parameter}", value)
             refuse_change(f"{component.name}.{parameter}", "profile", declared.changed_by)
         except InputError as error:
             error.place = None if profile is None else profile.place(("components", component.name, parameter))
             raise
     try:
-        return component.parameters.after(settings)
+        return component.configuration.after(settings)
     except InputError as error:
         error.place = None if profile is None else profile.place(("components", component.name))
         raise

@@ -50,7 +50,8 @@ which the component acts only one time. `sense` observes the world first, withou
 SkillBody = Callable[..., Any]
 """The decorated function, which returns an `Outcome`: a coroutine function or, if the body blocks, a plain function."""
 _Body = TypeVar("_Body", bound=SkillBody)
-_Returning = TypeVar("_Returning", bound=Callable[..., Awaitable[Outcome | None]] | Callable[..., Outcome | None])
+_Coroutine = TypeVar("_Coroutine", bound=Callable[..., Awaitable[Outcome]])
+_Plain = TypeVar("_Plain", bound=Callable[..., Outcome])
 Pattern = Literal["skill", "query", "event"]
 """The communication pattern of a `trigger` (S1.1).
 
@@ -149,11 +150,11 @@ DECLARED = "__dsc_skill__"
 
 
 @overload
-def skill(body: _Returning, /) -> _Returning: ...
+def skill(body: _Coroutine, /) -> _Coroutine: ...
 @overload
-def skill(
-    *, blocking: Literal["thread", "process"] | None = None, after_crash: AfterCrash = "sense"
-) -> Callable[[_Returning], _Returning]: ...
+def skill(*, after_crash: AfterCrash = ...) -> Callable[[_Coroutine], _Coroutine]: ...
+@overload
+def skill(*, blocking: Literal["thread", "process"], after_crash: AfterCrash = ...) -> Callable[[_Plain], _Plain]: ...
 def skill(
     body: SkillBody | None = None,
     /,
@@ -197,8 +198,8 @@ def skill(
     return declare if body is None else declare(body)
 
 
-def returned(body: SkillBody, names: Namespace) -> dict[str, dict[str, str | None]]:
-    """Return the outcomes in the return annotation of a body.
+def returned(body: SkillBody, names: Namespace, *, optional: bool = False) -> dict[str, dict[str, str | None]]:
+    """Return the outcomes in the return annotation of a body; `optional` permits `None`.
 
     Raises:
         SchemaError: the body has no return annotation, or it names something else than outcome classes.
@@ -207,7 +208,7 @@ def returned(body: SkillBody, names: Namespace) -> dict[str, dict[str, str | Non
     what = f"the returned value of '{named(body)}'"
     if annotation is inspect.Signature.empty:
         raise SchemaError(f"'{named(body)}' has no return annotation; write its outcomes, as in `-> Grasped | Slipped`")
-    return declared_outcomes(annotation, names, what)
+    return declared_outcomes(annotation, names, what, optional=optional)
 
 
 def _reported(body: SkillBody, own: int, names: Namespace) -> dict[str, dict[str, str | None]]:

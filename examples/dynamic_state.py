@@ -57,12 +57,12 @@ class Arrived(Outcome): ...
 
 class Base(Component):
     name = "base"
+    room = Room("hall")
 
     @skill
     async def drive(self, call: SkillCall, to: Room) -> Arrived:
         await call.clock.sleep(10.0)
-        here = self.parameters.get("here", "hall")
-        self.parameters["here"] = to
+        here, self.room = self.room, to
         return Arrived(observed=Delta(removed=(fact("robot-in", here),), added=(fact("robot-in", to),)))
 
 

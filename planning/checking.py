@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from dsc.components.component import Component
+from dsc.components.declarations import Parameter
 from dsc.components.hooks import contained
-from dsc.components.parameters import Parameter
 from dsc.components.robot import require_deployed, require_instances, require_wired
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, ProgrammingError
@@ -167,8 +167,8 @@ class _Robot:
     def _declared(self) -> dict[str, Mapping[str, Parameter]] | None:
         if self._components is None:
             return None
-        declared = {one.name: one.declares for one in self._components}
-        return {PlanningComponent.name: PlanningComponent.declares, **declared}
+        declared = {one.name: one.parameters.declared for one in self._components}
+        return {PlanningComponent.name: {}, **declared}
 
     def _check_task(self, schema: Schema) -> None:
         """Check the initial knowledge, the goal and the main plot."""

@@ -109,7 +109,10 @@ class Executive:
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
-        declared = {PlanningComponent.name: PlanningComponent.declares, **{c.name: c.declares for c in self.components}}
+        declared = {
+            PlanningComponent.name: {},
+            **{c.name: c.parameters.declared for c in self.components},
+        }
         schema = self.domain.schema if knowledge is None else knowledge.schema
         require_sound(self.library, self.domain, schema, skills, declared)
         if knowledge is not None:

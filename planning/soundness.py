@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 
-from dsc.components.parameters import Parameter
+from dsc.components.declarations import Parameter
 from dsc.dynamic.library import Library
 from dsc.errors import Finding
 from dsc.skills import SkillSignature

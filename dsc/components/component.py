@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import inspect
 from collections.abc import Awaitable, Mapping
+from inspect import get_annotations
 from pathlib import Path
 from typing import Any, ClassVar
 
+from dsc.annotations import Namespace, class_statement, evaluated
 from dsc.calls import Ended, SkillCall, Status
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
-from dsc.components.parameters import Parameter, Parameters, check_declarations
+from dsc.components.parameters import Configuration, Parameters
 from dsc.components.ports import TAKES, EventActivations
 from dsc.components.streams import Push, Stream
 from dsc.outcomes import Outcome
@@ -31,12 +33,11 @@ class ComponentHooks:
         concurrent: whether the component executes several skills concurrently. If not, steps of a plan that use the
             component never overlap; plots may still start its skills in parallel.
         modes: the sub-states of Alive besides `neutral`; if empty, any mode is valid.
-        declares: the parameters with type, range and the roles that may change them; if empty, any name is valid.
-        relations: conditions between the parameters that must always be true.
         device_errors: exceptions that report a failed device, e.g. `(OSError,)`: a skill that raises one ends with
             `skill_error`, and a hook leads to FatalError. Every other exception is a programming error.
         needs: for each mode, a tuple of names of required components; the key `ALWAYS` applies in every mode.
-        parameters: the present values, by name.
+        parameters: the present values. A component declares its parameters by a subclass: `parameters: BaseParameters`;
+            without one, any name is valid.
         life: the life cycle. When the device is lost, call `self.life.become(Life.FATAL_ERROR, "no power")`.
     """
 
@@ -44,12 +45,11 @@ class ComponentHooks:
     domain: ClassVar[Path | str | None] = None
     concurrent: bool = False
     modes: ClassVar[tuple[str, ...]] = ()
-    declares: ClassVar[Mapping[str, Parameter]] = {}
-    relations: ClassVar[tuple[str, ...]] = ()
     device_errors: ClassVar[tuple[type[BaseException], ...]] = ()
     needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     parameters: Parameters
+    configuration: Configuration
     life: LifeCycle
 
     async def start(self) -> None:
@@ -70,13 +70,13 @@ class ComponentHooks:
         """Set a named parameter, for the *param* port; override to react to the new value.
 
         The value `None` resets a declared parameter. The parameters that depend on the named parameter are reset too,
-        see `Parameter.depends_on`.
+        see `parameter`.
 
         Raises:
             UnknownNameError: the component declares parameters, and `parameter` is not among them.
             InputError: the value violates its declaration or a relation.
         """
-        self.parameters.configure(parameter, value)
+        self.configuration.set(parameter, value)
 
     async def switch(self, mode: str) -> None:
         """Enter a mode (`neutral` when idle), for the *state* port; override to react."""
@@ -125,24 +125,30 @@ class Component(ComponentHooks, RestartHooks):
 
     Attributes:
         activations: the activations of the component's events.
+        parameter_class: the class in the annotation of `parameters`.
         pushes: the push ports, by name; see `dsc.components.streams`.
         streams: the subscriptions to push ports of other components, by name.
     """
 
+    parameter_class: ClassVar[type[Parameters]] = Parameters
     _ports: ClassVar[Mapping[str, Push | Stream]] = {}
     _functions: Mapping[str, SkillBody] = {}  # skills that are functions, by name
 
     def __init_subclass__(cls, **named: Any) -> None:
-        """Validate the declared parameters, and collect the ports; raise `InputError` for an invalid declaration."""
+        """Collect the class of the parameters and the ports; raise `InputError` for an invalid declaration."""
         super().__init_subclass__(**named)
-        for check in (_check_parameters, _require_exceptions, _refuse_hidden):
+        for check in (_require_exceptions, _refuse_hidden):
             with tolerated():
                 check(cls)
+        if "parameters" in get_annotations(cls):
+            with class_statement(cls) as names:
+                cls.parameter_class = _parameter_class(cls, names)
         cls._ports = {name: one for name, one in inspect.getmembers(cls) if isinstance(one, Push | Stream)}
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
-        self.parameters = Parameters(self.name, self.declares, self.relations)
+        self.configuration = Configuration(self.name, self.parameter_class)
+        self.parameters = self.configuration.parameters
         self.life = LifeCycle(self.name, self.device_errors)
         self.activations = EventActivations()
         self.pushes: dict[str, Push] = {}
@@ -195,8 +201,7 @@ class Component(ComponentHooks, RestartHooks):
                 f"component '{self.name}' has no skill '{skill_name}'", found=skill_name, valid=signatures
             )
         check_arguments(signature, arguments)
-        if self.declares:
-            self.parameters.require_bound()
+        self.configuration.require_bound()
         body = self._functions.get(skill_name) or getattr(self, skill_name)
         declared: Declared = getattr(body, DECLARED)
         return declared.carry_out(self, body, call, arguments)
@@ -211,7 +216,7 @@ class Component(ComponentHooks, RestartHooks):
             UnknownNameError: the component declares parameters, and a name is not among them.
             InputError: a value violates its declaration or a relation; then no value is set.
         """
-        with self.parameters.as_one_set(values):
+        with self.configuration.as_one_set(values):
             for parameter, value in values.items():
                 await self.configure(parameter, value)
 
@@ -273,8 +278,14 @@ class Component(ComponentHooks, RestartHooks):
         }
 
 
-def _check_parameters(kind: type[Component]) -> None:
-    check_declarations(kind.name or kind.__name__.lower(), kind.declares, kind.relations, kind.__module__)
+def _parameter_class(kind: type[Component], names: Namespace) -> type[Parameters]:
+    """Return the class that the annotation of `parameters` names; raise `SchemaError` if it is none."""
+    said = f"`parameters` of {kind.__qualname__}"
+    found = evaluated(get_annotations(kind)["parameters"], names, said)
+    if isinstance(found, type) and issubclass(found, Parameters):
+        return found
+    shown = getattr(found, "__name__", None) or str(found)
+    raise SchemaError(f"the annotation of {said} is {shown}, which is not a subclass of Parameters", found=shown)
 
 
 def _refuse_hidden(kind: type[Component]) -> None:

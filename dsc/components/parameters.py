@@ -1,125 +1,191 @@
-"""Parameters of components: a builder declares ranges, an integrator sets values, others change them (S1.11)."""
+"""Parameters of components as typed classes (S1.11, S2.11).
+
+A builder declares the range of each parameter, an integrator sets values, and others change them.
+
+```python
+class BaseParameters(Parameters):
+    speed: float = parameter(0.5, least=0.1, most=1.5)  # metres per second
+    navigation: Literal["planned", "reactive"] = "planned"
+    port: str = parameter(changed_by="profile")  # a profile must set it
+
+
+class Base(Component):
+    parameters: BaseParameters
+```
+
+A type checker verifies each use, e.g. `self.parameters.speed`.
+"""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cache
-from graphlib import CycleError, TopologicalSorter
-from typing import Any, Literal, get_args
+from functools import partial
+from inspect import get_annotations
+from typing import Any, ClassVar, Literal, TypeVar, dataclass_transform, get_args, get_origin, overload
 
-from dsc.errors import SkillError
-from dsc.model.ranges import Range, Who, refuse_change, written
-from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
+from dsc.annotations import Namespace, class_statement, evaluated, is_class_variable, members, type_of
+from dsc.components.declarations import Parameter, Type, changed, check_declarations, known, missing, violated
+from dsc.model.ranges import Who, refuse_change
+from knowledge_base.errors import SchemaError, tolerated
 from knowledge_base.facts import Value
-from knowledge_base.language.evaluation.evaluator import evaluate_term, holds
-from knowledge_base.language.syntax.expression import free_variables
-from knowledge_base.language.syntax.text import parse_condition, parse_term
-from knowledge_base.world.overlay import Overlay
-from knowledge_base.world.schema import Schema
-from knowledge_base.world.state import WorldState
 
-Type = Literal["number", "text", "boolean"]
-_term = cache(parse_term)
-_NOTHING = Overlay(WorldState(Schema()))
+_T = TypeVar("_T", bound=Value)
 
 
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    """The declaration of one parameter by the component's builder.
+@overload
+def parameter(
+    default: _T,
+    *,
+    least: float | None = ...,
+    most: float | None = ...,
+    changed_by: Who = ...,
+    depends_on: tuple[str, ...] = ...,
+) -> _T: ...
+@overload
+def parameter(
+    *,
+    least: float | None = ...,
+    most: float | None = ...,
+    changed_by: Who = ...,
+    follows: str | None = ...,
+    depends_on: tuple[str, ...] = ...,
+) -> Any: ...
+def parameter(default: Value | None = None, **declared: Any) -> Any:
+    """Declare the default, range and roles of a parameter in a subclass of `Parameters`; the annotation is the type.
+
+    Args:
+        default: the value until another value is set; without a default, a profile must set the value.
+        declared: see `Parameter`: `least`, `most`, `changed_by`, `follows` and `depends_on`.
+    """
+    return partial(Parameter, default=default, **declared)
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter,))
+class Parameters(Mapping[str, Any]):
+    """The present values of one component's parameters, as attributes and by name; only the component sets them.
+
+    The annotations of a subclass declare the parameters: `float` and `int`, `bool`, `str`, or a `Literal` of the
+    permitted values. The value in the class is the default, or a `parameter(...)`. A component without a subclass has
+    any parameters, e.g. `self.parameters["speed"]`.
 
     Attributes:
-        type: `number`, `text` (any word) or `boolean`.
-        default: the value until another value is set; without a default, a profile must set the value.
-        least: the smallest permitted number.
-        most: the largest permitted number.
-        among: the permitted values; empty permits any value.
-        changed_by: the role that may change the value: `nobody`; a `profile`, before a run; an `operator`, during a
-            run; the `rules` of plots, after a failure; `plots` anywhere. Each role includes the roles listed before it.
-        follows: instead of a default, a term over other parameters, e.g. `(* 0.5 ?cycle)`.
-        depends_on: parameters that the value depends on, besides those in `follows`. A new value of such a parameter
-            resets this parameter to its default, to the value of its term, or to no value.
+        relations: conditions between the parameters that must always be true, e.g. `(<= ?speed (* 0.5 ?cycle))`.
+        declared: the declarations, by name.
     """
 
-    type: Type
-    default: Value | None = None
-    least: float | None = None
-    most: float | None = None
-    among: tuple[Value, ...] = ()
-    changed_by: Who = "plots"
-    follows: str | None = None
-    depends_on: tuple[str, ...] = ()
+    relations: ClassVar[tuple[str, ...]] = ()
+    declared: ClassVar[Mapping[str, Parameter]] = {}
 
-    @property
-    def reasons(self) -> frozenset[str]:
-        """Names of the parameters that this one's value depends on."""
-        return frozenset(self.depends_on) | (free_variables(_term(self.follows)) if self.follows else frozenset())
+    def __init__(self, component: str, values: Mapping[str, Any]) -> None:
+        vars(self).update(_component=component, _values=values)
 
-    def unset(self, values: Mapping[str, Value]) -> Value | None:
-        """Return the value that applies while no role has set one, computed from the `values` of other parameters.
+    def __init_subclass__(cls) -> None:
+        """Declare the parameters of a component.
 
-        The result is `None` if the parameter has no value then.
+        Raises:
+            InputError: an annotation, range, default or relation is not valid; the message has the line of the class.
         """
-        if self.follows is None:
-            return self.default
-        term = _term(self.follows)
-        if not all(name in values for name in free_variables(term)):
-            return None
-        found = evaluate_term(term, _NOTHING, values)
-        return found if isinstance(found, str | int | float | bool) else None
+        with class_statement(cls) as names:
+            cls.declared = {**cls.declared, **dict(_declared(cls, names))}
+            check_declarations(cls.__qualname__, cls.declared, cls.relations)
 
-    @property
-    def range(self) -> Range:
-        """Permitted values of the parameter."""
-        return Range(self.type, self.least, self.most, self.among)
+    def __getitem__(self, name: str) -> Any:
+        return vars(self)["_values"][name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(vars(self)["_values"])
+
+    def __len__(self) -> int:
+        return len(vars(self)["_values"])
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"'{name}' cannot be set here; use `await self.configure({name!r}, …)` of the component")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in self.items())})"
 
 
-class NoValueError(SchemaError, SkillError):
-    """A declared parameter has no value; a profile or an operator may set it."""
+def _declared(kind: type[Parameters], names: Namespace) -> Iterator[tuple[str, Parameter]]:
+    """Yield the parameters that the annotations of a class declare, and give the class an attribute for each."""
+    annotations = get_annotations(kind)
+    for name, value in vars(kind).items():
+        if name not in annotations and isinstance(value, partial | str | int | float) and name not in _TAKEN:
+            message = f"'{name}' of {kind.__qualname__} has no annotation, which is the type: {name}: float = …"
+            raise SchemaError(message, found=name)
+    for name, annotation in annotations.items():
+        if is_class_variable(annotation):
+            continue
+        said = f"parameter '{name}' of {kind.__qualname__}"
+        if name in _TAKEN:
+            raise SchemaError(f"{said} hides an attribute of every `Parameters`; choose another name", found=name)
+        given = vars(kind).get(name)
+        made = given if isinstance(given, partial) else partial(Parameter, default=given)
+        yield name, made(**_typed(evaluated(annotation, names, said), said))
+        setattr(kind, name, property(partial(_value, name)))
 
 
-class Parameters(dict[str, Any]):
-    """The present values of one component's parameters.
+def _typed(annotation: object, said: str) -> dict[str, Any]:
+    """Return the type, and the permitted values, that an annotation declares."""
+    among = get_args(annotation) if get_origin(annotation) is Literal else ()
+    kind = type_of(annotation) if [*members(annotation)] == [annotation] else None
+    if kind not in get_args(Type):
+        shown = getattr(annotation, "__name__", None) or str(annotation)
+        valid = "float, int, bool, str or a Literal of one type"
+        raise SchemaError(f"the annotation of {said} is {shown}, which is none of {valid}", found=shown)
+    whole = annotation is int or (bool(among) and all(isinstance(one, int) for one in among))
+    return {"type": kind, "among": among, "whole": whole and kind == "number"}
+
+
+def _value(name: str, parameters: Parameters) -> Value:
+    values = vars(parameters)["_values"]
+    if name not in values:
+        raise missing(vars(parameters)["_component"], name, parameters.declared)
+    return values[name]  # type: ignore[no-any-return]  # values are checked when they are set
+
+
+_TAKEN = frozenset({*dir(Parameters)})
+
+
+class Configuration:
+    """The values of one component's parameters, and the operations that set them.
 
     Args:
         component: the component's name, for messages.
-        declared: the declarations; if empty, any name is valid.
-        relations: conditions over the parameters, e.g. `(<= ?speed (* 0.5 ?cycle))`. Each must be true as soon as all
-            its parameters have values.
+        kind: the class of the parameters; `Parameters` itself permits any name.
     """
 
-    def __init__(self, component: str, declared: Mapping[str, Parameter], relations: Iterable[str]) -> None:
-        super().__init__()
-        with tolerated():
-            self.update(_changed(component, declared, {}, dict.fromkeys(declared)))
-        self._component = component
-        self._declared = dict(declared)
-        self._relations = tuple(relations)
+    def __init__(self, component: str, kind: type[Parameters]) -> None:
+        self.component = component
+        self.declared = kind.declared
+        self._relations = kind.relations
         self._as_one_set = False
+        self._values: dict[str, Any] = {}
+        with tolerated():
+            self._values |= changed(component, self.declared, {}, dict.fromkeys(self.declared))
+        self.parameters = kind(component, self._values)
 
-    def configure(self, name: str, value: Any) -> None:
+    def set(self, name: str, value: Any) -> None:
         """Set a parameter; `None` resets a declared one.
 
         Raises:
             UnknownNameError: the component declares parameters, and `name` is not among them.
             InputError: the value violates its declaration or a relation.
         """
-        after = self._after(self, {name: value})
+        after = self._after(self._values, {name: value})
         if not self._as_one_set:
             self._check_relations(after)
         self.replace(after)
 
     @contextmanager
     def as_one_set(self, values: Mapping[str, Any]) -> Iterator[None]:
-        """Validate values as one set; inside the block, `configure` checks no relations.
+        """Validate values as one set; inside the block, `set` checks no relations.
 
         Raises:
             UnknownNameError: the component declares parameters, and a name is not among them.
             InputError: a value violates its declaration or a relation.
         """
-        after: Mapping[str, Any] = self
+        after: Mapping[str, Any] = self._values
         for name, value in values.items():
             after = self._after(after, {name: value})
         self._check_relations(after)
@@ -137,8 +203,8 @@ class Parameters(dict[str, Any]):
             InputError: the role `who` may not change the parameter, or the value violates its declaration or a
                 relation.
         """
-        refuse_change(f"{self._component}.{name}", who, known(self._component, name, self._declared).changed_by)
-        self._check_relations(self._after(self, {name: value}))
+        refuse_change(f"{self.component}.{name}", who, known(self.component, name, self.declared).changed_by)
+        self._check_relations(self._after(self._values, {name: value}))
 
     def after(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Return the values after the settings of a profile.
@@ -146,7 +212,7 @@ class Parameters(dict[str, Any]):
         Raises:
             SchemaError: a parameter has no value, a setting violates its declaration, or a relation is false.
         """
-        found = self._after(self, settings)
+        found = self._after(self._values, settings)
         self._require_bound(found)
         self._check_relations(found)
         return found
@@ -154,148 +220,26 @@ class Parameters(dict[str, Any]):
     def replace(self, values: Mapping[str, Any]) -> None:
         """Replace all values without validation."""
         found = dict(values)
-        self.clear()
-        self.update(found)
+        self._values.clear()
+        self._values.update(found)
 
     def require_bound(self) -> None:
         """Raise `NoValueError` if a declared parameter has no value; the message has the reason."""
-        self._require_bound(self)
+        self._require_bound(self._values)
 
     def _require_bound(self, values: Mapping[str, Any]) -> None:
-        for name, parameter in self._declared.items():
+        for name in self.declared:
             if name not in values:
-                reasons = ", ".join(f"'{reason}'" for reason in sorted(parameter.reasons))
-                reset = f", and a new value of {reasons} resets it" if reasons else ""
-                message = f"'{self._component}.{name}' has no value: its builder leaves it to a profile{reset}"
-                raise NoValueError(message, found=name)
+                raise missing(self.component, name, self.declared)
 
     def _after(self, values: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-        if not self._declared:
+        if not self.declared:
             return {**values, **settings}
         for name in settings:
-            known(self._component, name, self._declared)
-        return _changed(self._component, self._declared, values, settings)
+            known(self.component, name, self.declared)
+        return changed(self.component, self.declared, values, settings)
 
     def _check_relations(self, values: Mapping[str, Any]) -> None:
         for text in self._relations:
-            condition = parse_condition(text)
-            read = sorted(free_variables(condition))
-            if all(name in values for name in read) and not holds(condition, _NOTHING, values):
-                found = ", ".join(f"{name} is {written(values[name])}" for name in read)
-                raise SchemaError(f"component '{self._component}' needs {text}, but {found}")
-
-
-def known(component: str, name: str, declared: Mapping[str, Parameter]) -> Parameter:
-    """Return the declaration of a parameter; raise `UnknownNameError` if it is missing."""
-    if name not in declared:
-        message = f"component '{component}' has no parameter '{name}'"
-        raise UnknownNameError(message, found=name, valid=declared)
-    return declared[name]
-
-
-def _changed(
-    component: str, declared: Mapping[str, Parameter], values: Mapping[str, Value], settings: Mapping[str, Value | None]
-) -> dict[str, Value]:
-    """Return the values of all parameters after new settings; the setting `None` resets a parameter.
-
-    A new setting resets the parameters that depend on it, unless they have a new setting too (S1.11). This applies also
-    if the setting equals the former value. So the last settings, in order, determine all values, also after a restart.
-
-    Raises:
-        InputError: a value violates its declaration, also a value that is computed by `follows`.
-    """
-    found, others = dict(values), set[str]()
-    reasons = {name: parameter.reasons for name, parameter in declared.items()}
-    for name in TopologicalSorter(reasons).static_order():
-        parameter, setting = declared[name], settings.get(name)
-        if name not in settings and others.isdisjoint(reasons[name]):
-            continue
-        value = parameter.unset(found) if setting is None else setting
-        if value is None:
-            found.pop(name, None)
-        else:
-            found[name] = parameter.range.check(f"{component}.{name}", value)
-        others.add(name)
-    return found
-
-
-def check_declarations(
-    component: str, declares: Mapping[str, Parameter], relations: Iterable[str], module: str = ""
-) -> None:
-    """Validate the declarations of a component class.
-
-    Args:
-        component: the component's name, for messages.
-        declares: the parameters by name.
-        relations: conditions between the parameters.
-        module: the module of the class, for messages.
-
-    Raises:
-        InputError: a type, role or name is unknown, a range is empty, or a default is outside its range. The error is
-            also raised if a relation is not a condition. The message has the file, the parameter, the value found and
-            the nearest name.
-    """
-    try:
-        for name, parameter in declares.items():
-            _check_parameter(f"{component}.{name}", parameter)
-            _check_dependencies(f"{component}.{name}", parameter, declares)
-        try:
-            _changed(component, declares, {}, dict.fromkeys(declares))
-        except CycleError as error:
-            cycle = ", ".join(f"'{name}'" for name in error.args[1])
-            raise SchemaError(
-                f"parameters of component '{component}' depend on each other in a cycle: {cycle}"
-            ) from error
-        _check_relations(component, declares, relations)
-    except InputError as error:
-        file = getattr(sys.modules.get(module), "__file__", None)
-        error.place = Place(file) if file else None
-        raise
-
-
-def _check_parameter(name: str, parameter: Parameter) -> None:
-    if parameter.type not in get_args(Type):
-        message = f"the type of parameter '{name}' is '{parameter.type}', which does not exist"
-        raise UnknownNameError(message, found=str(parameter.type), valid=get_args(Type))
-    if parameter.changed_by not in get_args(Who):
-        message = f"parameter '{name}' is changed by '{parameter.changed_by}', which is not a role"
-        raise UnknownNameError(message, found=str(parameter.changed_by), valid=get_args(Who))
-    for problem in parameter.range.problems():
-        raise SchemaError(f"parameter '{name}': {problem}")
-    if parameter.default is not None and parameter.follows is not None:
-        raise SchemaError(f"parameter '{name}' has a default and follows from others; only one of both can be")
-    if parameter.default is not None:
-        try:
-            parameter.range.check(name, parameter.default)
-        except InputError as error:
-            found = written(parameter.default)
-            raise SchemaError(
-                f"the default of parameter '{name}' is {found}, but it is {parameter.range}",
-                found=found, valid=map(str, parameter.among),
-            ) from error  # fmt: skip
-
-
-def _check_dependencies(name: str, parameter: Parameter, declares: Mapping[str, Parameter]) -> None:
-    if isinstance(parameter.depends_on, str):
-        raise SchemaError(f"`depends_on` of parameter '{name}' is a tuple of names, not one text")
-    try:
-        reasons = parameter.reasons
-    except InputError as error:
-        raise SchemaError(f"`follows` of parameter '{name}', {parameter.follows}, is not a term: {error}") from error
-    for reason in sorted(reasons - set(declares)):
-        raise UnknownNameError(
-            f"parameter '{name}' depends on '{reason}', which is not declared", found=reason, valid=declares
-        )
-
-
-def _check_relations(component: str, declares: Mapping[str, Parameter], relations: Iterable[str]) -> None:
-    if isinstance(relations, str):
-        raise SchemaError(f"`relations` of component '{component}' is a tuple of conditions, not one text")
-    for text in relations:
-        try:
-            condition = parse_condition(text)
-        except InputError as error:
-            raise SchemaError(f"the relation {text} of component '{component}' is not a condition: {error}") from error
-        for name in sorted(free_variables(condition) - set(declares)):
-            message = f"the relation {text} of component '{component}' reads '?{name}', which it does not declare"
-            raise UnknownNameError(message, found=name, valid=declares)
+            if reason := violated(text, values):
+                raise SchemaError(f"component '{self.component}' needs {text}, but {reason}")

@@ -90,7 +90,7 @@ def event(test: _Test) -> _Test:
     with refused_at(test) as name:
         names = names_around(test.__globals__)
         own = sum(one.default is inspect.Parameter.empty for one in inspect.signature(test).parameters.values())
-        events = returned(test, names)
+        events = returned(test, names, optional=True)
         if len(events) != 1:
             raise SchemaError(f"event '{name}' returns one outcome class or None, not {len(events)} classes")
         types = parameter_types(test, own, names)

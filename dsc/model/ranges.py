@@ -37,24 +37,30 @@ class Range:
         type: `number` or `boolean`; every other type has words as values.
         least, most: lower and upper bound of a number, inclusive; `None` means no bound.
         among: the allowed values; empty means any.
+        whole: whether the numbers are integers.
     """
 
     type: str
     least: float | None = None
     most: float | None = None
     among: tuple[Value, ...] = ()
+    whole: bool = False
 
     def __str__(self) -> str:
         """Return the range in words, for messages."""
         if self.among:
             return "one of " + ", ".join(map(written, self.among))
+        bounds = self._bounds()
+        if self.whole:
+            return f"an integer {bounds}".rstrip()
+        return bounds or f"{'an' if self.type[:1] in 'aeiou' else 'a'} {self.type}"
+
+    def _bounds(self) -> str:
         if self.least is not None and self.most is not None:
             return f"from {self.least:g} to {self.most:g}"
         if self.least is not None:
             return f"{self.least:g} or more"
-        if self.most is not None:
-            return f"{self.most:g} or less"
-        return f"{'an' if self.type[:1] in 'aeiou' else 'a'} {self.type}"
+        return "" if self.most is None else f"{self.most:g} or less"
 
     def check(self, name: str, value: object) -> Value:
         """Return the value if the range contains it.
@@ -67,7 +73,7 @@ class Range:
             InputError: the value is of another type or out of range; the message has the range and the nearest word.
         """
         if isinstance(value, str | int | float | bool) and self._fits(value):
-            return value
+            return int(value) if self.whole else value
         message = f"'{name}' is {self}; found {written(value)}"
         raise InputError(message, found=str(value), valid=map(str, self.among))
 
@@ -107,6 +113,8 @@ class Range:
         if kind_of(value) != self._kind or (self.among and value not in self.among):
             return False
         if isinstance(value, float) and math.isnan(value):  # every comparison with NaN is false
+            return False
+        if self.whole and float(value) % 1:
             return False
         too_low = self.least is not None and not isinstance(value, str) and value < self.least
         too_high = self.most is not None and not isinstance(value, str) and value > self.most

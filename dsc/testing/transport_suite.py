@@ -16,7 +16,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager, suppress
 from functools import wraps
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Never
 
 import pytest
 
@@ -100,7 +100,7 @@ class SuiteRobot(Component):
         return There(to=to, observed=Delta(added=(fact("at", to),)))
 
     @skill
-    async def fall(self, call: SkillCall) -> None:
+    async def fall(self, call: SkillCall) -> Never:
         """Fail."""
         raise RuntimeError(f"{call.action_id} fell")
 

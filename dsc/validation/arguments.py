@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from dsc.components.parameters import Parameter, known
+from dsc.components.declarations import Parameter, known
 from dsc.dynamic.steps import Step, concerns, contents_of, entered_by
 from dsc.errors import Finding
 from dsc.model.actions import Assign, Configure, ExternalAction, Internal, Trigger, component_of, flat

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Literal
 
-from dsc.components.parameters import Parameter
+from dsc.components.declarations import Parameter
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Step, contents_of, is_planned
 from dsc.errors import Finding

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Literal
 
-from dsc import Component
-from dsc.components.parameters import Parameter
+from dsc import Component, Parameters, parameter
+
+
+class BaseParameters(Parameters):
+    speed: float = parameter(0.5, least=0.1, most=1.5)
+    mode: Literal["calm", "brisk"] = "calm"
+    port: str = parameter(changed_by="profile")
+    wheels: int = parameter(4, changed_by="nobody")
+    light: bool = parameter(False, changed_by="rules")  # the default
+    cycle: float = parameter(2.0, least=0)
+    relations = ("(<= ?speed (* 0.5 ?cycle))",)
 
 
 class Base(Component):
     name = "base"
-    declares: ClassVar = {
-        "speed": Parameter("number", default=0.5, least=0.1, most=1.5),
-        "mode": Parameter("text", default="calm", among=("calm", "brisk")),
-        "port": Parameter("text", changed_by="profile"),
-        "wheels": Parameter("number", default=4, changed_by="nobody"),
-        "light": Parameter("boolean", default=False, changed_by="rules"),
-        "cycle": Parameter("number", default=2.0, least=0),
-    }
-    relations = ("(<= ?speed (* 0.5 ?cycle))",)
+    parameters: BaseParameters

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, NewType
+from typing import TYPE_CHECKING, NewType
 
-from dsc import Component, Outcome, Parameter, SkillCall, skill
+from dsc import Component, Outcome, Parameters, SkillCall, parameter, skill
 from knowledge_base import Delta, fact
 
 if TYPE_CHECKING:
@@ -27,11 +27,17 @@ class PickedUp(Outcome): ...
 class PutDown(Outcome): ...
 
 
+class BaseParameters(Parameters):
+    """Values that profiles and plots may set, with their permitted range."""
+
+    speed: float = parameter(1.0, least=0.1, most=2.0)
+
+
 class Base(Component):
     """Wheels and navigation."""
 
     name = "base"
-    declares: ClassVar = {"speed": Parameter("number", default=1.0, least=0.1, most=2.0)}
+    parameters: BaseParameters
 
     def __init__(self, house: House) -> None:
         super().__init__()
@@ -39,7 +45,7 @@ class Base(Component):
 
     @skill
     async def drive(self, call: SkillCall, start: Room, to: Room) -> Arrived | DoorClosed:
-        await call.clock.sleep(10.0 / self.parameters["speed"])  # run time: simulated, or real with --real-time
+        await call.clock.sleep(10.0 / self.parameters.speed)  # run time: simulated, or real with --real-time
         if self.house.fault(call.action_id, "door_closed"):
             return DoorClosed()
         self.house.robot_in = to

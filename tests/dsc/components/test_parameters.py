@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import re
-from typing import ClassVar
+import textwrap
+from typing import Literal
 
 import pytest
 from dsc_base import Base
 
-from dsc import Component, Library, Outcome, Sequencer, parse_plot, skill, validate_plot
-from dsc.components.parameters import Parameter
+from dsc import Component, Library, Outcome, Parameters, Sequencer, parameter, parse_plot, skill, validate_plot
 from dsc.profiles import configure
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import RunEnd
@@ -75,7 +75,10 @@ INNER = parse_plot("plot: q\nemits: {lost: }\nstates: {b: {on: {done: {to: f, em
 
 def findings_of(text, setting):
     plot = parse_plot(text % setting, "p.yaml")
-    return [str(one) for one in validate_plot(plot, Library([plot, INNER]), None, [], {"base": Base.declares})]
+    return [
+        str(one)
+        for one in validate_plot(plot, Library([plot, INNER]), None, [], {"base": Base.parameter_class.declared})
+    ]
 
 
 @pytest.mark.parametrize(
@@ -113,41 +116,39 @@ def test_names_of_components_alone_say_nothing_about_their_parameters():
 # -- what a builder declares is checked when the class is made ---------------------------------------------------
 
 
-def a_class(relations=(), **declares):
-    return type(
-        "Crane", (Component,), {"name": "crane", "declares": declares, "relations": relations, "__module__": __name__}
-    )
+def a_class(body):
+    """Make a class of parameters from the text of its body."""
+    text = "from __future__ import annotations\nclass Crane(Parameters):\n" + textwrap.indent(body, "    ")
+    names = {"Literal": Literal, "Parameters": Parameters, "parameter": parameter, "__name__": __name__}
+    exec(compile(text, "crane.py", "exec", dont_inherit=True), names)  # noqa: S102  # the text is the test's
 
 
 @pytest.mark.parametrize(
-    ("declared", "said"),
+    ("body", "said"),
     [
-        (Parameter("number", default=5, least=10), "the default of parameter 'crane.lift' is 5, but it is 10 or more"),
-        (Parameter("number", default="fast"), "the default of parameter 'crane.lift' is fast, but it is a number"),
+        ("lift: float = parameter(5, least=10)", "the default of parameter 'Crane.lift' is 5, but it is 10 or more"),
+        ('lift: float = "fast"', "the default of parameter 'Crane.lift' is fast, but it is a number"),
+        ("lift: int = 2.5", "the default of parameter 'Crane.lift' is 2.5, but it is an integer"),
+        ('lift: Literal["up", "down"] = "upp"', "is upp, but it is one of up, down; did you mean 'up'?"),
+        ("lift: float = parameter(5, least=9, most=1)", "parameter 'Crane.lift': no number is 9 or more and 1 or less"),
+        ("lift: str = parameter(least=1)", "`least` and `most` are about numbers, and this is a text"),
+        ("lift: nmber = 5", "the annotation of parameter 'lift' of Crane names 'nmber', which does not exist"),
+        ("lift: list[int] = 5", "is list, which is none of float, int, bool, str or a Literal of one type"),
+        ('lift: Literal["up", 1]', "which is none of float, int, bool, str or a Literal of one type"),
+        ("lift: float | None = None", "which is none of float, int, bool, str or a Literal of one type"),
         (
-            Parameter("text", default="upp", among=("up", "down")),
-            "is upp, but it is one of up, down; did you mean 'up'?",
-        ),
-        (
-            Parameter("number", default=5, least=9, most=1),
-            "parameter 'crane.lift': no number is 9 or more and 1 or less",
-        ),
-        (Parameter("text", least=1), "`least` and `most` are about numbers, and this is a text"),
-        (
-            Parameter("nmber", default=5),  # type: ignore[arg-type]
-            "the type of parameter 'crane.lift' is 'nmber', which does not exist; did you mean 'number'?",
-        ),
-        (
-            Parameter("number", default=5, changed_by="operater"),  # type: ignore[arg-type]
+            'lift: float = parameter(5, changed_by="operater")',
             "'operater', which is not a role; did you mean 'operator'?",
         ),
+        ("lift = 5", "'lift' of Crane has no annotation, which is the type: lift: float = …"),
+        ("values: float = 5", "parameter 'values' of Crane hides an attribute of every `Parameters`"),
     ],
 )
-def test_a_parameter_that_cannot_be_meant_is_refused_with_its_file(declared, said):
+def test_a_parameter_that_cannot_be_meant_is_refused_with_its_line(body, said):
     with pytest.raises(InputError) as refused:
-        a_class(lift=declared)
+        a_class(body)
     assert said in str(refused.value)
-    assert str(refused.value).startswith(f"{__file__}: ")
+    assert str(refused.value).startswith("crane.py:2: ")
 
 
 @pytest.mark.parametrize(
@@ -155,32 +156,66 @@ def test_a_parameter_that_cannot_be_meant_is_refused_with_its_file(declared, sai
     [
         (
             ("(< ?lft 3)",),
-            "the relation (< ?lft 3) of component 'crane' reads '?lft', which it does not declare; did you mean 'lift'?",
+            "the relation (< ?lft 3) of Crane reads '?lft', which it does not declare; did you mean 'lift'?",
         ),
-        (("(< ?lift 3",), "the relation (< ?lift 3 of component 'crane' is not a condition"),
-        ("(< ?lift 3)", "`relations` of component 'crane' is a tuple of conditions, not one text"),
+        (("(< ?lift 3",), "the relation (< ?lift 3 of Crane is not a condition"),
+        ("(< ?lift 3)", "`relations` of Crane is a tuple of conditions, not one text"),
     ],
 )
 def test_a_relation_that_cannot_be_meant_is_refused(relations, said):
     with pytest.raises(InputError) as refused:
-        a_class(relations, lift=Parameter("number", default=1))
+        a_class(f"lift: float = 1\nrelations = {relations!r}")
     assert said in str(refused.value)
+
+
+def test_the_annotation_of_parameters_names_a_class_of_parameters():
+    with pytest.raises(InputError, match=r"`parameters` of .*Crane is dict, which is not a subclass of Parameters"):
+
+        class Crane(Component):
+            parameters: dict  # type: ignore[assignment,type-arg]
+
+
+def test_skills_read_parameters_and_only_the_component_sets_them():
+    base = Base()
+    assert base.parameters.speed == base.parameters["speed"] == 0.5
+    with pytest.raises(InputError, match=r"'base\.port' has no value: its builder leaves it to a profile"):
+        _ = base.parameters.port
+    with pytest.raises(AttributeError, match=r"use `await self\.configure\('speed', …\)` of the component"):
+        base.parameters.speed = 1.0  # type: ignore[misc]
+
+
+def test_a_whole_number_stays_an_integer():
+    class WheelParameters(Parameters):
+        teeth: int = parameter(9, least=1)
+        step: Literal[1, 2, 4] = 1
+
+    class Wheel(Component):
+        parameters: WheelParameters
+
+    wheel = Wheel()
+    asyncio.run(wheel.configure("teeth", 12.0))
+    assert repr(wheel.parameters) == "WheelParameters(teeth=12, step=1)"
+    for name, value, said in (("teeth", 2.5, "is an integer 1 or more; found 2.5"), ("step", 3, "is one of 1, 2, 4")):
+        with pytest.raises(InputError, match=f"'wheel.{name}' {said}"):
+            asyncio.run(wheel.configure(name, value))
 
 
 # -- what relies on other parameters ---------------------------------------------------------------------------
 
 
-class Axle(Component):
+class AxleParameters(Parameters):
     """A worst-case time that is measured for each processor, and what follows from it (S1.11)."""
 
-    name = "axle"
-    declares: ClassVar = {
-        "period": Parameter("number", follows="(* 2 ?worst)", most=100),
-        "processor": Parameter("text", default="a", among=("a", "b"), changed_by="operator"),
-        "worst": Parameter("number", default=3, depends_on=("processor",)),
-        "label": Parameter("text", changed_by="profile", depends_on=("period",)),
-    }
+    period: float = parameter(follows="(* 2 ?worst)", most=100)
+    processor: Literal["a", "b"] = parameter("a", changed_by="operator")
+    worst: float = parameter(3, depends_on=("processor",))
+    label: str = parameter(changed_by="profile", depends_on=("period",))
     relations = ("(>= ?period ?worst)",)
+
+
+class Axle(Component):
+    name = "axle"
+    parameters: AxleParameters
 
 
 def axle(**said):
@@ -226,26 +261,26 @@ def test_a_profile_binds_what_relies_on_each_other_at_once():
 
 
 @pytest.mark.parametrize(
-    ("declared", "said"),
+    ("body", "said"),
     [
         (
-            Parameter("number", follows="(* 2 ?lft)"),
-            "parameter 'crane.lift' depends on 'lft', which is not declared; did you mean 'lift'?",
+            'lift: float = parameter(follows="(* 2 ?lft)")',
+            "parameter 'Crane.lift' depends on 'lft', which is not declared; did you mean 'lift'?",
         ),
-        (Parameter("number", default=1, depends_on=("lft",)), "depends on 'lft', which is not declared"),
+        ('lift: float = parameter(1, depends_on=("lft",))', "depends on 'lft', which is not declared"),
         (
-            Parameter("number", follows="(* 2 ?lift)"),
-            "parameters of component 'crane' depend on each other in a cycle: 'lift', 'lift'",
+            'lift: float = parameter(follows="(* 2 ?lift)")',
+            "parameters of Crane depend on each other in a cycle: 'lift', 'lift'",
         ),
-        (Parameter("number", default=1, follows="2"), "has a default and follows from others"),
-        (Parameter("number", follows="(* 2"), "is not a term"),
-        (Parameter("number", follows="2", most=1), "'crane.lift' is 1 or less; found 2"),
-        (Parameter("number", default=1, depends_on="lift"), "is a tuple of names, not one text"),  # type: ignore[arg-type]
+        ('lift: float = parameter(1, follows="2")', "has a default and follows from others"),
+        ('lift: float = parameter(follows="(* 2")', "is not a term"),
+        ('lift: float = parameter(follows="2", most=1)', "'Crane.lift' is 1 or less; found 2"),
+        ('lift: float = parameter(1, depends_on="lift")', "is a tuple of names, not one text"),
     ],
 )
-def test_a_dependency_that_cannot_be_meant_is_refused(declared, said):
+def test_a_dependency_that_cannot_be_meant_is_refused(body, said):
     with pytest.raises(InputError) as refused:
-        a_class(lift=declared)
+        a_class(body)
     assert said in str(refused.value)
 
 
@@ -253,12 +288,13 @@ class Rolled(Outcome): ...
 
 
 def test_an_operator_changes_what_others_rely_on_and_the_next_skill_says_what_is_missing():
+    class WheelParameters(Parameters):
+        tyre: Literal["soft", "hard"] = parameter("soft", changed_by="operator")
+        slip: float = parameter(changed_by="operator", depends_on=("tyre",))
+
     class Wheel(Component):
         name = "wheel"
-        declares: ClassVar = {
-            "tyre": Parameter("text", default="soft", among=("soft", "hard"), changed_by="operator"),
-            "slip": Parameter("number", changed_by="operator", depends_on=("tyre",)),
-        }
+        parameters: WheelParameters
 
         @skill
         async def roll(self, call) -> Rolled:

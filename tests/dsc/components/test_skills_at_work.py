@@ -7,7 +7,7 @@ import math
 import re
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Never
 
 import pytest
 from dsc_runs import SLOW, Arm, Ran
@@ -556,8 +556,8 @@ def test_a_component_tells_its_skills():
 def test_arguments_are_checked_against_the_signature():
     class Strict(Component):
         @skill
-        async def go(self, call, to, speed=1) -> None:
-            return Outcome("ok")  # type: ignore[return-value]
+        async def go(self, call, to, speed=1) -> Never:
+            raise NotImplementedError
 
     signature = Strict().skills()["go"]
     check_arguments(signature, {"to": 1})

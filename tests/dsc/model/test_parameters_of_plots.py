@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import re
-from typing import ClassVar
 
 import pytest
 from dsc_crashes import Crashes, Robot
 from dsc_runs import Ran
 
 from dsc import Component, Library, Outcome, Sequencer, parse_plot, skill, validate_plot
-from dsc.components.parameters import Parameter
+from dsc.components.parameters import Parameters, parameter
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.replay import replay
@@ -149,15 +148,17 @@ def test_what_only_the_run_knows_is_checked_when_the_plot_is_entered():
 class Arrived(Outcome): ...
 
 
+class BaseParameters(Parameters):
+    speed: float = parameter(0.5, least=0.1, most=1.5, changed_by="operator")
+    light: bool = False
+    port: str = parameter("a", changed_by="profile")
+    cycle: float = 2.0
+    relations = ("(<= ?speed (* 0.5 ?cycle))",)
+
+
 class Base(Component):
     name = "base"
-    declares: ClassVar = {
-        "speed": Parameter("number", default=0.5, least=0.1, most=1.5, changed_by="operator"),
-        "light": Parameter("boolean", default=False),
-        "port": Parameter("text", default="a", changed_by="profile"),
-        "cycle": Parameter("number", default=2.0),
-    }
-    relations = ("(<= ?speed (* 0.5 ?cycle))",)
+    parameters: BaseParameters
 
     def __init__(self):
         super().__init__()
@@ -165,7 +166,7 @@ class Base(Component):
 
     @skill
     async def drive(self, call) -> Arrived:
-        self.driven.append(self.parameters["speed"])
+        self.driven.append(self.parameters.speed)
         await call.clock.sleep(1.0)
         return Arrived()
 
@@ -233,8 +234,12 @@ def test_what_rules_and_plots_may_change_an_operator_may_too():
     assert driven(lambda run: run.set_parameter("base", "light", value=True)) == ([0.5, 0.5], 22.0)
 
 
+class DialParameters(Parameters):
+    speed: int = parameter(1, least=1, most=9, changed_by="operator")
+
+
 class Dial(Robot):
-    declares: ClassVar = {"speed": Parameter("number", default=1, least=1, most=9, changed_by="operator")}
+    parameters: DialParameters
 
 
 KEPT = """

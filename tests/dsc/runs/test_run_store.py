@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from types import MappingProxyType
 
 import pytest
 from dsc_crashes import Crashes, Robot, Run, copied
@@ -12,7 +11,7 @@ from dsc_kept_charts import CHARTS, handed_in
 from dsc_runs import SCHEMA, Ran
 
 from dsc.calls import Ended, Status
-from dsc.components.parameters import Parameter
+from dsc.components.parameters import Parameters, parameter
 from dsc.dynamic.library import Library
 from dsc.errors import ChangedError
 from dsc.events import Event
@@ -174,14 +173,14 @@ def test_what_is_in_force_is_told_again_before_anything_goes_on(tmp_path):
     assert last.robot.parameters == {"speed": 2}
 
 
-class Related(Robot):
-    declares = MappingProxyType(
-        {
-            "speed": Parameter("number", default=0.5, least=0.1, most=10.0),
-            "wheels": Parameter("number", default=4),
-        }
-    )
+class RelatedParameters(Parameters):
+    speed: float = parameter(0.5, least=0.1, most=10.0)
+    wheels: int = 4
     relations = ("(<= ?speed (/ ?wheels 4))",)
+
+
+class Related(Robot):
+    parameters: RelatedParameters
 
 
 def test_parameters_in_force_come_back_as_one_set_whatever_order_they_were_set_in(tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from dsc_charts import plot
 
 from dsc.components.component import Component
-from dsc.components.parameters import Parameter
+from dsc.components.declarations import Parameter
 from dsc.dynamic.library import Library
 from dsc.errors import PlotError
 from dsc.model.plot import ActionPlot

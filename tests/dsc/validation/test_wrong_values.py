@@ -130,7 +130,7 @@ def sequencer_of(**other):
         (lambda: load_library("/nowhere"), "there are no plots (*.yaml) in '/nowhere'"),
         (lambda: ActionPlot.model_validate("p"), "a mapping was expected; found 'p'"),
         (lambda: skill({"ok": {}}), "`@skill` decorates a function, whose annotations declare it, not {'ok': {}}"),  # type: ignore[call-overload]
-        (lambda: skill(lambda call: None), "'<lambda>' has no return annotation; write its outcomes"),
+        (lambda: skill(lambda call: None), "'<lambda>' has no return annotation; write its outcomes"),  # type: ignore[type-var]
         (lambda: skill(blocking="tread"), "blocks in a thread or a process, not 'tread'; did you mean 'thread'?"),  # type: ignore[call-overload]
         (lambda: query(["hours"]), "`@query` decorates a function, whose annotations declare it, not ['hours']"),  # type: ignore[type-var]
         (lambda: event(5), "`@event` decorates a function, whose annotations declare it, not 5"),  # type: ignore[type-var]
@@ -158,13 +158,13 @@ def test_a_wrong_value_is_refused_in_words(act, said):
 
 
 def not_a_coroutine():
-    @skill
+    @skill  # type: ignore[type-var]
     def go(call) -> Ok:
         return Ok()
 
 
 def a_blocking_coroutine():
-    @skill(blocking="thread")
+    @skill(blocking="thread")  # type: ignore[type-var]
     async def go(call) -> Ok:
         return Ok()
 
@@ -201,6 +201,13 @@ def no_outcome():
     class Arm(Component):
         @skill  # type: ignore[type-var]
         async def go(self, call) -> Ok | str:
+            return Ok()
+
+
+def perhaps_an_outcome():
+    class Arm(Component):
+        @skill  # type: ignore[type-var]
+        async def go(self, call) -> Ok | None:
             return Ok()
 
 
@@ -247,6 +254,10 @@ def a_hidden_method():
         (without_outcomes, "'Arm.go' has no return annotation; write its outcomes, as in `-> Grasped | Slipped`"),
         (any_outcome, "the returned value of 'Arm.go' is any Outcome; name its classes, as in `-> Grasped | Slipped`"),
         (no_outcome, "the returned value of 'Arm.go' names str, which is not a subclass of Outcome"),
+        (
+            perhaps_an_outcome,
+            "the returned value of 'Arm.go' may be None, which is not an outcome; a skill that never ends has `-> Never`",
+        ),
         (two_classes_of_one_event, "the returned value of 'Arm.go' names two classes for the event 'ok'"),
         (an_unknown_report, "names 'Progres', which does not exist when the class is made; did you mean 'Progress'?"),
         (two_answers, "query 'Arm.free' returns one outcome class, the answer, not 2"),

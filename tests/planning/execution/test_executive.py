@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 import pytest
 
 from dsc import Component, Event, Library, Outcome, SkillCall, Stream, parse_plot, primitive_plot, skill
-from dsc.components.parameters import Parameter
+from dsc.components.parameters import Parameters, parameter
 from dsc.errors import PlotError, SkillError
 from dsc.reflection import MODELS, design_facts
 from dsc.trace import Record
@@ -614,21 +614,27 @@ def test_bounds_that_make_no_sense_are_refused(bounds):
 
 
 def test_a_component_whose_parameter_nobody_has_said_is_refused_before_anything_runs():
+    class LaserParameters(Parameters):
+        port: str = parameter(changed_by="profile")
+        rate: int = 30
+        most: int = 20
+        relations = ("(<= ?rate ?most)",)
+
     class Laser(Component):
         name = "laser"
-        declares: ClassVar = {
-            "port": Parameter("text", changed_by="profile"),
-            "rate": Parameter("number", default=30),
-            "most": Parameter("number", default=20),
-        }
-        relations = ("(<= ?rate ?most)",)
+        parameters: LaserParameters
 
     with pytest.raises(InputError, match=r"'laser\.port' has no value: its builder leaves it to a profile"):
         Executive("(define (domain d))", [], [Laser()])
-    bound = Laser()
-    bound.parameters["port"] = "ttyS0"
+
+    class BoundParameters(LaserParameters):
+        port: str = "ttyS0"
+
+    class Bound(Laser):
+        parameters: BoundParameters
+
     with pytest.raises(InputError, match=r"component 'laser' needs .<= .rate .most., but most is 20, rate is 30"):
-        Executive("(define (domain d))", [], [bound])
+        Executive("(define (domain d))", [], [Bound()])
 
 
 def test_plots_ask_for_rules_if_the_knowledge_has_the_design():

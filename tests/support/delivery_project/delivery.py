@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
-from dsc import Component, Outcome, Parameter, SkillCall, skill
+from dsc import Component, Outcome, Parameters, SkillCall, parameter, skill
 from knowledge_base import Delta, fact
 from planning import Bundle, Left, Setup, Simulation
 
@@ -58,9 +58,13 @@ class Taken(Outcome): ...
 class Put(Outcome): ...
 
 
+class WheelsParameters(Parameters):
+    speed: float = parameter(1.0, least=0.1, most=5.0)
+
+
 class Wheels(Component):
     name = "wheels"
-    declares: ClassVar = {"speed": Parameter("number", default=1.0, least=0.1, most=5.0)}
+    parameters: WheelsParameters
 
     def __init__(self, house: House) -> None:
         super().__init__()
@@ -68,7 +72,7 @@ class Wheels(Component):
 
     @skill
     async def drive(self, call: SkillCall, to: Room) -> Arrived | Blocked:
-        await call.clock.sleep(10.0 / self.parameters["speed"])
+        await call.clock.sleep(10.0 / self.parameters.speed)
         if os.environ.get("CRASH") == to:
             os._exit(9)
         if self.house.fault(call.action_id, "blocked"):
