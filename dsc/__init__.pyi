@@ -1,5 +1,6 @@
 from dsc.blocking import BlockingCall as BlockingCall
 from dsc.calls import Ended as Ended
+from dsc.calls import PlotCall as PlotCall
 from dsc.calls import SkillCall as SkillCall
 from dsc.calls import Status as Status
 from dsc.chance import uniform as uniform

@@ -14,11 +14,12 @@ from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType, UnionType
-from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, NewType, Union, get_args, get_origin
 
 from knowledge_base.errors import InputError, Place, SchemaError, nearest, tolerated
 
 _PLAIN: Mapping[object, str] = {bool: "boolean", int: "number", float: "number", str: "text"}
+_WORDS = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 Namespace = Mapping[str, Any]
 
 
@@ -61,13 +62,32 @@ def type_of(annotation: object) -> str | None:
         return _PLAIN[annotation]
     if get_origin(annotation) is Annotated:
         return next((one for one in get_args(annotation)[1:] if isinstance(one, str)), None)
-    if getattr(annotation, "__supertype__", None) is str:
-        return lower_name(annotation.__name__).replace("_", "-")  # type: ignore[attr-defined]  # a `NewType`
+    if isinstance(annotation, NewType):
+        return domain_type(annotation.__name__) if _made_of(annotation) is str else None
     if get_origin(annotation) is Literal:
         kinds = {type_of(type(one)) for one in get_args(annotation)}
         return kinds.pop() if len(kinds) == 1 else None
     others = [one for one in members(annotation) if one is not type(None)]
     return type_of(others[0]) if len(others) == 1 and others[0] is not annotation else None
+
+
+def domain_type(class_name: str) -> str:
+    """Return the type of the domain for the name of a class: `clean-item` for `CleanItem`."""
+    return _WORDS.sub("-", class_name).lower()
+
+
+def type_class(type_name: str) -> str:
+    """Return a name of a class for a type of the domain; `domain_type` inverts it, unless the type has other signs."""
+    words = re.split(r"\W+", type_name)
+    made = "".join(word[:1].upper() + word[1:] for word in words)
+    return made if made.isidentifier() else f"T{made}"
+
+
+def _made_of(new_type: NewType) -> object:
+    below: object = new_type
+    while isinstance(below, NewType):
+        below = below.__supertype__
+    return below
 
 
 def members(annotation: object) -> Iterator[object]:
@@ -111,7 +131,7 @@ def parameter_types(body: Callable[..., Any], own: int, names: Namespace) -> dic
 
 def lower_name(class_name: str) -> str:
     """Return the name of a class in lower case, with underscores between words."""
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", class_name).lower()
+    return _WORDS.sub("_", class_name).lower()
 
 
 def is_class_variable(annotation: object) -> bool:

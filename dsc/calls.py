@@ -1,4 +1,4 @@
-"""Calls of skills: a call's identity and clock, its reports, its outcome, and its status after a crash."""
+"""Calls of plots and skills: a call's identity and clock, its reports, its outcome, and its status after a crash."""
 
 from __future__ import annotations
 
@@ -27,6 +27,28 @@ class Clock(Protocol):
     async def sleep(self, seconds: float) -> None:
         """Wait until `seconds` of run time have passed."""
         ...
+
+
+Outputs = TypeVar("Outputs", bound=Mapping[str, Any], default=Mapping[str, Any])
+"""Outputs of a plot by name; a `TypedDict` gives them types."""
+
+
+@dataclass(frozen=True)  # without slots: `PlotCall[…](…)` sets an attribute
+class PlotCall(Generic[Outputs]):
+    """A plot with values of its parameters, as the functions return it that `dsc plot types` makes (S2.11).
+
+    Attributes:
+        plot: the name of the plot.
+        given: values by parameter; `None` leaves the parameter's default.
+    """
+
+    plot: str
+    given: Mapping[str, Any]
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The values without those that are left to defaults."""
+        return {name: value for name, value in self.given.items() if value is not None}
 
 
 Reported_contra = TypeVar("Reported_contra", bound=Outcome, contravariant=True, default=Never)

@@ -13,6 +13,7 @@ from typing import Any, Self
 
 from pydantic import ValidationError
 
+from dsc.calls import Outputs, PlotCall
 from dsc.components.component import Component
 from dsc.components.robot import require_deployed, require_instances, require_wired
 from dsc.dynamic.knowledge_situation import ACHIEVE
@@ -150,18 +151,18 @@ class Executive:
 
     def run(
         self,
-        plot: str,
+        plot: str | PlotCall[Outputs],
         arguments: Mapping[str, Any] | None = None,
         *,
         simulated: bool = True,
         open_ended: bool = False,
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
-    ) -> RunEnd:
+    ) -> RunEnd[Outputs]:
         """Run a plot to its end, and return how the run ended.
 
         Args:
-            plot: the name of the plot.
+            plot: the name of the plot, or a call with its arguments, see `dsc plot types`.
             arguments: values of the plot's parameters.
             simulated: whether the run uses simulated time, which jumps from event to event, instead of real time.
             open_ended: whether an idle run waits for events from outside, e.g. from an operator. Otherwise an idle run
@@ -178,13 +179,13 @@ class Executive:
 
     async def execute(
         self,
-        plot: str,
+        plot: str | PlotCall[Outputs],
         arguments: Mapping[str, Any] | None = None,
         *,
         open_ended: bool = False,
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
-    ) -> RunEnd:
+    ) -> RunEnd[Outputs]:
         """Run a plot inside an existing asyncio loop, e.g. with remote components, and return how the run ended.
 
         The loop determines whether time is real, or simulated by `run_simulated`. For the arguments see `run`.
@@ -324,7 +325,9 @@ class Executive:
         self.close()
 
 
-async def _to_its_end(running: Coroutine[Any, Any, RunEnd], planning: PlanningComponent, clock: LoopClock) -> RunEnd:
+async def _to_its_end(
+    running: Coroutine[Any, Any, RunEnd[Outputs]], planning: PlanningComponent, clock: LoopClock
+) -> RunEnd[Outputs]:
     with nullcontext() if clock.simulated else settled():
         try:
             return await running

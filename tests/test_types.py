@@ -8,6 +8,10 @@ from pathlib import Path
 import pytest
 from mypy import api
 
+from dsc import parse_plot
+from dsc.text.typed_plots import typed_plots
+from knowledge_base.world.schema import Schema
+
 ROOT = Path(__file__).parents[1]
 
 ROBOT = """
@@ -126,6 +130,54 @@ def test_each_planted_mistake_is_found_where_it_is(tmp_path, errors):
         line = ROBOT[: ROBOT.index(correct)].count("\n") + 1
         lines = [int(re.search(r":(\d+)", error)[1]) for error in found[f"mistake{number}"]]  # type: ignore[index]
         assert min(abs(one - line) for one in lines) <= 6, (what, found[f"mistake{number}"])
+
+
+PLOT = """
+plot: count
+parameters:
+  mug: mug
+  room: room
+  floor: {type: number, default: 1}
+outputs: {mugs: number}
+states: {e: {final: true}}
+"""
+
+CALLS = """
+from dsc import RunEnd
+from planning import Executive
+from plots import Mug, Room, count
+
+
+def counted(robot: Executive) -> float:
+    end = robot.run(count(mug=Mug("m1"), room=Room("hall"), floor=2.0))
+    return end.outputs["mugs"]
+
+
+def any_run(robot: Executive) -> RunEnd:
+    return robot.run("count", {"mug": "m1"})
+"""
+
+MISTAKEN_CALLS = (
+    ("a misspelt plot", "run(count(", "run(cuont("),
+    ("a misspelt parameter of a plot", "floor=2.0", "flor=2.0"),
+    ("a missing parameter of a plot", 'room=Room("hall"), ', ""),
+    ("an object of another type in a plot", 'room=Room("hall")', 'room=Mug("hall")'),
+    ("a value of another type in a plot", "floor=2.0", 'floor="second"'),
+    ("a misspelt output", '["mugs"]', '["mgus"]'),
+    ("an output of another type", "-> float", "-> str"),
+)
+
+
+def test_mistakes_in_calls_of_plots_are_found(tmp_path, errors, monkeypatch):
+    schema = Schema.parse("(define (domain d) (:types mug room))")
+    (tmp_path / "plots.py").write_text(typed_plots([parse_plot(PLOT)], schema))
+    (tmp_path / "correct.py").write_text(CALLS)
+    for number, (what, correct, mistaken) in enumerate(MISTAKEN_CALLS):
+        assert CALLS.count(correct) == 1, what
+        (tmp_path / f"mistake{number}.py").write_text(CALLS.replace(correct, mistaken))
+    monkeypatch.setenv("MYPYPATH", str(tmp_path))
+    found = {Path(error.partition(":")[0]).stem for error in errors(*tmp_path.glob("*.py"))}
+    assert found == {f"mistake{number}" for number in range(len(MISTAKEN_CALLS))}
 
 
 def test_the_tutorial_has_no_mistake_in_types(errors):

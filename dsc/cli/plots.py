@@ -240,6 +240,25 @@ def schema(
     print_json(profile_schema() if profile else json_schema())
 
 
+@app.command()
+def types(
+    sources: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Plots (YAML), or folders of plots.")],
+    domain: Annotated[
+        Path | None,
+        typer.Option(
+            "--domain", metavar="D.pddl", help="The types.  [default: domain.pddl beside FILE or one folder up]"
+        ),
+    ] = None,
+) -> None:
+    """Print a Python module with a typed function for each plot, for type checkers and editors."""
+    from dsc.text.plot_files import load_library
+    from dsc.text.typed_plots import typed_plots
+
+    plots = [plot for one in sources for plot in (load_library(one) if one.is_dir() else [_load(one)])]
+    first = sources[0]
+    typer.echo(typed_plots(plots, _schema(first / "any" if first.is_dir() else first, domain)), nl=False)
+
+
 def _findings(
     file: Path, domain: Path | None, neighbours: Neighbours, components: tuple[Component, ...] | None
 ) -> list[Finding]:

@@ -6,8 +6,9 @@ import asyncio
 from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, cast
 
+from dsc.calls import Outputs, PlotCall
 from dsc.components.component import Component
 from dsc.components.hooks import programming_errors
 from dsc.dynamic.library import Library
@@ -35,8 +36,8 @@ _MOST_GROUPED = 100
 
 
 @dataclass(frozen=True, slots=True)
-class RunEnd:
-    """The end of a run.
+class RunEnd(Generic[Outputs]):
+    """The end of a run; the run of a `PlotCall` has typed outputs.
 
     Attributes:
         finished: whether the plot reached its final state.
@@ -50,7 +51,7 @@ class RunEnd:
     finished: bool
     emitted: tuple[Event, ...] = ()
     problem: str | None = None
-    outputs: Mapping[str, Any] = field(default_factory=dict)
+    outputs: Outputs = field(default_factory=lambda: cast(Outputs, {}))
     programming_error: str | None = None
 
     @property
@@ -209,20 +210,22 @@ class Sequencer:
         setting = message_checks.checked_setting(owner, name, value, self.dispatcher.components, self.library)
         self._hand_in(setting, after)
 
-    async def run(self, plot: str, arguments: Mapping[str, Any] | None = None) -> RunEnd:
+    async def run(self, plot: str | PlotCall[Outputs], arguments: Mapping[str, Any] | None = None) -> RunEnd[Outputs]:
         """Run the plot until it ends, or until a deadlock; return the end of the run.
 
         Raises:
             InputError: the plot or a parameter is unknown, a parameter is missing, or an argument has another type.
             StoreError: the store cannot be written; the run can resume from its last commit.
         """
-        wanted = self.library.plot(plot)
+        if isinstance(plot, PlotCall):
+            arguments = {**plot.arguments, **(arguments or {})}
+        wanted = self.library.plot(plot.plot if isinstance(plot, PlotCall) else plot)
         given = message_checks.checked_arguments(wanted, {} if arguments is None else arguments, self.knowledge)
 
         async def begin() -> None:
-            self._start(plot, given)
+            self._start(wanted.name, given)
 
-        return await self._watched(begin)
+        return cast("RunEnd[Outputs]", await self._watched(begin))
 
     async def resume(self, kept: Kept) -> RunEnd:
         """Continue a run after its last macrostep, and return the end of the run.
