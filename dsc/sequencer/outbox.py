@@ -70,7 +70,7 @@ class Outbox:
         before = self.untaken.get(component.name)
 
         async def in_order() -> None:
-            if before is not None:
+            if before is not None and not before.done():  # otherwise it arrives before a skill of this step can end
                 await asyncio.wait([before])
             try:
                 with contained(f"{component.name}.{hook}", component.device_errors):

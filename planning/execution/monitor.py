@@ -19,7 +19,7 @@ from knowledge_base.language.syntax.expression import Atom, Expression
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
-from planning.execution.plan_progress import PlanProgress, is_true, shortest_end, thinned
+from planning.execution.plan_progress import PlanProgress, is_true, leads_to, shortest_end, thinned
 from planning.generation.carried_steps import expectation
 from planning.plan import Plan, PlanStep
 from planning.validation import validate
@@ -108,6 +108,14 @@ class Monitor:
         self._whole: Callable[[], None] = lambda: None
         self._is_broken = False
         self._goal = self._install(progress.goal, self._goal_fired)
+
+    def look_first(self) -> None:
+        """Validate the plan when monitoring begins; the effects of a running step may already hold."""
+        progress = self._progress
+        if progress.running and leads_to(progress.coming(), self._domain, self._knowledge, progress.goal):
+            self.update()
+        else:
+            self.look("earlier")
 
     def look(self, author: str) -> None:
         """Validate all remaining steps after a change by `author`, and report news if there are any."""

@@ -82,7 +82,7 @@ class Monitoring:
             self._unsubscribe = self._knowledge.subscribe(self._changed)
         if run.state is PlanState.BOUND:
             run.state = PlanState.MONITORED
-            self._look("earlier")  # the world may have changed since the search
+            self._install().look_first()  # the world may have changed since the search
         else:
             self._resume()
         if run.improvements is not None:

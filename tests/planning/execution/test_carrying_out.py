@@ -10,7 +10,7 @@ from breadth_first import BreadthFirst
 from errands import DOMAIN, HOLDER, ROOMS, ROUND, when_asked
 from obedient_robot import FAILED, ObedientRobot, plots
 
-from dsc import Event, parse_plot
+from dsc import Component, Event, Outcome, parse_plot, skill
 from dsc.trace import Record
 from knowledge_base import Delta, fact
 from planning import Executive, Plan, PlannerProcess, PlanStep
@@ -319,3 +319,52 @@ def _is_there(pid):
     except ProcessLookupError:
         return False
     return True
+
+
+class Counted(Outcome): ...
+
+
+class Counter(Component):
+    """Skills that end at once: without a wait, after a look at the loop, or after some time."""
+
+    def __init__(self, seconds):
+        super().__init__()
+        self.seconds = seconds
+        self.done = []
+
+    @skill(after_crash="repeat")
+    async def act(self, call, what: str) -> Counted:
+        if self.seconds is not None:
+            await call.clock.sleep(self.seconds)
+        self.done.append(what)
+        return Counted()
+
+
+COUNTING = """(define (domain count) (:functions (n)) (:predicates (done))
+  (:action more :parameters () :precondition (< (n) 5) :effect (increase (n) 1))
+  (:action stop :parameters () :precondition (>= (n) 3) :effect (done)))"""
+
+
+class CountsToThree:
+    async def solve(self, problem, seconds):
+        return PlanFound(Plan((*[PlanStep("more")] * 3, PlanStep("stop"))), "fake", 0.0, 0.1)
+
+
+@pytest.mark.parametrize("seconds", [None, 0, 1])
+def test_steps_that_end_at_once_are_each_done_one_time(seconds):
+    counter = Counter(seconds)
+    records: list[Record] = []
+    ways = [
+        parse_plot(
+            f"{{plot: {name}, implements: {name}, effects: assumed, states: {{"
+            f"do: {{entry: {{trigger: counter.act, with: {{what: {name}}}}}, on: {{counted: e}}}}, e: {{final: true}}}}}}"
+        )
+        for name in ("more", "stop")
+    ]
+    with Executive(COUNTING, ways, [counter], planner=CountsToThree()) as robot:
+        with robot.knowledge.transaction(author="test") as world:
+            world.set("n", 0)
+        robot.listen(records.append)
+        assert robot.achieve("(done)").reached
+    assert counter.done == ["more", "more", "more", "stop"]
+    assert [record.data for record in records if record.type == "plan.skipped"] == []
