@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -96,11 +97,14 @@ class Deployment:
         if self.simulation is not None:
             self.simulation.close()
 
-    def run(self, *, simulated: bool = True, prepare: Callable[[Sequencer], None] | None = None) -> Report:
+    def run(
+        self, *, simulated: bool = True, speed: float = math.inf, prepare: Callable[[Sequencer], None] | None = None
+    ) -> Report:
         """Run the task and return the report, also if the operator ends the run with Ctrl-C.
 
         Args:
             simulated: whether time jumps from event to event; a resumed run keeps its kind of time.
+            speed: simulated seconds per real second, for people who watch.
             prepare: called with the sequencer before the run starts.
 
         Raises:
@@ -117,21 +121,21 @@ class Deployment:
                 prepare(sequencer)
 
         try:
-            end = self._run(ready, simulated=simulated)
+            end = self._run(ready, simulated=simulated, speed=speed)
         except KeyboardInterrupt:
             end = RunEnd(finished=False, problem="the operator ended the run")
         return self._report(end, time.perf_counter() - started)
 
-    def _run(self, prepare: Callable[[Sequencer], None], *, simulated: bool) -> RunEnd:
+    def _run(self, prepare: Callable[[Sequencer], None], *, simulated: bool, speed: float) -> RunEnd:
         if self.resumes:
-            return self.executive.resume(prepare=prepare)
-        header = {**self.header(), **self._kept}
-        if self._task.plot is not None:
+            return self.executive.resume(speed=speed, prepare=prepare)
+        header, task = {**self.header(), **self._kept}, self._task
+        if task.plot is not None:
             return self.executive.run(
-                self._task.plot, self._task.arguments, simulated=simulated, prepare=prepare, header=header
+                task.plot, task.arguments, simulated=simulated, speed=speed, prepare=prepare, header=header
             )
-        assert self._task.goal is not None  # noqa: S101  `deploy` requires a plot or a goal
-        return self.executive.achieve(self._task.goal, simulated=simulated, prepare=prepare, header=header)
+        assert task.goal is not None  # noqa: S101  `deploy` requires a plot or a goal
+        return self.executive.achieve(task.goal, simulated=simulated, speed=speed, prepare=prepare, header=header)
 
     def header(self) -> dict[str, Any]:
         """Return the inputs that determine a run, for the first line of the trace."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import threading
 from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
@@ -35,8 +36,9 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema_compatibility import require_extension
 from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of, shipped_by
 from planning.domain import PlanningDomain
-from planning.engines.planner import Planner, PlannerProcess
+from planning.engines.planner import Planner
 from planning.engines.race import CachingPlanner, PlannerRace
+from planning.engines.registry import repeatable
 from planning.execution.planning_component import PlanningComponent
 from planning.execution.search import Foresight
 from planning.problem.construction import check_goal
@@ -57,7 +59,8 @@ class Executive:
             and its caches. The plot `achieve` is added if the library lacks it.
         components: the components, with their skills.
         knowledge: the knowledge base, whose schema the plots may use; by default an empty one with the domain's schema.
-        planner: the planner. The default in simulated time is pyperplan, so that a run is repeatable. The default in
+        planner: the planner. The default in simulated time is pyperplan, or an installed deterministic engine for
+            problems that pyperplan cannot solve, so that a run is repeatable. The default in
             real time is a race of the engines that suit a problem.
         parallel: whether independent steps of a plan are executed concurrently.
         foresight: simulates each plan before its execution.
@@ -155,6 +158,7 @@ class Executive:
         arguments: Mapping[str, Any] | None = None,
         *,
         simulated: bool = True,
+        speed: float = math.inf,
         open_ended: bool = False,
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
@@ -165,6 +169,7 @@ class Executive:
             plot: the name of the plot, or a call with its arguments, see `dsc plot types`.
             arguments: values of the plot's parameters.
             simulated: whether the run uses simulated time, which jumps from event to event, instead of real time.
+            speed: simulated seconds per real second, for people who watch a run in simulated time.
             open_ended: whether an idle run waits for events from outside, e.g. from an operator. Otherwise an idle run
                 ends and reports the deadlock.
             prepare: called before the run starts, see `Prepare`.
@@ -174,8 +179,8 @@ class Executive:
             InputError: the plot is unknown, or a parameter is missing or unknown.
             StoreError: the store cannot be written, or contains an unfinished run.
         """
-        runner = run_simulated if simulated else run_real
-        return runner(self.execute(plot, arguments, open_ended=open_ended, prepare=prepare, header=header))
+        running = self.execute(plot, arguments, open_ended=open_ended, prepare=prepare, header=header)
+        return run_simulated(running, speed=speed) if simulated else run_real(running)
 
     async def execute(
         self,
@@ -197,8 +202,8 @@ class Executive:
             prepare(sequencer)
         return await _to_its_end(sequencer.run(plot, arguments), planning, clock)
 
-    def resume(self, *, prepare: Prepare | None = None) -> RunEnd:
-        """Resume the unfinished run of the store at its last macrostep, and run it to its end.
+    def resume(self, *, speed: float = math.inf, prepare: Prepare | None = None) -> RunEnd:
+        """Resume the unfinished run of the store at its last macrostep, and run it to its end; for `speed` see `run`.
 
         Listeners receive the records of the run from the beginning. `prepare` is called again. Scheduled events that
         are still pending are kept and need not be posted again.
@@ -210,7 +215,7 @@ class Executive:
         """
         store, kept = self._taken_up()
         going_on = self._go_on(store, kept, prepare)
-        return run_simulated(going_on, kept.time) if kept.run.header["simulated"] else run_real(going_on)
+        return run_simulated(going_on, kept.time, speed) if kept.run.header["simulated"] else run_real(going_on)
 
     async def go_on(self, *, prepare: Prepare | None = None) -> RunEnd:
         """Resume the unfinished run inside an existing asyncio loop, see `resume`.
@@ -233,6 +238,7 @@ class Executive:
         seconds: float = _BUDGET.seconds,
         replans: int = _BUDGET.replans,
         simulated: bool = True,
+        speed: float = math.inf,
         open_ended: bool = False,
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
@@ -247,6 +253,7 @@ class Executive:
             seconds: real time for each search.
             replans: the maximum number of plans after the first plan.
             simulated: see `run`.
+            speed: see `run`.
             open_ended: see `run`.
             prepare: see `run`.
             header: see `run`.
@@ -257,7 +264,9 @@ class Executive:
         check_goal(parse_condition(goal), self.knowledge)
         budget = _budget(seconds, replans)
         arguments = {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
-        return self.run(ACHIEVE, arguments, simulated=simulated, open_ended=open_ended, prepare=prepare, header=header)
+        return self.run(
+            ACHIEVE, arguments, simulated=simulated, speed=speed, open_ended=open_ended, prepare=prepare, header=header
+        )
 
     def _taken_up(self) -> tuple[RunStore, Kept]:
         store = self._run_store({})
@@ -312,7 +321,7 @@ class Executive:
         if self._planner is not None:
             return self._planner
         if clock.simulated not in self._own_planners:
-            planner = PlannerProcess() if clock.simulated else PlannerRace()
+            planner = PlannerRace(choose=repeatable) if clock.simulated else PlannerRace()
             self._own_planners[clock.simulated] = CachingPlanner(planner)
         return self._own_planners[clock.simulated]
 

@@ -1,7 +1,8 @@
 """Clocks of a run, always injected: real seconds, or simulated seconds that jump to the next timer.
 
 In simulated time, the whole asyncio loop runs on the simulated clock, so that a skill sleeps as in real time. A hold
-stops the clock during the wait for a real answer, e.g. of a planner in another process.
+stops the clock during the wait for a real answer, e.g. of a planner in another process. A finite speed, e.g. ten
+simulated seconds per real second, slows the jumps down for people who watch.
 """
 
 from __future__ import annotations
@@ -10,11 +11,14 @@ import asyncio
 import heapq
 import math
 import selectors
+import time
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import Context, ContextVar, copy_context
 from functools import partial
 from typing import Any, NamedTuple, TypeVar, TypeVarTuple, Unpack
+
+from knowledge_base.errors import InputError
 
 _Result = TypeVar("_Result")
 _Args = TypeVarTuple("_Args")
@@ -130,16 +134,18 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
 
     Args:
         at: the loop's first time, in simulated seconds.
+        speed: simulated seconds per real second; `math.inf` jumps without waiting.
     """
 
-    def __init__(self, at: float = 0.0) -> None:
+    def __init__(self, at: float = 0.0, speed: float = math.inf) -> None:
         self._simulated_now = at
+        self._pace = None if speed == math.inf else _Pace(speed, at)
         self._due: list[_Due] = []
         self._asked = 0
         self._cancelled = 0  # an upper bound of the cancelled calls in `_due`
         self._holds = 0
         self._settling: list[asyncio.Future[None]] = []
-        super().__init__(_IdleSelector(self._go_on))
+        super().__init__(_IdleSelector(self._go_on, self._until_jump, self._advance))
 
     def time(self) -> float:
         """Return the simulated seconds."""
@@ -177,20 +183,41 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
     @contextmanager
     def hold(self) -> Iterator[None]:
         """Stop simulated time inside the block; the loop waits for real input."""
-        self._holds += 1
+        self._change_holds(+1)
         try:
             yield
         finally:
-            self._holds -= 1
+            self._change_holds(-1)
 
     @contextmanager
     def release(self) -> Iterator[None]:
         """Suspend one `hold` inside the block."""
-        self._holds -= 1
+        self._change_holds(-1)
         try:
             yield
         finally:
-            self._holds += 1
+            self._change_holds(+1)
+
+    def _until_jump(self) -> float:
+        """Return the real seconds to wait before time jumps; without a pace, it jumps immediately."""
+        if self._pace is None or self._holds or self._settling:
+            return 0.0
+        self._drop_cancelled()
+        self._advance()
+        return self._pace.seconds(self._due[0].timer.when() - self._simulated_now) if self._due else 0.0
+
+    def _advance(self) -> None:
+        """Advance simulated time by the real time that has passed, but not beyond the next scheduled call."""
+        if self._pace is not None and not self._holds:
+            reached = self._pace.now()
+            self._simulated_now = max(
+                self._simulated_now, min(reached, self._due[0].timer.when()) if self._due else reached
+            )
+
+    def _change_holds(self, change: int) -> None:
+        self._holds += change
+        if self._pace is not None:
+            self._pace.restart(self._simulated_now)
 
     def _go_on(self) -> bool:
         """Advance simulated time, unless it is held, as no call is ready; return whether a call is ready now."""
@@ -200,9 +227,12 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
                 waits.set_result(None)
         return bool(settling) or (not self._holds and self._jump())
 
-    def _jump(self) -> bool:
+    def _drop_cancelled(self) -> None:
         while self._due and self._due[0].timer.cancelled():
             heapq.heappop(self._due)
+
+    def _jump(self) -> bool:
+        self._drop_cancelled()
         if not self._due:
             return False
         moment = self._due[0].moment
@@ -211,6 +241,32 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
             self._simulated_now = max(self._simulated_now, due.timer.when())
             self.call_soon(due.call, context=due.context)
         return True
+
+
+class _Pace:
+    """The relation of simulated to real time at a finite speed.
+
+    Args:
+        speed: simulated seconds per real second.
+        at: the simulated second now.
+    """
+
+    def __init__(self, speed: float, at: float) -> None:
+        self._speed = speed
+        self.restart(at)
+
+    def restart(self, at: float) -> None:
+        """Let the simulated second `at` be now, e.g. after a hold."""
+        self._since = time.monotonic(), at
+
+    def now(self) -> float:
+        """Return the simulated second now."""
+        real, at = self._since
+        return at + (time.monotonic() - real) * self._speed
+
+    def seconds(self, simulated: float) -> float:
+        """Return the real seconds that simulated seconds last."""
+        return simulated / self._speed
 
 
 class _Due(NamedTuple):
@@ -230,29 +286,45 @@ def _unless_cancelled(timer: asyncio.TimerHandle, callback: Callable[[Unpack[_Ar
 
 
 class _IdleSelector(selectors.DefaultSelector):
-    """A selector that advances simulated time when the loop would wait.
+    """A selector that advances simulated time when the loop would wait, at the loop's speed.
 
     If time cannot advance, it waits for real input.
     """
 
-    def __init__(self, go_on: Callable[[], bool]) -> None:
+    def __init__(self, go_on: Callable[[], bool], until_jump: Callable[[], float], arrived: Callable[[], None]) -> None:
         super().__init__()
         self._go_on = go_on
+        self._until_jump = until_jump
+        self._arrived = arrived
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         ready: list[tuple[selectors.SelectorKey, int]] = super().select(0)
-        if ready or timeout is not None or self._go_on():
+        if ready or timeout is not None:
             return ready
-        return super().select(None)
+        while not ready and (seconds := self._until_jump()) > 0:
+            ready = super().select(seconds)
+        if not ready:
+            if self._go_on():
+                return ready
+            ready = super().select(None)
+        self._arrived()
+        return ready
 
 
-def run_simulated(main: Coroutine[Any, Any, _Result], at: float = 0.0) -> _Result:
+def run_simulated(main: Coroutine[Any, Any, _Result], at: float = 0.0, speed: float = math.inf) -> _Result:
     """Run a coroutine in simulated time that begins at `at`, and return its result.
 
     The loop compares scheduled times in its own time. With an equal `at`, a `LoopClock` returns exactly the loop's
-    times, without a rounding error.
+    times, without a rounding error. With a finite `speed`, real input during the run has the simulated time of its
+    arrival.
+
+    Raises:
+        InputError: the speed is not positive.
     """
-    with asyncio.Runner(loop_factory=lambda: SimulatedEventLoop(at)) as runner:
+    if not speed > 0:
+        main.close()
+        raise InputError(f"a speed is a positive number of simulated seconds per real second, not {speed:g}")
+    with asyncio.Runner(loop_factory=lambda: SimulatedEventLoop(at, speed)) as runner:
         return runner.run(main)
 
 

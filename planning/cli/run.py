@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import StrEnum
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -52,6 +53,10 @@ def run_command(
         str | None, typer.Option(metavar="NAME|FILE", help="The robot and the values of its parameters (YAML).")
     ] = None,
     real_time: Annotated[bool, typer.Option("--real-time", help="Run in real time.")] = False,
+    speed: Annotated[
+        float | None,
+        typer.Option(metavar="X", help="Simulated seconds per real second, to watch a run.  [default: no limit]"),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the report as one JSON object.")] = False,
     trace: Annotated[
         Path | None, typer.Option(help="Write every record to this file (JSON lines); - is standard output.")
@@ -83,6 +88,8 @@ def run_command(
 
     show_logs(verbose, quiet=quiet)
     settings = None if profile is None or not Path(profile).suffix else Path(profile)
+    if speed is not None and real_time:
+        raise InputError("a run is in real time, or in simulated time at a --speed")
     output = None if trace is None else Output(trace, "--trace", scenario, settings, store, resume, over=BEGINS)
     if resume is not None:
         beginning = {
@@ -97,7 +104,8 @@ def run_command(
         bundle = _bundle(target)
         deployed = _deployed(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
                              durability, target)  # fmt: skip
-    follow = partial(_followed, deployed, simulated=not real_time, quiet=json or quiet, trace=output)
+    follow = partial(_followed, deployed, simulated=not real_time, speed=inf if speed is None else speed,
+                     quiet=json or quiet, trace=output)  # fmt: skip
     with deployed:
         if not view:
             report = follow()
@@ -211,6 +219,7 @@ def _followed(
     deployed: Deployment,
     *,
     simulated: bool,
+    speed: float,
     quiet: bool,
     trace: Output | None,
     prepare: Callable[[Sequencer], None] | None = None,
@@ -240,7 +249,7 @@ def _followed(
             deployed.executive.listen(PlainProgress(typer.echo))
         else:
             stack.enter_context(redirect_stdout(sys.stderr))
-        return deployed.run(simulated=simulated, prepare=prepare)
+        return deployed.run(simulated=simulated, speed=speed, prepare=prepare)
 
 
 def _print(report: Report, *, as_json: bool) -> None:

@@ -1,7 +1,7 @@
 """Planners with several engines: a race in real time, and a cache of outcomes by problem.
 
 The first valid plan wins a race, and cheaper plans may follow. The winner depends on the speed of the machine. A run
-in simulated time must be repeatable, and uses one engine instead (`planning.engines.planner.PlannerProcess`).
+in simulated time must be repeatable, and lets only one engine start (`planning.engines.registry.repeatable`).
 """
 
 from __future__ import annotations

@@ -190,6 +190,15 @@ def chosen(problem: Problem, *, usable: Callable[[Engine], bool] = installed) ->
     return (fitting or ([] if "durations" in problem.features else racing))[:AT_ONCE]
 
 
+def repeatable(problem: Problem, *, usable: Callable[[Engine], bool] = installed) -> list[Engine]:
+    """Return the engine for a run in simulated time, which must be repeatable; empty if no usable engine suits.
+
+    The engine is pyperplan, which every installation has, or else the first deterministic engine.
+    """
+    suited = [one for one in able(problem.features) if one.races and one.deterministic and usable(one)]
+    return sorted(suited, key=lambda one: one.name != "pyperplan")[:1]
+
+
 _JAVA_SECONDS = 10.0
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 import weakref
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from dsc.sequencer.clock import LoopClock, released, run_real, run_simulated
+from knowledge_base import InputError
 
 
 def test_simulated_time_jumps_to_what_is_due_next():
@@ -226,3 +229,72 @@ def test_what_was_cancelled_is_not_kept_until_it_would_have_been_due():
 
     assert run_simulated(main()) < 2 * 200 + 101
     assert len(woken) == 200
+
+
+# -- a finite speed ------------------------------------------------------------------------------------------
+
+
+class Wall:
+    """A real clock that passes only while a selector waits; real input arrives at given real seconds."""
+
+    def __init__(self, monkeypatch, inputs=()):
+        self.now, self.inputs = 0.0, list(inputs)
+        monkeypatch.setattr("dsc.sequencer.clock.time.monotonic", lambda: self.now)
+        monkeypatch.setattr("selectors.DefaultSelector.select", self.select)
+
+    def select(self, timeout=None):
+        due = self.inputs[0][0] if self.inputs else math.inf
+        if timeout is not None and self.now + timeout < due:
+            self.now += timeout
+            return []
+        assert due < math.inf, "the loop waits without end"
+        self.now = max(self.now, due)
+        self.inputs.pop(0)[1]()
+        return [(SimpleNamespace(fileobj=None, data=(None, None)), 0)]
+
+
+async def slept(seconds):
+    clock = LoopClock()
+    await clock.sleep(seconds)
+    return clock.now()
+
+
+@pytest.mark.parametrize(("speed", "real"), [(10.0, 2.0), (0.5, 40.0), (math.inf, 0.0)])
+def test_a_run_lasts_as_long_as_its_speed_says(monkeypatch, speed, real):
+    wall = Wall(monkeypatch)
+    assert run_simulated(slept(20.0), speed=speed) == 20.0
+    assert wall.now == pytest.approx(real)
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, math.nan])
+def test_a_speed_is_positive(speed):
+    with pytest.raises(InputError, match="a speed is a positive number"):
+        run_simulated(slept(1.0), speed=speed)
+
+
+def test_real_input_has_the_simulated_time_of_its_arrival(monkeypatch):
+    async def main():
+        clock, heard = LoopClock(), asyncio.Event()
+        wall.inputs.append((1.5, heard.set))
+        await heard.wait()
+        arrived = clock.now()
+        await clock.sleep(5.0)
+        return arrived, clock.now()
+
+    wall = Wall(monkeypatch)
+    assert run_simulated(main(), speed=10.0) == (15.0, 20.0)
+
+
+def test_time_does_not_catch_up_after_a_hold(monkeypatch):
+    async def main():
+        clock, answered = LoopClock(), asyncio.Event()
+        wall.inputs.append((7.0, answered.set))
+        with clock.hold():
+            await answered.wait()
+        held = clock.now()
+        await clock.sleep(10.0)
+        return held, clock.now()
+
+    wall = Wall(monkeypatch)
+    assert run_simulated(main(), speed=10.0) == (0.0, 10.0)
+    assert wall.now == pytest.approx(8.0)

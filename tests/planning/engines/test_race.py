@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import aclosing
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -27,7 +28,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planning.engines.race import PlannerRace
-from planning.engines.registry import ENGINES, able, chosen, engine
+from planning.engines.registry import ENGINES, able, chosen, engine, repeatable
 from planning.plan import EngineFailed, NobodyCan, PlanFound, ProvenUnsolvable, TimedOut
 
 FIRST, SECOND = ENGINES[:2]
@@ -184,6 +185,16 @@ def test_a_large_problem_is_left_to_those_that_are_made_for_it():
     large: Any = Large
     assert [one.name for one in chosen(large, usable=lambda _: True)] == ["fast-downward"]
     assert chosen(large, usable=lambda one: one.name == "pyperplan") == [engine("pyperplan")]
+
+
+def test_in_simulated_time_one_repeatable_engine_starts():
+    numeric: Any = SimpleNamespace(features=frozenset({"numeric"}))
+    timed: Any = SimpleNamespace(features=frozenset({"durations"}))
+    everything = [
+        [one.name for one in repeatable(problem, usable=lambda _: True)] for problem in (PROBLEM, numeric, timed)
+    ]
+    assert everything == [["pyperplan"], ["enhsp"], []]
+    assert repeatable(numeric, usable=lambda one: one.name == "pyperplan") == []
 
 
 def test_features_are_needs_and_costs_a_wish():

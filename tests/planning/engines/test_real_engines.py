@@ -8,12 +8,14 @@ from typing import Any
 import pytest
 from fake_engines import PROBLEM, descendants, gone, lights_out, session
 
+from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from knowledge_base.facts import Fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning.domain import PlanningDomain
 from planning.engines.process import Deadline, EngineProcess, OutOfTimeError, worker
 from planning.engines.registry import ENGINES
 from planning.engines.request import written
+from planning.executive import Executive
 from planning.plan import PlanStep
 from planning.problem.construction import build_problem
 from planning.strips import GroundAction, Problem
@@ -97,6 +99,9 @@ def test_an_engine_that_minds_costs_ends_with_the_cheaper_plan(process_of, name)
     assert PRICED.cost(last["actions"]) == 1.0
 
 
+class Acted(Outcome): ...
+
+
 COUNTING = """(define (domain count) (:functions (n)) (:predicates (done))
   (:action more :parameters () :precondition (< (n) 5) :effect (increase (n) 1))
   (:action stop :parameters () :precondition (>= (n) 3) :effect (done)))"""
@@ -111,6 +116,25 @@ def test_an_engine_that_can_count_does(process_of, name, world_of):
     assert "numeric" in problem.features
     plan = problem.plan(answers(process_of(name), problem)[0]["actions"])
     assert [step.action for step in plan.steps] == ["more"] * 3 + ["stop"]
+
+
+@pytest.mark.skipif(bool(BY_NAME["enhsp"].lacks()), reason=f"enhsp: {BY_NAME['enhsp'].lacks()}")
+def test_a_simulated_run_with_numbers_uses_the_installed_engine():
+    class Counter(Component):
+        @skill(after_crash="repeat")
+        async def act(self, call: SkillCall) -> Acted:
+            return Acted()
+
+    counter = Counter()
+    plots = [
+        primitive_plot(counter.skills()["act"], name=name, done="acted", implements=name, effects="assumed")
+        for name in ("more", "stop")
+    ]
+    with Executive(COUNTING, plots, [counter]) as robot:
+        with robot.knowledge.transaction(author="test") as world:
+            world.set("n", 0)
+        assert robot.achieve("(done)").reached
+        assert robot.knowledge.value("n", ()) == 3
 
 
 @pytest.mark.parametrize("name", NAMES)
