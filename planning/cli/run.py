@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from enum import StrEnum
 from functools import partial
 from math import inf
@@ -34,11 +34,24 @@ class Durability(StrEnum):
     power = "power"
 
 
+def robots() -> Iterator[str]:
+    """Yield the names of the installed robots, for the completion of a shell."""
+    from contextlib import suppress
+
+    from knowledge_base.errors import InputError
+    from planning.bundles import installed
+
+    with suppress(InputError):  # an unreadable package must not end the completion
+        yield from installed()
+
+
 def run_command(
     target: Annotated[
         str | None,
         typer.Argument(
-            metavar="TARGET", help="The robot: a bundle's name, MODULE:NAME, a Python file or a project folder."
+            metavar="TARGET",
+            help="The robot: a bundle's name, MODULE:NAME, a Python file or a project folder.",
+            autocompletion=robots,
         ),
     ] = None,
     goal: Annotated[str | None, typer.Option(metavar="CONDITION", help="Plan for this goal.")] = None,

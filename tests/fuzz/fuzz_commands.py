@@ -29,7 +29,11 @@ from planning.cli.command import NOBODY_READS, NOT_WRITTEN, app, main
 STATUSES = {0, 1, 2, NOT_WRITTEN, NOBODY_READS}
 MORE_STATUSES = {("plan",): {3, 4}, ("kb", "watch"): {130}}
 """Of a planner whose time was up or whose engine failed; of what was interrupted."""
-NEVER = {"--real-time": "time passes as on the wall, by intent", "--speed": "a low speed waits, by intent"}
+NEVER = {
+    "--real-time": "time passes as on the wall, by intent",
+    "--speed": "a low speed waits, by intent",
+    "--install-completion": "it writes into the user's shell",
+}
 """Options that are not drawn, and why."""
 ALWAYS = {("plan",): ("--seconds", "1"), ("view",): ("--no-open",)}
 """Arguments that stand before what was drawn: a search may take the time that it is given."""

@@ -2,8 +2,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import typer
@@ -15,6 +17,8 @@ from planning.cli import doctor_command, plan_command
 from planning.engines import registry
 from planning.engines.registry import ENGINES
 from planning.plan import EngineFailed, PlanFound
+
+DSC = Path(sys.executable).with_name("dsc")
 
 PROBLEM = """(define (problem two-cups) (:domain clean-up-table)
   (:objects table - surface  sink - destination  cup1 cup2 - cup)
@@ -388,3 +392,14 @@ def test_a_predicate_that_follows_from_itself_and_from_what_actions_change_is_pl
     assert said in result.output
     assert ("'above': planning actions change what it follows from" in result.stderr) == (status == 0)
     assert "derive" not in result.stdout
+
+
+def test_a_shell_completes_commands_and_robots():
+    def completed(words):
+        environment = {**os.environ, "_DSC_COMPLETE": "complete_bash", "COMP_WORDS": words}
+        environment["COMP_CWORD"] = str(words.count(" "))
+        done = subprocess.run([DSC], env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.split()
+
+    assert completed("dsc plo") == ["plot"]
+    assert completed("dsc run clean") == ["clean-up-table"]
