@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 BENCH  := .venv-bench
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
+.PHONY: mistakes help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
@@ -35,6 +35,9 @@ $(VENV)/.engines: $(VENV)/.test   # planning engines that no one is forced to ha
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,check,fast,numeric,durations]'
 	@command -v java >/dev/null || $(if $(filter 0,$(shell id -u)),,sudo) apt-get install --yes --quiet default-jre-headless
 	@touch $@
+
+mistakes: $(VENV)/.test   ## planted mistakes of users, and the answers of the command
+	$(BIN)/python tests/mistakes/answer_mistakes.py
 
 test-engines: $(VENV)/.engines   ## every planning engine for real
 	$(BIN)/dsc doctor

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import sysconfig
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
-from knowledge_base.errors import described, printable, shortened
+from knowledge_base.errors import Place, described, printable, shortened
 
 
 def raised_at(error: BaseException, *, only_users: bool = False) -> str:
@@ -34,6 +36,33 @@ def _frames(error: BaseException) -> Iterator[tuple[str, int]]:
             yield frame.f_code.co_filename, line
         group = issubclass(type(cause), BaseExceptionGroup)
         cause = cause.exceptions[0] if group else cause.__cause__  # type: ignore[attr-defined]
+
+
+def waits_at(coroutine: Any) -> str:
+    """Return the innermost line of a user's code at which a coroutine waits, as `file:line`; empty without a line."""
+    found = ""
+    awaited = coroutine
+    while awaited is not None:
+        frame = getattr(awaited, "cr_frame", None) or getattr(awaited, "gi_frame", None)
+        if frame is not None and is_users_code(frame.f_code.co_filename):
+            found = f"{frame.f_code.co_filename}:{frame.f_lineno}"
+        awaited = getattr(awaited, "cr_await", None) or getattr(awaited, "gi_yieldfrom", None)
+    return found
+
+
+def place_of(made: type | Callable[..., Any]) -> Place | None:
+    """Return file and line of the definition of a class or function; `None` if its source is unknown."""
+    try:
+        source = inspect.unwrap(made) if inspect.isfunction(made) else made
+        return Place(inspect.getsourcefile(source), inspect.getsourcelines(source)[1])
+    except (OSError, TypeError):
+        return None
+
+
+def user_place(error: BaseException) -> Place | None:
+    """Return the innermost line of a user's code that raised the error; `None` without one."""
+    users = [frame for frame in _frames(error) if is_users_code(frame[0])]
+    return Place(*users[-1]) if users else None
 
 
 def is_users_code(file: str) -> bool:

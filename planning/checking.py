@@ -10,7 +10,7 @@ from pathlib import Path
 from dsc.components.component import Component
 from dsc.components.declarations import Parameter
 from dsc.components.hooks import contained
-from dsc.components.robot import require_deployed, require_instances, require_wired
+from dsc.components.robot import require_deployed, require_instances, require_whole, require_wired
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, ProgrammingError
 from dsc.model.plot import ActionPlot
@@ -25,13 +25,13 @@ from knowledge_base.pddl.domain_text import read_domain
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.bundles import Bundle, components_of, gathered, plots_of, shipped_by
-from planning.deployment import initial_knowledge, simulated
+from planning.deployment import begin, simulated
 from planning.domain import PlanningDomain
 from planning.execution.planning_component import PlanningComponent
 from planning.executive import achieve_plot
 from planning.problem.construction import check_goal
 from planning.simulation import Setup, Simulation
-from planning.soundness import check_implementations
+from planning.soundness import IMPLEMENTED, check_implementations
 from planning.targets import bundle_at
 
 READABLE = "readable"
@@ -39,6 +39,7 @@ READABLE = "readable"
 _KNOWN_PLOT = "known plot"
 _SKIPPED = frozenset({"build", "dist", "node_modules", "site-packages", "__pycache__"})
 _NAMES_PLOT = re.compile(r"^plot:\s*[\"']?([\w.-]+)", re.MULTILINE)
+_IMPLEMENTS = re.compile(r"^implements:\s*[\"']?([\w.-]+)", re.MULTILINE)
 _NAMES_PROFILE = re.compile(r"^profile:", re.MULTILINE)
 _DEFINES_DOMAIN = re.compile(r"\(\s*define\s*\(\s*domain\b", re.IGNORECASE)
 
@@ -54,7 +55,9 @@ def check_project(target: str) -> list[Finding]:
         return _sorted(_files([path]))
     with collecting() as errors:
         bundle = _bundle(target) if not path.is_dir() or _has_robot(path) else None
-        findings = [] if bundle is None else _Robot(bundle).findings()
+        unread = any(str(one.place.source).endswith(".pddl") for one in errors if one.place is not None)
+        whole = bundle is not None and (bundle.domain is not None or not unread)
+        findings = [] if bundle is None else _Robot(bundle, whole=whole).findings()
     findings += [Finding(error, READABLE) for error in errors]
     if path.is_dir():
         read = {Path(one.place.source or "").resolve() for one in findings if one.place is not None}
@@ -111,10 +114,16 @@ def _seen_from_here(place: Place | None) -> Place | None:
 
 
 class _Robot:
-    """The parts of a bundle that could be made, for the checks of their agreement; used inside `collecting`."""
+    """The parts of a bundle that could be made, for the checks of their agreement; used inside `collecting`.
 
-    def __init__(self, bundle: Bundle) -> None:
+    Args:
+        bundle: the bundle.
+        whole: whether its domain could be read, so that plots and skills can be compared with it.
+    """
+
+    def __init__(self, bundle: Bundle, *, whole: bool = True) -> None:
         self._bundle = bundle
+        self._whole = whole
         self._bundles: tuple[Bundle, ...] = (bundle,)
         with tolerated():
             self._bundles = gathered([bundle])
@@ -132,12 +141,19 @@ class _Robot:
                 self._simulation = simulated(self._bundle, Setup(profile=profile))
                 with contained(f"the components of '{self._bundle.name}'", (InputError,)):
                     own = () if self._simulation is None else self._simulation.components()
-                    return [*components_of(self._bundles), *own]
+                    found = [*components_of(self._bundles), *own]
+                if not all(isinstance(one, Component) for one in found):
+                    require_instances(found)
+                for one in found:
+                    require_whole(one)
             except ProgrammingError as error:
                 raise InputError(f"programming error in {error}") from error
+            return found
         return None
 
     def _merged(self) -> PlanningDomain | None:
+        if not self._whole:
+            return None
         with tolerated():
             parts = [one.domain for one in self._bundles if one.domain is not None]
             return PlanningDomain.from_fragments([*parts, *shipped_by(self._components or ())] or [_EMPTY])
@@ -153,7 +169,7 @@ class _Robot:
             found += validate_plot(plot, library, schema, skills, declared, thorough=True) or review_plot(plot, library)
         found = without_consequences(found, self._broken_files())
         if self._domain is not None:
-            found += check_implementations(library, self._domain)
+            found += without_consequences(check_implementations(library, self._domain), self._broken_files())
             self._check_task(self._domain.schema)
         self._check_components()
         return found
@@ -175,7 +191,7 @@ class _Robot:
         bundle, world = self._bundle, KnowledgeBase(schema)
         with tolerated():
             try:
-                world.apply(initial_knowledge(bundle, self._simulation), "check")
+                begin(world, bundle, self._simulation, "check")
             except ProgrammingError as error:
                 raise InputError(f"programming error in {error}") from error
         if bundle.goal is not None:
@@ -200,7 +216,6 @@ class _Robot:
             return
         with tolerated():
             require_instances(self._components)
-        with tolerated():
             require_deployed(self._components, [PlanningComponent.name])
         with tolerated():
             require_wired(self._components)
@@ -224,9 +239,12 @@ _EMPTY = "(define (domain bundles))"
 
 
 def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) -> list[Finding]:
-    """Return the findings without those about missing plots that are in files with errors."""
-    names = {name for file in broken for name in _NAMES_PLOT.findall(_text(file))}
-    return [one for one in findings if one.rule != _KNOWN_PLOT or one.error.found not in names]
+    """Return the findings without those about missing plots, or their actions, that are in files with errors."""
+    texts = [_text(file) for file in broken]
+    plots = {name for text in texts for name in _NAMES_PLOT.findall(text)}
+    actions = {name for text in texts for name in _IMPLEMENTS.findall(text)}
+    missing = {(_KNOWN_PLOT, name) for name in plots} | {(IMPLEMENTED, name) for name in actions}
+    return [one for one in findings if (one.rule, one.error.found) not in missing]
 
 
 # -- files ---------------------------------------------------------------------------------------------------

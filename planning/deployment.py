@@ -15,6 +15,7 @@ from dsc.components.hooks import contained
 from dsc.components.robot import require_instances
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
+from dsc.errors import ProgrammingError
 from dsc.profiles import adapted, configure
 from dsc.runs.archive import RunRow, archive, has_run, unfinished
 from dsc.sequencer.sequencer import RunEnd, Sequencer
@@ -24,6 +25,8 @@ from knowledge_base.errors import InputError, Place, StoreError, UnknownNameErro
 from knowledge_base.facts import Delta
 from knowledge_base.journal.file import Durability
 from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.store import KnowledgeBase
+from knowledge_base.tracebacks import place_of, user_place
 from planning.bundles import Bundle, components_of, domain_of, gathered, plots_of
 from planning.domain import PlanningDomain
 from planning.engines.planner import Planner
@@ -164,6 +167,10 @@ class Deployment:
             return None
         with contained(f"{type(self.simulation).__name__}.left"):
             left = self.simulation.left()
+            if left is None and type(self.simulation).left is not Simulation.left:
+                method = type(self.simulation).left
+                place = place_of(method)
+                raise ProgrammingError(f"{method.__qualname__}: it returns None instead of a list ({place})")
             return None if left is None else list(left)
 
     @property
@@ -312,7 +319,10 @@ def plot_task(bundle: Bundle, plot: str, given: Mapping[str, str]) -> Task:
     parameters = plots[plot].parameters
     for name in given:
         if name not in parameters:
-            raise UnknownNameError(f"the plot '{plot}' has no parameter '{name}'", found=name, valid=parameters)
+            having = [f"--plot {one.name}" for one in plots.values() if name in one.parameters and one.name != plot]
+            hint = f"; the parameter belongs to {', '.join(having)}" if having else ""
+            message = f"the plot '{plot}' has no parameter '{name}'{hint}"
+            raise UnknownNameError(message, found=name, valid=parameters)
     values = {name: parameters[name].range.read(f"{plot}.{name}", text) for name, text in given.items()}
     return Task(plot, values)
 
@@ -353,7 +363,7 @@ def _deployed(
         if simulation is not None and setup.store is not None and not setup.resumes:
             with contained(f"{type(simulation).__name__}.begin", _MAY_RAISE):
                 simulation.begin()
-        executive.knowledge.apply(initial_knowledge(bundle, simulation), "deployment", key="deployment")
+        begin(executive.knowledge, bundle, simulation, "deployment", key="deployment")
         if task.goal is not None:
             check_goal(parse_condition(task.goal, "goal"), executive.knowledge)
     except BaseException:
@@ -374,7 +384,24 @@ def initial_knowledge(bundle: Bundle, simulation: Simulation | None) -> Delta:
     if simulation is None:
         return bundle.knowledge
     with contained(f"{type(simulation).__name__}.knowledge", _MAY_RAISE):
-        return bundle.knowledge.then(simulation.knowledge())
+        try:
+            return bundle.knowledge.then(simulation.knowledge())
+        except InputError as error:
+            error.place = error.place or user_place(error)
+            raise
+
+
+def begin(
+    knowledge: KnowledgeBase, bundle: Bundle, simulation: Simulation | None, author: str, key: str | None = None
+) -> None:
+    """Apply the initial knowledge of a bundle and its simulation; an error has the place of the simulation's method."""
+    delta = initial_knowledge(bundle, simulation)
+    try:
+        knowledge.apply(delta, author, key=key)
+    except InputError as error:
+        if simulation is not None:
+            error.place = error.place or place_of(type(simulation).knowledge)
+        raise
 
 
 def simulated(bundle: Bundle, setup: Setup) -> Simulation | None:
@@ -387,7 +414,8 @@ def simulated(bundle: Bundle, setup: Setup) -> Simulation | None:
 
 def _components(bundle: Bundle, simulation: Simulation | None) -> list[Component]:
     with contained(f"the components of '{bundle.name}'", _MAY_RAISE):
-        return [*components_of(gathered([bundle])), *(() if simulation is None else simulation.components())]
+        found = [*components_of(gathered([bundle])), *(() if simulation is None else simulation.components())]
+    return [*require_instances(found)]
 
 
 _MAY_RAISE = (InputError, OSError)

@@ -19,7 +19,7 @@ _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "plan.none": lambda data: f"no plan, {data['kind']}: {data['reason']}",
     "plan.broken": lambda data: f"the plan no longer holds: {data['reason']}",
     "plan.resumed": lambda data: f"the plan resumes at {data['step']}: {data['why']}",
-    "plan.skipped": lambda data: f"skipped {', '.join(data['steps'])}: {data['why']}",
+    "plan.skipped": lambda data: f"skipped {', '.join(data['steps']) or 'no step'}: {data['why']}",
     "plan.excluded": lambda data: f"{data['step']} is excluded for {data['seconds']:g} s: {data['why']}",
     "plan.readmitted": lambda data: f"{', '.join(data['steps'])} may be planned again: there is no plan without",
     "plan.rejected": lambda data: f"a plan fails in the simulation: {data['reason']}",
@@ -38,6 +38,7 @@ class Tally:
         candidates: number of choices of each plot by dynamic states, without choices of planning.
         plans: number of plans found; `replans`: number of plans that replaced a running plan.
         excluded: number of exclusions of each plan step after failures.
+        unobserved: number of times that the effects of each planning action were not observed.
         gave_up: the reason of the last goal for which there was no plan or no further plan; empty without one.
         seconds: run time of the last record, in seconds.
     """
@@ -47,6 +48,7 @@ class Tally:
         self.recoveries: Counter[str] = Counter()
         self.candidates: Counter[str] = Counter()
         self.excluded: Counter[str] = Counter()
+        self.unobserved: Counter[str] = Counter()
         self.plans = 0
         self.replans = 0
         self.gave_up = ""
@@ -67,6 +69,8 @@ class Tally:
             self.replans += 1
         elif record.type == "plan.excluded":
             self.excluded[record.data["step"]] += 1
+        elif record.type == "plan.unobserved":
+            self.unobserved[record.data["step"].strip("()").split()[0]] += 1
         elif record.type in {"plan.gave_up", "plan.none"}:
             self.gave_up = record.data["reason"]
 

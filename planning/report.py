@@ -47,6 +47,7 @@ class Report:
         recoveries: the number of uses of each rule.
         candidates_chosen: the number of choices of each plot by dynamic states.
         excluded: the number of exclusions of each plan step after failures.
+        not_observed: the number of times that the effects of each planning action were not observed.
         faults: the faults of the simulation, in order.
         simulated_s, wall_s: the duration of the run in run time and in real time, in seconds.
         problem: the reason why the run ended early; `None` otherwise.
@@ -68,6 +69,7 @@ class Report:
     recoveries: Mapping[str, int]
     candidates_chosen: Mapping[str, int]
     excluded: Mapping[str, int]
+    not_observed: Mapping[str, int]
     faults: tuple[Fault, ...]
     simulated_s: float
     wall_s: float
@@ -97,9 +99,12 @@ class Report:
             ("recovered by rule", self.recoveries),
             ("candidates chosen", self.candidates_chosen),
             ("excluded for a while", self.excluded),
+            ("effects not observed", self.not_observed),
         ):
             if counts:
                 lines.append(f"  {title}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
+        if self.faults and not self.skill_failures:
+            lines.append(f"  {len(self.faults)} faults were drawn, and no skill reported a failure")
         return lines
 
     @property
@@ -148,6 +153,7 @@ def summarise(
         recoveries=dict(sorted(tally.recoveries.items())),
         candidates_chosen=dict(sorted(tally.candidates.items())),
         excluded=dict(sorted(tally.excluded.items())),
+        not_observed=dict(sorted(tally.unobserved.items())),
         faults=(),
         simulated_s=round(tally.seconds, 3),
         wall_s=round(wall_s, 3),

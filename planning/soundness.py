@@ -17,6 +17,9 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.domain import PlanningDomain
 
+IMPLEMENTED = "every action has a plot"
+"""The rule of a finding about a planning action without a plot."""
+
 
 def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[Finding]:
     """Yield a finding for each disagreement between plots and planning actions.
@@ -52,8 +55,8 @@ def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[
     for name, action in domain.actions.items():
         yield from _mixed_effects(name, library)
         if implemented and name not in implemented:
-            error = SchemaError(f"no plot implements the planning action '{name}'", place=action.place)
-            yield Finding(error, "every action has a plot", f"add a plot with `implements: {name}`")
+            error = SchemaError(f"no plot implements the planning action '{name}'", place=action.place, found=name)
+            yield Finding(error, IMPLEMENTED, f"add a plot with `implements: {name}`")
 
 
 def _mixed_effects(action: str, library: Library) -> Iterator[Finding]:

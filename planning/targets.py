@@ -111,8 +111,10 @@ def _of_file(file: Path, name: str | None) -> object:
 def _executed(file: Path) -> ModuleType:
     if not file.is_file():
         raise InputError("there is no such file", place=Place(str(file)), found=str(file))
-    name = file.resolve().stem
-    folder = str(file.resolve().parent)
+    name, above = file.resolve().stem, file.resolve().parent
+    while (above / "__init__.py").is_file() and above.name.isidentifier():
+        name, above = f"{above.name}.{name}", above.parent
+    folder = str(above)
     if folder not in sys.path:
         sys.path.insert(0, folder)
     try:
@@ -120,9 +122,13 @@ def _executed(file: Path) -> ModuleType:
             known = sys.modules.get(name)
             if known is not None and getattr(known, "__file__", None) == str(file.resolve()):
                 return known
-            if known is None and name.isidentifier():
+            if known is None and all(part.isidentifier() for part in name.split(".")):
                 return import_module(name)
-            return _loaded(name, file)
+            return _loaded(file.resolve().stem, file)
+    except InputError as error:
+        if error.place is not None:
+            raise
+        raise InputError(f"{file} cannot be executed: {error}") from error
     except Exception as error:  # a user's module may raise any error
         raise InputError(f"{file} cannot be executed: {described(error)}{raised_at(error)}") from error
 

@@ -183,7 +183,7 @@ def test_the_sessions_with_a_store_are_what_the_command_prints(tmp_path):
 
 
 def test_the_run_on_the_first_screen_is_what_the_command_prints():
-    (shown,) = [block for block in blocks(ROOT / "README.md", "console") if "dsc run" in block]
+    (shown,) = [block for block in blocks(ROOT / "README.md", "console") if block.startswith("$ dsc run")]
     command, *lines = shown.splitlines()
     words = command.removeprefix("$ dsc ").split()
     dsc = Path(sys.executable).with_name("dsc")

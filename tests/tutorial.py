@@ -22,7 +22,8 @@ READ_ON = {
 BEGINNING = """# Tutorial
 
 A delivery robot in eight steps. Each step is a program in [examples/tutorial](../examples/tutorial) that ends with its
-output; a later step imports the parts of earlier ones. Run a step with `python examples/tutorial/step1_skill.py`.
+output; a later step imports the parts of earlier ones. After `make demo`, run a
+step with `.venv/bin/python examples/tutorial/step1_skill.py`.
 
 Afterwards, `dsc new my_robot` makes a project with the same parts, see [Running a robot](run.md#start-a-project).
 """

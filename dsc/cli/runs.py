@@ -151,9 +151,7 @@ def viewer_installed() -> None:
 
     missing = [name for name in ("starlette", "uvicorn", "websockets") if find_spec(name) is None]
     if missing:
-        raise InputError(
-            f"the viewer needs {', '.join(missing)}: pip install 'dynamic-state-charts[viewer]'", found=missing[0]
-        )
+        raise InputError(f"the viewer needs {', '.join(missing)}: pip install {' '.join(missing)}", found=missing[0])
 
 
 def _summary(runs: RunArchive, run: RunRow) -> dict[str, Any]:

@@ -140,9 +140,12 @@ class Component(ComponentHooks, RestartHooks):
         for check in (_require_exceptions, _refuse_hidden):
             with tolerated():
                 check(cls)
-        if "parameters" in get_annotations(cls):
-            with class_statement(cls) as names:
+        with class_statement(cls) as names:
+            if "parameters" in get_annotations(cls):
                 cls.parameter_class = _parameter_class(cls, names)
+            elif "parameters" in vars(cls):
+                cls.parameter_class = vars(cls)["parameters"]
+                raise SchemaError(f"`parameters` of {cls.__qualname__} is an annotation: `parameters: BaseParameters`")
         cls._ports = {name: one for name, one in inspect.getmembers(cls) if isinstance(one, Push | Stream)}
 
     def __init__(self, name: str | None = None) -> None:

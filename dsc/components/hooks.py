@@ -7,10 +7,14 @@ from `Exception` would end the program, too.
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import logging
+import re
 import signal
 import threading
+import warnings
 from asyncio.runners import Runner
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -20,11 +24,14 @@ from typing import Any
 
 from dsc.errors import ProgrammingError, SkillError
 from knowledge_base.errors import InputError, described
-from knowledge_base.tracebacks import raised_at, whole_traceback
+from knowledge_base.tracebacks import is_users_code, raised_at, whole_traceback
 
 _LOG = logging.getLogger(__package__)
 Classes = tuple[type[BaseException], ...]
 _found: ContextVar[list[str] | None] = ContextVar("found", default=None)
+_NEVER_AWAITED = "coroutine .* was never awaited"
+_RAISED = "exceptions must derive from BaseException"
+_RETURNED = "; an outcome is returned, not raised"
 _MOST_FOUND = 100
 """Number of programming errors of one run that are kept for its end; all are logged."""
 
@@ -38,6 +45,57 @@ def programming_errors() -> Iterator[list[str]]:
         yield found
     finally:
         _found.reset(token)
+
+
+@contextmanager
+def unheard_errors(found: list[str]) -> Iterator[None]:
+    """Return a context manager in which errors that Python only prints are programming errors of the run.
+
+    These are exceptions of tasks and coroutines without an `await`.
+
+    Args:
+        found: the list of `programming_errors`.
+    """
+    loop = asyncio.get_running_loop()
+    before = loop.get_exception_handler()
+
+    def lost(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        error = context.get("exception")
+        if error is None or not raised_at(error, only_users=True):
+            loop.default_exception_handler(context) if before is None else before(loop, context)
+            return
+        token = _found.set(found)
+        programming_error(error, "a task that nobody awaits")
+        _found.reset(token)
+
+    loop.set_exception_handler(lost)
+    warnings.filterwarnings("always", _NEVER_AWAITED, RuntimeWarning)
+    if warnings.showwarning is not _show_warning:
+        _shown_before.append(warnings.showwarning)
+        warnings.showwarning = _show_warning
+    try:
+        yield
+    finally:
+        loop.set_exception_handler(before)
+
+
+_shown_before: deque[Callable[..., None]] = deque(maxlen=1)
+
+
+def _show_warning(
+    message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
+) -> None:
+    """Show a warning, unless it is about a coroutine of a run without an `await`."""
+    found = _found.get()
+    if found is None or not re.match(_NEVER_AWAITED, str(message)) or not is_users_code(filename):
+        _shown_before[-1](message, category, filename, lineno, file, line)
+        return
+    bug = f"{message}; write `await` before it ({filename}:{lineno})"
+    if bug in found:
+        return
+    _LOG.error("%s", bug)
+    if len(found) < _MOST_FOUND:
+        found.append(bug)
 
 
 class contained:  # noqa: N801  # a context manager, named like `suppress`
@@ -93,6 +151,7 @@ def programming_error(error: BaseException, hook: str, raises: Classes = ()) -> 
     itself = ": it cancelled itself" if issubclass(kind, asyncio.CancelledError) else ""
     refused = issubclass(kind, InputError)  # its message is complete without a line of this project
     said = described(error, named=not refused)
+    said += _RETURNED if _RAISED in said else ""
     bug = ProgrammingError(f"{hook}: {said}{itself}{raised_at(error, only_users=refused)}")
     _LOG.error("%s\n%s", bug, whole_traceback(error))
     found = _found.get()
@@ -169,7 +228,9 @@ def give_up(task: asyncio.Task[Any]) -> None:
     """Abandon a task, so that the loop does not wait for the task when the loop closes.
 
     Asyncio waits without end for a task that ignores its cancellation. Its documentation permits this function's calls
-    to extensions.
+    to extensions. Python also resumes a suspended coroutine when it frees it, also at its exit; so it never frees this
+    one.
     """
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(task.get_coro()))
     task._log_destroy_pending = False  # type: ignore[attr-defined]  # noqa: SLF001  # the task is known to be pending
     asyncio.tasks._unregister_task(task)  # noqa: SLF001  # documented under "Extending"

@@ -10,12 +10,14 @@ from pathlib import Path
 
 from dsc.components.component import ALWAYS, Component
 from dsc.components.hooks import contained
-from dsc.components.life_cycle import NEUTRAL
+from dsc.components.life_cycle import NEUTRAL, LifeCycle
+from dsc.components.parameters import Configuration, Parameters
+from dsc.components.ports import EventActivations
 from dsc.components.streams import Push, Stream, require_fitting
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
 from knowledge_base.language.checking.inputs import require_several, shown
-from knowledge_base.tracebacks import raised_at
+from knowledge_base.tracebacks import place_of, raised_at
 
 
 def component_of(name: str, *functions: SkillBody) -> Component:
@@ -78,6 +80,10 @@ def made(found: object, named: str) -> object:
     try:
         with contained():
             return found()
+    except InputError as error:
+        if error.place is not None:  # its message is complete
+            raise
+        raise InputError(f"'{named}' cannot be called: {error}") from error
     except Exception as error:  # a user's function may raise any error
         raise InputError(f"'{named}' cannot be called: {described(error)}{raised_at(error)}") from error
 
@@ -98,6 +104,10 @@ def named_part(named: str) -> object:
     try:
         with contained():
             module = import_module(module_name)
+    except InputError as error:
+        if error.place is not None:
+            raise
+        raise InputError(f"the module '{module_name}' cannot be imported: {error}") from error
     except Exception as error:  # a user's module may raise any error
         raise InputError(
             f"the module '{module_name}' cannot be imported: {described(error)}{raised_at(error)}"
@@ -122,11 +132,36 @@ def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
         if not isinstance(one, Component):
             hint = f"; an instance is made by {one.__name__}()" if isinstance(one, type) else ""
             raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
+        require_whole(one)
         if one.name in names:
-            raise SchemaError(f"two components are named '{one.name}'", found=one.name)
+            other = next(other for other in components if other.name == one.name)
+            classes = " and ".join(f"{type(each).__name__} ({place_of(type(each))})" for each in (other, one))
+            raise SchemaError(f"two components are named '{one.name}': {classes}", found=one.name)
         _require_needs(one)
         names.add(one.name)
     return components
+
+
+_OF_EVERY_COMPONENT = {
+    "configuration": Configuration,
+    "parameters": Parameters,
+    "life": LifeCycle,
+    "activations": EventActivations,
+    "pushes": dict,
+    "streams": dict,
+}
+
+
+def require_whole(component: Component) -> None:
+    """Raise `SchemaError` if the `__init__` of a component's class omits or replaces attributes of every component."""
+    kind = type(component)
+    for name, wanted in _OF_EVERY_COMPONENT.items():
+        if not hasattr(component, name):
+            message = f"{kind.__name__}.__init__ does not call super().__init__()"
+            raise SchemaError(message, place=place_of(kind.__init__))
+        if not isinstance(getattr(component, name), wanted):
+            message = f"'{name}' of {kind.__name__} hides an attribute of every component; choose another name"
+            raise SchemaError(message, place=place_of(kind.__init__), found=name)
 
 
 def _require_needs(component: Component) -> None:
@@ -138,16 +173,17 @@ def _require_needs(component: Component) -> None:
     """
     name, needs = component.name, component.needs
     if not isinstance(needs, Mapping):
-        raise InputError(f"`needs` of component '{name}' is a mapping of modes, as in {_EXAMPLE}, not {shown(needs)}")
+        message = f"`needs` of component '{name}' is a mapping of modes, as in {_EXAMPLE}, not {shown(needs)}"
+        raise InputError(message, place=place_of(type(component)))
     modes = (NEUTRAL, *component.modes)
     for mode, needed in needs.items():
         if not isinstance(needed, tuple) or not all(isinstance(one, str) for one in needed):
             when = f" in its mode '{mode}'" if mode else ""
             message = f"the needs of component '{name}'{when} are a tuple, as in {_EXAMPLE}, not {shown(needed)}"
-            raise InputError(message)
+            raise InputError(message, place=place_of(type(component)))
         if mode != ALWAYS and component.modes and mode not in modes:
             message = f"component '{name}' needs something in its mode '{mode}', which it does not have"
-            raise UnknownNameError(message, found=mode, valid=modes)
+            raise UnknownNameError(message, found=mode, valid=modes, place=place_of(type(component)))
 
 
 def require_deployed(components: Collection[Component], besides: Iterable[str] = ()) -> None:
@@ -164,7 +200,8 @@ def require_deployed(components: Collection[Component], besides: Iterable[str] =
         for needed in (*component.needed(), *(name for names in component.needs.values() for name in names)):
             if needed not in deployed:
                 message = f"component '{component.name}' needs a component '{needed}', and there is none"
-                raise UnknownNameError(message, found=needed, valid=deployed - {component.name})
+                place = place_of(type(component))
+                raise UnknownNameError(message, found=needed, valid=deployed - {component.name}, place=place)
 
 
 _EXAMPLE = "needs = {'scanning': ('power',)}"

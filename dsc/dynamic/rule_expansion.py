@@ -87,7 +87,7 @@ class _Expansion:
                     onward = partial(self._responses.onward, number=number, name=name, state=state)
                     own += self._responses.carried_out(about, name, f"{name}_{event}_{number}", onward, recoveries)
             if self._plot.generated and event != PROGRAMMING_ERROR:
-                reason = "no candidate fits" if event == NO_CANDIDATE else reason_of(event)
+                reason = NO_CANDIDATE_FITS if event == NO_CANDIDATE else reason_of(event)
                 own.append(self._responses.ending(name, REPLAN, reason))
             if own:
                 on[event] = tuple(own)
@@ -96,6 +96,8 @@ class _Expansion:
         return {name: state.model_copy(update={"on": on}), **recoveries}
 
 
+NO_CANDIDATE_FITS = "no candidate fits"
+"""The reason of a plan's step whose candidates all have false conditions."""
 Ways = Mapping[str, tuple[Transition, ...]]
 """Transitions by event, tried in order."""
 

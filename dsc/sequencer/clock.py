@@ -174,6 +174,15 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
             heapq.heapify(self._due)
             self._cancelled = 0
 
+    def run_in_executor(
+        self, executor: Any, func: Callable[[Unpack[_Args]], _Result], *args: *_Args
+    ) -> asyncio.Future[_Result]:
+        """Run a function in a thread, e.g. for `asyncio.to_thread`; simulated time stops until it returns."""
+        future = super().run_in_executor(executor, func, *args)
+        self._change_holds(+1)
+        future.add_done_callback(lambda _: self._change_holds(-1))
+        return future
+
     async def settled(self) -> None:
         """Wait until the loop has no more work at the present time; time does not advance."""
         waits = self.create_future()

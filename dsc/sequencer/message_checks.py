@@ -69,10 +69,10 @@ def _invalid(start: Start, reason: str, place: str) -> Outcome:
     return outcome
 
 
-def late(start: Start, seconds: float, missing: str = "", observed: Delta = NO_CHANGE) -> Outcome:
-    """Return the outcome `timed_out` of a skill. A skill that waited for the component `missing` has not begun."""
+def late(start: Start, seconds: float, waited: str = "", observed: Delta = NO_CHANGE) -> Outcome:
+    """Return the outcome `timed_out` of a skill, which waited `for` a component or `at` a line."""
     skill = f"{start.component}.{start.skill}"
-    reason = f"{skill}: no outcome within {seconds:g} s" + (f", it waited for {missing}" if missing else "")
+    reason = f"{skill}: no outcome within {seconds:g} s" + (f", it waited {waited}" if waited else "")
     return Outcome(TIMED_OUT, {"skill": skill, "seconds": seconds, "reason": reason}, observed)
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
+import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -11,6 +13,7 @@ from dsc.blocking import DeadlineError
 from dsc.calls import Reports
 from dsc.components.hooks import GRACE, Classes, give_up, give_up_after, is_own, programming_error
 from dsc.engine.steps import Start
+from dsc.errors import ProgrammingError
 from dsc.events import PROGRAMMING_ERROR, SKILL_ERROR
 from dsc.messages import SkillMessage
 from dsc.outcomes import Outcome
@@ -18,6 +21,9 @@ from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.message_checks import failed, faulty, late, validated
 from dsc.skills import SkillSignature
 from knowledge_base.errors import described
+from knowledge_base.tracebacks import waits_at
+
+_LOG = logging.getLogger(__package__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,16 +86,37 @@ class RunningSkill:
         self._post = post
         self._fault = fault
         self._raises = raises
+        self._thread = threading.get_ident()
         self._expired = False
+        self._waited = ""
         self._timer: asyncio.TimerHandle | None = None
 
     # -- answers -----------------------------------------------------------------------------------------
 
     def report(self, outcome: Outcome) -> None:
-        """Post an intermediate event, unless the skill has ended."""
+        """Post an intermediate event, unless the skill has ended.
+
+        Raises:
+            ProgrammingError: the call comes from another thread than the event loop's; the skill then fails, too.
+        """
+        if threading.get_ident() != self._thread:
+            skill = f"{self.start.component}.{self.start.skill}"
+            bug = ProgrammingError(f"{skill}: it reports from another thread; declare it `blocking`")
+            self.task.get_loop().call_soon_threadsafe(self._misused, bug)
+            raise bug
+        if self.answered:
+            _LOG.warning("skill '%s.%s' reports after its end", self.start.component, self.start.skill)
         if not self.stopped and not self.answered:
             self.reports = self.reports or Reports(self._post_report)
             self.reports.put(validated(outcome, self.start, self.signature))
+
+    def _misused(self, bug: ProgrammingError) -> None:
+        if self.answered:
+            self._fault(str(bug))
+            return
+        programming_error(bug, "")
+        self.answer(faulty(self.start, str(bug)))
+        self.task.cancel()
 
     def _post_report(self, report: Outcome, conflated: int) -> None:
         ends = report.event in {SKILL_ERROR, PROGRAMMING_ERROR}
@@ -116,7 +143,7 @@ class RunningSkill:
         """Return the outcome of a skill that raised an error; `None` if its task was cancelled from outside."""
         cancelled = issubclass(type(error), asyncio.CancelledError)
         if cancelled and self._expired and self.task.uncancel() <= 0:  # only the deadline has cancelled it
-            return late(self.start, self.within, missing)
+            return late(self.start, self.within, f"for {missing}" if missing else self._waited)
         if not is_own(error, self.task):
             return None
         if issubclass(type(error), DeadlineError) or (self.is_late and issubclass(type(error), TimeoutError)):
@@ -153,6 +180,8 @@ class RunningSkill:
         if self.task.done():
             self._abandon()
             return
+        place = waits_at(self.task.get_coro())
+        self._waited = f"at {place}" if place else ""
         self.task.cancel()
         self._timer = asyncio.get_running_loop().call_later(GRACE, self._overdue)
 
@@ -164,12 +193,13 @@ class RunningSkill:
         """Post `timed_out` for a task that ignored its deadline, so that the chart need not wait for the task."""
         if not self.answered:
             self.given_up()
-            self.answer(late(self.start, self.within))
+            self.answer(late(self.start, self.within, self._waited))
 
     def given_up(self) -> None:
         """Report as a fault that the skill ignored its cancellation."""
-        skill = f"{self.start.component}.{self.start.skill}"
-        self._fault(f"skill '{skill}' ignored its cancellation for {GRACE:g} s and was abandoned")
+        skill, place = f"{self.start.component}.{self.start.skill}", waits_at(self.task.get_coro())
+        where = f"; it waits at {place}" if place else ""
+        self._fault(f"skill '{skill}' ignored its cancellation for {GRACE:g} s and was abandoned{where}")
 
 
 class PendingCleanups:

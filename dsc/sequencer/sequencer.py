@@ -10,7 +10,7 @@ from typing import Any, Generic, cast
 
 from dsc.calls import Outputs, PlotCall
 from dsc.components.component import Component
-from dsc.components.hooks import programming_errors
+from dsc.components.hooks import programming_errors, unheard_errors
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output
@@ -242,7 +242,8 @@ class Sequencer:
 
     async def _watched(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
         is_part = self.dispatcher.is_part  # the sequencer around it has a watchdog
-        with programming_errors() as bugs, nullcontext() if is_part else Watchdog(self.dispatcher.skill_of):
+        watched = nullcontext() if is_part else Watchdog(self.dispatcher.skill_of)
+        with programming_errors() as bugs, unheard_errors(bugs), watched:
             return await self._until_end(begin, bugs)
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]], bugs: Iterable[str]) -> RunEnd:

@@ -88,6 +88,10 @@ class PlanRecords:
         """Record that the plan omits steps that the goal does not need."""
         self._trace.record("plan.skipped", plot=name, steps=[str(step) for step in steps], why=why)
 
+    def unobserved(self, name: str, step: PlanStep, facts: Iterable[Expression]) -> None:
+        """Record the expected effects of a step that do not hold some time after its end."""
+        self._trace.record("plan.unobserved", plot=name, step=str(step), facts=[_text(fact) for fact in facts])
+
     def gave_up(self, name: str, reason: str) -> None:
         """Record that the robot abandons the goal of the plan."""
         self._trace.record("plan.gave_up", plot=name, reason=reason)

@@ -7,13 +7,17 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from dsc.dynamic.rule_expansion import NO_CANDIDATE_FITS
+from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.effect import effect_conditions
-from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.language.syntax.expression import Expression, Not
 from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.text import to_text
 from planning.execution.outcomes import GaveUp, GoalHolds, PlotFound, Repaired, Replan
 from planning.execution.plan_progress import PlanProgress, is_true, shortest_end
 from planning.execution.plan_run import EscalationStep, Failure, PlanRun, PlanRuns, PlanState
 from planning.generation.carried_steps import expectation, implementing
+from planning.generation.control_flow import NOT_OBSERVED
 from planning.generation.plan_to_plot import laid_out, plot_of
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import PartialOrder, in_sequence
@@ -39,17 +43,23 @@ class Choices:
     Args:
         domain: the planning domain.
         library: the plots.
+
+    Attributes:
+        refusals: the candidates of the last decision that chose none, with the reasons.
     """
 
     def __init__(self, domain: PlanningDomain, library: Library) -> None:
         self._domain = domain
         self._library = library
+        self.refusals: list[str] = []
         self._chosen: dict[tuple[str, frozenset[tuple[str, Any]]], str] = {}
 
     def note(self, step: Step) -> None:
         """Store the choices of a macrostep."""
         for made in step.decisions:
             decision = made.decision
+            if decision.chosen is None:
+                self.refusals = [f"{one.plot}: {one.reason}" for one in decision.verdicts if not one.fits]
             plot = None if decision.chosen is None else self._library.plot(decision.chosen)
             if plot is not None and plot.implements:
                 self._chosen[plot.implements, frozenset(decision.arguments.items())] = plot.name
@@ -150,6 +160,10 @@ class Escalation:
         if self._reached(run):
             return GoalHolds()
         progress, attempt = run.progress, run.attempt
+        if why.startswith(NOT_OBSERVED):
+            why += self._unobserved(run)
+        elif why == NO_CANDIDATE_FITS and self.choices.refusals:
+            why += f" ({'; '.join(self.choices.refusals)})"
         end = self._end(run)
         failed = None if run.state is PlanState.STOPPED else self._failed_step(progress)
         if end is not None and (run.successor is not None if failed is None else failed not in end):
@@ -159,7 +173,9 @@ class Escalation:
             attempt.resumed[end[0]] += 1
             return self._continued(run, end, why, choice if step is EscalationStep.OTHER_CANDIDATE else None)
         if step is EscalationStep.GIVE_UP:
-            return self._give_up(run, f"{failed} has failed before, in the same way and the same situation: {why}")
+            remedy = self._remedy(failed) if failed is not None and why.startswith(NOT_OBSERVED) else ""
+            reason = f"{failed} has failed before, in the same way and the same situation: {why}{remedy}"
+            return self._give_up(run, reason)
         if attempt.replans >= run.replans:
             return self._give_up(run, f"the budget of {run.replans} new plans is used up: {why}")
         attempt.replans += 1
@@ -216,6 +232,25 @@ class Escalation:
         expected = expectation(domain.action(step).effect, domain.bindings(step))
         return None if is_true(expected, self._knowledge) else step
 
+    def _unobserved(self, run: PlanRun) -> str:
+        """Record the expected effects of running steps that do not hold, and return them as text."""
+        domain, missing = self.plotting.derivation.domain, list[str]()
+        for step in run.progress.steps_of(run.progress.running):
+            expected = conjuncts(expectation(domain.action(step).effect, domain.bindings(step)))
+            facts = [one for one in expected if not is_true(one, self._knowledge)]
+            if facts:
+                self.records.unobserved(run.name, step, facts)
+            missing += map(_as_missing, facts)
+        return f": {', '.join(missing)}" if missing else ""
+
+    def _remedy(self, failed: PlanStep) -> str:
+        name = self.choices.of(failed)
+        if name is None:
+            return ""
+        place = self.plotting.library.plot(name).place(("plot",))
+        where = f" ({place})" if place is not None and place.source else ""
+        return f"; let its skill observe the effect, or give plot '{name}'{where} `tell` or `effects: assumed`"
+
     def _continued(
         self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None
     ) -> PlotFound:
@@ -246,6 +281,10 @@ class Escalation:
         self.runs.over(run.name)
         self.records.gave_up(run.name, reason)
         return GaveUp(reason=reason)
+
+
+def _as_missing(fact: Expression) -> str:
+    return f"{to_text(fact.body)} is still true" if isinstance(fact, Not) else f"{to_text(fact)} is false"
 
 
 def situation(domain: PlanningDomain, world: View, goal: Expression) -> str:

@@ -33,6 +33,8 @@ HELD = "held"
 MOST_WATCHED = 86400
 """The time limit, in seconds, for the call of `planner.hold`, since every call needs a limit."""
 _HELD = Comparison("=", Variable(HELD), Constant(value=True))
+NOT_OBSERVED = "not observed: "
+"""Beginning of the reason if the effects of a step do not hold in time."""
 _DONE, _BEGUN = "done", "begun"
 
 
@@ -141,7 +143,7 @@ class Writer:
             onward = self._onward(following, lane, step.expected, told, step)
         state: dict[str, Any] = {"always": onward}
         if step.expected and not left_out:
-            state["after"] = {"seconds": step.confirm, **self._replan(lane, f"not observed: {step.text}")}
+            state["after"] = {"seconds": step.confirm, **self._replan(lane, f"{NOT_OBSERVED}{step.text}")}
         return state
 
     def _onward(

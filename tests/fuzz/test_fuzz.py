@@ -74,7 +74,7 @@ def test_every_command_and_option_is_drawn():
         if option.startswith("-")
     }
     drawn, random = set(), Random(0)
-    for _ in range(40):
+    for _ in range(60):
         for words in commands():
             drawn |= {(words, one) for one in fuzz_commands._drawn(random, words, {})}
     assert declared - drawn == set()

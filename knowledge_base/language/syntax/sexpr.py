@@ -193,7 +193,8 @@ def typed_variables(nodes: Sequence[Node], *, distinct: bool = True) -> tuple[Ty
     found: list[TypedVariable] = []
     for name, types, place in parse_typed_list(nodes):
         if not name.startswith("?") or name == "?":
-            raise ParseError(f"a variable begins with '?': ?{name.lstrip('?') or 'x'}", place=place)
+            hint = "" if name == "?" else f"; a type follows a dash: - {name}"
+            raise ParseError(f"a variable begins with '?': ?{name.lstrip('?') or 'x'}{hint}", place=place)
         if distinct and name in seen:
             raise ParseError(f"the variable '{name}' is declared twice", place=place)
         seen.add(name)

@@ -69,4 +69,4 @@ def test_a_robot_says_which_condition_no_engine_that_it_may_ask_can_do(jars, wor
         [outcome] = robot.achieve("(sealed a)").emitted
     reason = outcome.attributes["reason"]
     assert (outcome.name, "jars.pddl:6:" in reason, "(> (litres ?j) 2)" in reason) == ("no_plan", True, True)
-    assert "pyperplan cannot do that, enhsp could (" in reason
+    assert "no installed engine can do that, enhsp could (" in reason
