@@ -9,10 +9,21 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, Generic, Self, TypeVar
 
-from pydantic import ConfigDict, Discriminator, PlainSerializer, PlainValidator, PrivateAttr, WithJsonSchema
+from pydantic import (
+    ConfigDict,
+    Discriminator,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    PlainValidator,
+    PrivateAttr,
+    WithJsonSchema,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
 
 from dsc.model.reading import UNKNOWN_FORM, Form, FormPath
 from knowledge_base.errors import InputError, Place
@@ -23,6 +34,7 @@ from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text
 
 _Read = TypeVar("_Read")
+_Part = TypeVar("_Part")
 
 _SYMBOL = re.compile(r"[a-z0-9_][a-z0-9_\-#~.]*", re.IGNORECASE)
 
@@ -155,40 +167,58 @@ def _setting(value: object) -> Value:
     raise ValueError(f"a number, a text or a truth value was expected; found {value!r}")
 
 
+@dataclass(frozen=True, eq=False)
+class _Text(Generic[_Part]):
+    """Marks a field whose value is read from text and is written back as text.
+
+    Pydantic's own markers also make a schema for the class of the value. For conditions that took half of the time in
+    which the model is imported.
+    """
+
+    read: Callable[[object], _Part]
+    write: Callable[[_Part], Any]
+    description: JsonSchemaValue
+
+    def __get_pydantic_core_schema__(self, _source: object, _handler: GetCoreSchemaHandler) -> CoreSchema:
+        written = core_schema.plain_serializer_function_ser_schema(self.write)
+        return core_schema.no_info_plain_validator_function(self.read, serialization=written)
+
+    def __get_pydantic_json_schema__(self, _schema: CoreSchema, _handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return dict(self.description)
+
+
 Setting = Annotated[Value, PlainValidator(_setting), WithJsonSchema({"type": ["string", "number", "boolean"]})]
 """Field type of a constant value."""
 
 ConditionField = Annotated[
     Expression,
-    PlainValidator(_condition),
-    PlainSerializer(_text_out),
-    WithJsonSchema({"type": "string", "description": "a condition, e.g. (and (on ?o table) (cup ?o))"}),
+    _Text(_condition, _text_out, {"type": "string", "description": "a condition, e.g. (and (on ?o table) (cup ?o))"}),
 ]
 """Field type of a condition; each free variable must be a chart variable, a parameter or an event attribute."""
 
 TermField = Annotated[
     Term,
-    PlainValidator(_term),
-    PlainSerializer(_term_out),
-    WithJsonSchema(
+    _Text(
+        _term,
+        _term_out,
         {
             "type": ["string", "number", "boolean"],
             "description": "a constant, a variable such as ?item or ?event.level, or arithmetic such as (+ ?n 1)",
-        }
+        },
     ),
 ]
 """Field type of a term: a constant, a variable or arithmetic."""
 
 EffectField = Annotated[
     Effect,
-    PlainValidator(_effect),
-    PlainSerializer(_text_out),
-    WithJsonSchema(
+    _Text(
+        _effect,
+        _text_out,
         {
             "type": ["string", "array"],
             "items": {"type": "string"},
             "description": "a PDDL effect, e.g. (and (unreachable ?item) (not (graspable ?item)))",
-        }
+        },
     ),
 ]
 """Field type of a change of the knowledge base, written as a PDDL effect."""

@@ -61,7 +61,7 @@ def _choices(names, world) -> list[dict[str, Any]]:
     return [dict(zip(names, choice, strict=True)) for choice in product(*(values[name] for name in names))]
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(st.lists(_plain_parts(), min_size=1, max_size=5).map(tuple), _bindings(), st.lists(deltas(), max_size=3))
 def test_a_question_is_answered_as_the_textbook_does_and_prepared_in_the_same_order(parts, params, changes) -> None:
     e = ex.And(parts)

@@ -14,7 +14,7 @@ from knowledge_base import Delta, KnowledgeBase
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax import expression as ex
 
-PROPERTY = settings(deadline=None, derandomize=True, max_examples=100)
+PROPERTY = settings(deadline=None, derandomize=True, max_examples=60)
 
 
 class UndoneError(Exception):

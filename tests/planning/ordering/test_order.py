@@ -38,7 +38,7 @@ def steps(*texts):
 # -- random plans, all linearisations ------------------------------------------------------------------------
 
 
-@settings(max_examples=150, derandomize=True, deadline=None)
+@settings(max_examples=60, derandomize=True, deadline=None)
 @given(planned())
 def test_every_linearisation_leads_to_the_goal_and_to_the_same_world_and_keeps_what_stands(case: Planned):
     order = deordered(case.plan, case.domain, case.world, case.goal)
@@ -56,7 +56,7 @@ def test_every_linearisation_leads_to_the_goal_and_to_the_same_world_and_keeps_w
     assert all(end == ends[0] for end in ends)
 
 
-@settings(max_examples=150, derandomize=True, deadline=None)
+@settings(max_examples=60, derandomize=True, deadline=None)
 @given(planned(), st.data())
 def test_there_is_an_order_for_exactly_those_plans_that_are_valid(case: Planned, data):
     steps = case.plan.steps
