@@ -13,4 +13,4 @@ settings.load_profile("same")
 settings.register_profile("mutation", settings.get_profile("same"), phases=(Phase.explicit, Phase.generate))
 
 # Typer makes the commands of an app anew at each call, which took a fifth of the time of all tests.
-typer.main.get_command = typer.testing._get_command = cache(typer.main.get_command)
+typer.main.get_command = typer.testing._get_command = cache(typer.main.get_command)  # type: ignore[attr-defined]

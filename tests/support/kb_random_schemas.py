@@ -113,9 +113,9 @@ def parameters(draw, e: ex.Expression, schema: Schema) -> dict[str, Any]:
 
 
 def brute_witnesses(e: ex.Expression, params: dict[str, Any], world) -> list[dict[str, Any]]:
-    """All choices for the free variables that make it true."""
+    """All choices for the free variables that make it true, in an order that does not depend on the world's history."""
     found: list[dict[str, Any]] = [{}]
     for name in sorted(ex.free_variables(e) - params.keys()):
-        values = NUMBERS if name == NUMBER else world.objects("object")
+        values = NUMBERS if name == NUMBER else sorted(world.objects("object"))
         found = [{**one, name: value} for one in found for value in values]
     return [one for one in found if brute(e, world, {**params, **one})]
