@@ -15,6 +15,7 @@ from knowledge_base.conditions.condition import Condition, Firing
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Change
 from knowledge_base.language.evaluation.lookups import conjuncts
+from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import Atom, Expression
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.store import KnowledgeBase
@@ -223,13 +224,22 @@ class Monitor:
         now, later = progress.needed() or {}, progress.needed_later() or {}
         if fallen is None:
             fallen = next((one for one in itertools.chain(now, later) if not is_true(one, world)), None)
-        why = validate(Plan(progress.remaining_steps), self._domain, world, progress.goal).why
+        why = validate(Plan(self._not_done(world)), self._domain, world, progress.goal).why
         if fallen is None:
             return Broken(why, "", len(progress.steps) + 1, author, version)
         return Broken(why, to_text(fallen), now.get(fallen) or later[fallen], author, version)
 
+    def _not_done(self, world: World) -> tuple[PlanStep, ...]:
+        """Return the remaining steps, without running steps whose expected effects already hold."""
+        progress = self._progress
+        done = [n for n in progress.running if is_true(_expected(progress.steps[n - 1], self._domain), world)]
+        return progress.steps_of(number for number in progress.remaining if number not in done)
+
+
+def _expected(step: PlanStep, domain: PlanningDomain) -> Expression:
+    return expectation(domain.action(step).effect, domain.bindings(step))
+
 
 def _brought(step: PlanStep, domain: PlanningDomain) -> list[Expression]:
     """Return the facts that a step adds in every world."""
-    expected = conjuncts(expectation(domain.action(step).effect, domain.bindings(step)))
-    return [part for part in expected if isinstance(part, Atom)]
+    return [part for part in conjuncts(_expected(step, domain)) if isinstance(part, Atom)]

@@ -370,3 +370,12 @@ def test_a_goal_that_cannot_be_computed_is_not_reached():
     plan.news.clear()
     plan.begin(1)
     assert [type(one) for one in plan.news] == [Broken]
+
+
+def test_the_reason_is_what_the_goal_lacks_and_no_condition_of_a_step_that_is_done():
+    plan = Watched(TWO, before=SIDE_BY_SIDE, facts=(fact("at", "eve", "hall"), fact("in", "p2", "hall")))
+    plan.begin(1)
+    plan.begin(2)
+    plan.do(2)  # nothing that follows has begun, so the plan still counts this step as running
+    plan.change("somebody", now="urgent p3")
+    assert [one.why for one in plan.news] == ["(in p3 office) is false"]
