@@ -14,6 +14,7 @@ from dsc.components.robot import require_deployed, require_instances, require_wh
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, ProgrammingError
 from dsc.model.plot import ActionPlot
+from dsc.model.states import DynamicState
 from dsc.profiles import adapted, configure
 from dsc.skills import SkillSignature, signatures
 from dsc.text.plot_files import load_plot
@@ -27,9 +28,11 @@ from knowledge_base.world.schema import Schema
 from planning.bundles import Bundle, components_of, gathered, plots_of, shipped_by
 from planning.deployment import begin, simulated
 from planning.domain import PlanningDomain
+from planning.engines.registry import able, installed, nobody
 from planning.execution.planning_component import PlanningComponent
 from planning.executive import achieve_plot
 from planning.problem.construction import check_goal
+from planning.problem.relevance import numeric_constructs
 from planning.simulation import Setup, Simulation
 from planning.soundness import IMPLEMENTED, check_implementations
 from planning.targets import bundle_at
@@ -171,6 +174,7 @@ class _Robot:
         if self._domain is not None:
             found += without_consequences(check_implementations(library, self._domain), self._broken_files())
             self._check_task(self._domain.schema)
+            found += self._unplannable(self._domain)
         self._check_components()
         return found
 
@@ -200,6 +204,18 @@ class _Robot:
         if bundle.main is not None:
             with tolerated():
                 self._check_main(bundle.main)
+
+    def _unplannable(self, domain: PlanningDomain) -> Iterator[Finding]:
+        """Yield a warning for numbers that actions change, if no installed engine can plan with them."""
+        if any(installed(one) and one.races for one in able({"numeric"})):
+            return
+        goals = [] if self._bundle.goal is None else [parse_condition(self._bundle.goal)]
+        goals += [state.goal for plot in self._plots for _, state, _ in plot.walk() if isinstance(state, DynamicState)
+                  and state.goal is not None]  # fmt: skip
+        constructs = {construct.place: construct for goal in goals for construct in numeric_constructs(domain, goal)}
+        for construct in constructs.values():
+            error = InputError(f"{replace(construct, place=None)}; {nobody({'numeric'}).who}", place=construct.place)
+            yield Finding(error, "engine", level="warning")
 
     def _check_main(self, main: str) -> None:
         plots = {plot.name: plot for plot in self._plots}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Self
 
 from rich.console import Console
@@ -18,6 +18,7 @@ _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "plan.found": lambda data: f"plan with {len(data['steps'])} steps ({data['engine']})",
     "plan.none": lambda data: f"no plan, {data['kind']}: {data['reason']}",
     "plan.broken": lambda data: f"the plan no longer holds: {data['reason']}",
+    "plan.failed": lambda data: f"failed: {' or '.join(data['steps'])}: {data['why']}",
     "plan.resumed": lambda data: f"the plan resumes at {data['step']}: {data['why']}",
     "plan.skipped": lambda data: f"skipped {', '.join(data['steps']) or 'no step'}: {data['why']}",
     "plan.excluded": lambda data: f"{data['step']} is excluded for {data['seconds']:g} s: {data['why']}",
@@ -87,6 +88,15 @@ def _working(scope: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return found
 
 
+def _rule_labels(form: Any) -> Iterator[str]:
+    """Yield the labels of rules and handlers on transitions; a state that such a response added is about its label."""
+    parts = form.values() if isinstance(form, Mapping) else form if isinstance(form, list | tuple) else ()
+    for part in parts:
+        yield from _rule_labels(part)
+    if isinstance(form, Mapping) and isinstance(form.get("rule"), str):
+        yield form["rule"]
+
+
 class PlainProgress:
     """A trace listener that writes one line for each notable record."""
 
@@ -94,17 +104,29 @@ class PlainProgress:
         self._write = write
         self._steps: dict[str, str] = {}
         self._stages: set[str] = set()
+        self._entered: list[str] = []  # the lines of the last macrostep; its rules come next, and are written first
 
     def __call__(self, record: Record) -> None:
         """Write the lines of text for one record, if there are any."""
         if record.type == "plot":
             self._learn_steps(record.data["plot"])
-        for line in self.lines(record):
-            self._write(f"{record.t:8.1f} s  {line}")
+        if record.type != "rule":
+            self._write_all(self._entered)
+            self._entered = []
+        lines = [f"{record.t:8.1f} s  {line}" for line in self.lines(record)]
+        if record.type == "step":
+            self._entered = lines
+        else:
+            self._write_all(lines)
+
+    def _write_all(self, lines: Iterable[str]) -> None:
+        for line in lines:
+            self._write(line)
 
     def _learn_steps(self, plot: dict[str, Any]) -> None:
         working = {} if plot["plot"] == ACHIEVE else _working(plot)  # progress shows the plan, not its execution state
-        self._stages |= working.keys()
+        responses = set(_rule_labels(plot))
+        self._stages |= {name for name, state in working.items() if state.get("about") not in responses}
         if plot.get("generated"):
             self._steps = {name: state["about"] for name, state in working.items() if _STEP.fullmatch(name)}
 

@@ -96,7 +96,7 @@ class Report:
         ]
         for title, counts in (
             ("skill failures", self.skill_failures),
-            ("recovered by rule", self.recoveries),
+            ("rules used", self.recoveries),
             ("candidates chosen", self.candidates_chosen),
             ("excluded for a while", self.excluded),
             ("effects not observed", self.not_observed),

@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from dsc.engine.situation import Chart
 from dsc.engine.tables import CompiledPlot
 from dsc.events import Event
+from dsc.model.plot import ActionPlot
 from knowledge_base.errors import ParseError, UnknownNameError
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -261,6 +262,11 @@ class MachineState(NamedTuple):
         """Return whether the state with this serial number is still active."""
         return self.root is not None and any(serial in one.activations.values() for one in self.root.frames())
 
+    def state_of(self, serial: int) -> tuple[str, ActionPlot] | None:
+        """Return path and plot of the state with this serial number; `None` if the state is no longer active."""
+        found = [] if self.root is None else _activated(self.root, "", serial)
+        return next(iter(found), None)
+
     def activations_inside(self, serial: int) -> frozenset[int]:
         """Return `serial` and the serial numbers of activations inside its state; empty if the state is not active."""
         for frame in self.root.frames() if self.root else ():
@@ -284,6 +290,14 @@ def at_rest(root: FrameState, serials: int) -> MachineState:
     if kept is None:
         kept = root.configuration.bare = MachineState(root, serials)
     return kept
+
+
+def _activated(frame: FrameState, prefix: str, serial: int) -> Iterator[tuple[str, ActionPlot]]:
+    for name, own in frame.activations.items():
+        if own == serial:
+            yield prefix + name, frame.compiled.plot
+    for name, inner in frame.children.items():
+        yield from _activated(inner, f"{prefix}{name}/", serial)
 
 
 def _paths(frame: FrameState, prefix: str) -> Iterator[str]:

@@ -16,6 +16,7 @@ from dsc.engine.steps import NO_CHANGE, Cancel, Output, SendLater, SetParameter,
 from dsc.errors import RunawayError
 from dsc.events import EVERY, PROGRAMMING_ERROR, SKILL_FAILURES, Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
+from dsc.model.plot import ActionPlot
 from dsc.runs.kept import Kept
 from dsc.sequencer.step_tracing import StepTracer
 from dsc.trace import Trace
@@ -277,10 +278,19 @@ class Reactor:
             return
         if not isinstance(message, SkillMessage) or not message.final or event.to is None:
             return
-        if self.machine.state.has_activation(event.to):
+        caller = self.machine.state.state_of(event.to)
+        if caller is not None:
             skill = f"{message.start.component}.{message.start.skill}"
             whose = f": {event.attributes['reason']}" if event.name in SKILL_FAILURES else f" of {skill}"
-            self.problem = f"no transition handles '{event.name}'{whose}"
+            self.problem = f"no transition handles '{event.name}'{whose}; the caller is {_described(*caller)}"
+
+
+def _described(path: str, plot: ActionPlot) -> str:
+    name = path.rsplit("/", 1)[-1]
+    form = next((form for one, _, form in plot.walk() if one == name), ())
+    place = plot.place(form)
+    where = f" ({place})" if place is not None and place.source else ""
+    return f"state '{path}' of plot '{plot.name}'{where}"
 
 
 def _is_vain(step: Step) -> bool:

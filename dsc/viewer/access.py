@@ -154,7 +154,9 @@ class Access:
         if host not in self._hosts:
             return "this Host is not served"
         needs_origin = scope["type"] == "websocket" or scope["method"] in MUST_HAVE_ORIGIN
-        if origin != f"http://{host}" and (origin is not None or needs_origin):
+        if origin is None and needs_origin:
+            return f"this request needs the header 'Origin: http://{host}'"
+        if origin not in {None, f"http://{host}"}:
             return "this Origin is not served"
         return None
 

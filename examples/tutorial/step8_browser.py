@@ -43,5 +43,5 @@ if __name__ == "__main__":
 # Goal reached (judge: knowledge), 55 s of run time.
 #   plans 1, replans 0
 #   skill failures: door_closed 1
-#   recovered by rule: door_closed: knock, retry 1
+#   rules used: door_closed: knock, retry 1
 #   candidates chosen: drive 5, pick_up 1

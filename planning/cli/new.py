@@ -34,7 +34,9 @@ def new_command(
     for path, text in texts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, "utf-8")
-    typer.echo(f"made {folder}: {', '.join(sorted(str(path) for path in texts if path.suffix in {'.py', '.pddl'}))}")
+    typer.echo(f"made {folder}:")
+    for path in sorted(texts, key=lambda path: (path.parts[0].startswith("."), path)):
+        typer.echo(f"  {path}")
     typer.echo(f"next:  cd {folder}    dsc check    dsc run .    dsc run . --view    pytest")
 
 

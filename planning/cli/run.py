@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from knowledge_base.store import KnowledgeBase
     from planning.bundles import Bundle
     from planning.deployment import Deployment, Task
+    from planning.engines.planner import Planner
     from planning.report import Report
 
 GOAL_REACHED, SOMETHING_LEFT = 0, 1
@@ -65,6 +66,9 @@ def run_command(
     profile: Annotated[
         str | None, typer.Option(metavar="NAME|FILE", help="The robot and the values of its parameters (YAML).")
     ] = None,
+    engine: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The planning engine.  [default: one that suits the problem]")
+    ] = None,
     real_time: Annotated[bool, typer.Option("--real-time", help="Run in real time.")] = False,
     speed: Annotated[
         float | None,
@@ -104,6 +108,7 @@ def run_command(
     if speed is not None and real_time:
         raise InputError("a run is in real time, or in simulated time at a --speed")
     output = None if trace is None else Output(trace, "--trace", scenario, settings, store, resume, over=BEGINS)
+    planner = None if engine is None else _planner(engine)
     if resume is not None:
         beginning = {
             "--goal": goal, "--plot": plot, "--with": with_, "--scenario": scenario, "--seed": seed,
@@ -112,11 +117,11 @@ def run_command(
         given = [name for name, value in beginning.items() if value is not None] + ["--real-time"] * real_time
         if given:
             raise InputError(f"--resume continues a run as it began, without {', '.join(given)}")
-        deployed = _resumed(resume, target, durability)
+        deployed = _resumed(resume, target, durability, planner)
     else:
         bundle = _bundle(target)
         deployed = _deployed(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
-                             durability, target)  # fmt: skip
+                             durability, target, planner)  # fmt: skip
     follow = partial(_followed, deployed, simulated=not real_time, speed=inf if speed is None else speed,
                      quiet=json or quiet, trace=output)  # fmt: skip
     with deployed:
@@ -173,6 +178,7 @@ def _deployed(
     store: Path | None,
     durability: Durability,
     target: str | None,
+    planner: Planner | None,
 ) -> Deployment:
     from dsc.text.profiles import find_profile
     from planning.deployment import deploy
@@ -181,11 +187,19 @@ def _deployed(
     settings = None if profile is None else find_profile(profile, bundle.profiles or Path())
     return deploy(
         bundle, task, seed=seed, faults=faults, scenario=scenario, profile=settings, store=store,
-        durability=durability.value, target=None if target is None else full_target(target),
+        durability=durability.value, planner=planner, target=None if target is None else full_target(target),
     )  # fmt: skip
 
 
-def _resumed(store: Path, target: str | None, durability: Durability) -> Deployment:
+def _planner(engine: str) -> Planner:
+    """Return the planner of one engine; its processes end with the program."""
+    from planning.engines.race import CachingPlanner, PlannerRace
+    from planning.engines.registry import only
+
+    return CachingPlanner(PlannerRace(choose=only(engine)))
+
+
+def _resumed(store: Path, target: str | None, durability: Durability, planner: Planner | None) -> Deployment:
     """Deploy the robot that began the run in a store; `target` replaces the target that the store has kept."""
     from knowledge_base.errors import Place, StoreError
     from planning.deployment import kept_run, resume
@@ -196,7 +210,7 @@ def _resumed(store: Path, target: str | None, durability: Durability) -> Deploym
     if wanted is None:
         whose = f"the run of '{run.plot}' in this store is another program's, which resumes it: Executive.resume()"
         raise StoreError(whose, place=Place(str(store)))
-    return resume(bundle_at(str(wanted)), store, durability=durability.value)
+    return resume(bundle_at(str(wanted)), store, durability=durability.value, planner=planner)
 
 
 def _viewed(

@@ -132,7 +132,7 @@ class PlannerProcess:
         if not problem.goal and not problem.bounds and not problem.unreachable:
             return PlanFound(Plan(), self.engine, 0.0, problem.simulated_seconds)
         if cannot(self.engine, problem):
-            return nobody(problem, self.engine)
+            return nobody(problem.features, self.engine)
         return None
 
     def _none(self, problem: Problem, reason: str) -> ProvenUnsolvable | NoneFound:

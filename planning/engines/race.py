@@ -98,7 +98,7 @@ class PlannerRace:
     ) -> AsyncGenerator[PlanningOutcome, None]:
         """Yield the outcomes of a race of `engines` for one form of a problem, e.g. its temporal form."""
         if not engines:
-            yield nobody(problem)
+            yield nobody(problem.features)
             return
         for task in self._improving:
             task.cancel()

@@ -10,13 +10,13 @@ import platform
 import re
 import shutil
 import subprocess
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, requires, version
 from typing import Any
 
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError
 from planning.plan import NobodyCan
 from planning.strips import Problem
 
@@ -161,10 +161,10 @@ def in_concert() -> str:
     return "engines that could do several: " + ", ".join(map(described, able({"durations"})))
 
 
-def nobody(problem: Problem, engine: str = "") -> NobodyCan:
-    """Return the outcome for a problem that no permitted engine supports."""
-    could = tuple((one.name, one.lacks()) for one in able(problem.features) if one.races)
-    return NobodyCan(engine, tuple(sorted(problem.features - WISHES)), could)
+def nobody(features: Collection[str], engine: str = "") -> NobodyCan:
+    """Return the outcome for a problem with these features, which no permitted engine supports."""
+    could = tuple((one.name, one.lacks()) for one in able(features) if one.races)
+    return NobodyCan(engine, tuple(sorted(frozenset(features) - WISHES)), could)
 
 
 def cannot(name: str, problem: Problem) -> bool:
@@ -197,6 +197,19 @@ def repeatable(problem: Problem, *, usable: Callable[[Engine], bool] = installed
     """
     suited = [one for one in able(problem.features) if one.races and one.deterministic and usable(one)]
     return sorted(suited, key=lambda one: one.name != "pyperplan")[:1]
+
+
+def only(name: str) -> Callable[[Problem], Sequence[Engine]]:
+    """Return a choice of one engine, for `PlannerRace`; the choice is empty for problems that it does not support.
+
+    Raises:
+        UnknownNameError: no engine has this name.
+        InputError: the engine is not installed.
+    """
+    named = engine(name)
+    if lacks := named.lacks():
+        raise InputError(f"the engine '{name}' is not installed: {lacks}")
+    return lambda problem: [named] if named.can_do(problem.features) else []
 
 
 _JAVA_SECONDS = 10.0

@@ -92,6 +92,10 @@ class PlanRecords:
         """Record the expected effects of a step that do not hold some time after its end."""
         self._trace.record("plan.unobserved", plot=name, step=str(step), facts=[_text(fact) for fact in facts])
 
+    def failed(self, name: str, steps: Iterable[PlanStep], why: str) -> None:
+        """Record that one of the running steps failed, and that a new plan is needed."""
+        self._trace.record("plan.failed", plot=name, steps=[str(step) for step in steps], why=why)
+
     def gave_up(self, name: str, reason: str) -> None:
         """Record that the robot abandons the goal of the plan."""
         self._trace.record("plan.gave_up", plot=name, reason=reason)

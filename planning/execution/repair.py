@@ -169,6 +169,8 @@ class Escalation:
         if end is not None and (run.successor is not None if failed is None else failed not in end):
             return self._continued(run, end, why)
         step, choice = self._chosen(run, failed, end, why)
+        if step is EscalationStep.REPLAN and run.state is PlanState.MONITORED:
+            self.records.failed(run.name, progress.steps_of(progress.running), why)
         if end is not None and step in (EscalationStep.RESUME, EscalationStep.OTHER_CANDIDATE):
             attempt.resumed[end[0]] += 1
             return self._continued(run, end, why, choice if step is EscalationStep.OTHER_CANDIDATE else None)

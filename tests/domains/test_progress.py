@@ -19,7 +19,14 @@ def step(entered=(), taken=()):
 
 PLOT = {
     "plot": "main",
-    "states": {"group": {"states": {"look": {"use": "search"}, "decide": {}}}, "end": {"final": True}},
+    "states": {
+        "group": {
+            "states": {"look": {"use": "search"}, "decide": {}},
+            "on": {"slipped": {"to": "retried", "rule": "slipped: pick, retry"}},
+        },
+        "retried": {"use": "pick", "about": "slipped: pick, retry"},
+        "end": {"final": True},
+    },
 }
 PLAN = {
     "plot": "plan_1", "generated": True,
@@ -30,10 +37,11 @@ RECORDS = [
     record(2, "step", **step(["group", "group/decide", "look"])),
     record(3, "plan.found", plot="plan_1", steps=["(pick cup)"], engine="fake"),
     record(4, "plot", plot=PLAN),
-    record(5, "step", **step(["clear/execute/step_1", "clear/execute/step_1/pick"])),
+    record(5, "step", **step(["clear/execute/step_1", "clear/execute/step_1/pick", "retried"])),
     record(6, "rule", rule="slipped: pick, retry", state="clear/execute/step_1"),
     record(7, "plan.none", kind="timed_out", reason="no plan within 5 s"),
     record(8, "plan.broken", reason="(on cup) is false", author="somebody", step=1),
+    record(8, "plan.failed", plot="plan_1", steps=["(pick cup)"], why="no_path"),
     record(9, "plan.resumed", plot="plan_2", after="plan_1", step="(pick cup)", why="no_path"),
     record(10, "plan.skipped", plot="plan_3", steps=["(pick cup)", "(put cup)"], why="the goal holds"),
     record(11, "plan.excluded", step="(pick cup)", seconds=120.0, why="no_path"),
@@ -43,8 +51,8 @@ RECORDS = [
     record(15, "end", finished=False, problem="nobody handles 'x'"),
 ]
 LINES = [
-    "look", "plan with 1 steps (fake)", "step   1  (pick cup)", "rule  slipped: pick, retry",
-    "no plan, timed_out: no plan within 5 s", "the plan no longer holds: (on cup) is false",
+    "look", "plan with 1 steps (fake)", "rule  slipped: pick, retry", "step   1  (pick cup)",
+    "no plan, timed_out: no plan within 5 s", "the plan no longer holds: (on cup) is false", "failed: (pick cup): no_path",
     "the plan resumes at (pick cup): no_path", "skipped (pick cup), (put cup): the goal holds",
     "(pick cup) is excluded for 120 s: no_path", "(pick cup) may be planned again: there is no plan without",
     "a plan fails in the simulation: (pick cup) ends in gone: gone",
@@ -83,4 +91,5 @@ def test_steps_that_stand_side_by_side_are_told_as_well():
     progress = PlainProgress(lines.append)
     progress(record(1, "plot", plot=plan))
     progress(record(2, "step", **step(["clear/execute/work", "clear/execute/before_2", "clear/execute/step_2"])))
+    progress(record(3, "end", finished=True, problem=None))
     assert [line.split(" s  ", 1)[1] for line in lines] == ["step   2  (throw can)"]

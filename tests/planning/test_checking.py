@@ -136,3 +136,18 @@ def test_a_programming_error_is_one_line_of_the_list(project):
     done = subprocess.run([DSC, "check", project], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (2, "")
     assert len(done.stdout.splitlines()) == 1
+
+
+@pytest.mark.parametrize("has_engine", [True, False])
+def test_numbers_that_no_installed_engine_can_plan_with_are_a_warning_with_the_remedy(project, monkeypatch, has_engine):
+    monkeypatch.setattr("planning.checking.installed", lambda one: has_engine or one.name == "pyperplan")
+    planted(project, [
+        ("domain.pddl", "(full))\n", "(full)) (:functions (charge))\n", ""),
+        ("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (> (charge) 2))", ""),
+        ("domain.pddl", "(robot-in ?to))", "(robot-in ?to) (decrease (charge) 1))", ""),
+    ])  # fmt: skip
+    found = [str(one) for one in check_project(str(project))]
+    assert len(found) == (not has_engine)
+    if found:
+        assert found[0].startswith(f"{project / 'domain.pddl'}:7:")
+        assert found[0].endswith("enhsp could (pip install 'up-enhsp>=0.1.1') [warning]")

@@ -129,7 +129,7 @@ def test_intermediate_reports_reach_the_chart_and_the_knowledge_base():
 def test_an_outcome_nobody_handles_ends_the_run_with_a_problem():
     ran = Ran("{plot: p, states: {a: {entry: {trigger: arm.grasp}, on: {slipped: e}}, e: {final: true}}}")
     assert not ran.end.finished
-    assert ran.end.problem == "no transition handles 'grasped' of arm.grasp"
+    assert ran.end.problem == "no transition handles 'grasped' of arm.grasp; the caller is state 'a' of plot 'p'"
     (end,) = ran.of_type("end")
     assert (end["finished"], end["reached"], end["problem"]) == (False, False, ran.end.problem)
 

@@ -97,7 +97,9 @@ def test_others_are_refused_with_a_reason(viewer, token, headers, reason) -> Non
 
 def test_a_request_that_asks_something_and_a_socket_must_say_their_origin(viewer) -> None:
     url = f"http://127.0.0.1:{viewer.port}/query?token={viewer.token}"
-    assert httpx.post(url, json={"seq": 1, "expression": "(hand-free)"}).status_code == 403
+    answer = httpx.post(url, json={"seq": 1, "expression": "(hand-free)"})
+    assert answer.status_code == 403
+    assert f"needs the header 'Origin: http://127.0.0.1:{viewer.port}'" in answer.text
     with pytest.raises(import_module("websockets.exceptions").InvalidStatus, match="403"):
         socket(viewer, origin=None)
 

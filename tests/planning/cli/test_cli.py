@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
 from planning.cli import doctor_command, plan_command
+from planning.cli.command import app
 from planning.engines import registry
 from planning.engines.registry import ENGINES
 from planning.plan import EngineFailed, PlanFound
@@ -96,6 +97,17 @@ def test_an_engine_that_is_not_installed_says_how_to_get_it(run, monkeypatch):
     monkeypatch.setattr("planning.engines.registry.Engine.version", None)
     with pytest.raises(InputError, match=r"not installed: pip install 'up-fast-downward>=1\.0'"):
         run("--engine", "fast-downward")
+
+
+@pytest.mark.parametrize(
+    ("engine", "said"),
+    [("pyperlan", "no engine 'pyperlan'; did you mean 'pyperplan'"), ("aries", "not installed: pip install 'up-aries")],
+)
+def test_a_run_with_an_unknown_or_missing_engine_is_refused(monkeypatch, engine, said):
+    monkeypatch.setattr("planning.engines.registry.Engine.version", None)
+    result = CliRunner().invoke(app, ["run", "clean-up-table", "--engine", engine])
+    assert isinstance(result.exception, InputError)
+    assert said in str(result.exception)
 
 
 def test_without_any_engine_the_command_says_what_could_be_installed(run, monkeypatch):
