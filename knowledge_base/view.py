@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import islice
 
+from knowledge_base._notebook import svg_by
 from knowledge_base.errors import ConflictError, InputError
 from knowledge_base.exchange import to_json
 from knowledge_base.facts import Content, Fact, Value
@@ -31,6 +32,8 @@ class View:
 
     A view is itself a `World` (`schema`, `holds`, `match`, `value`, `objects`, `type_of`).
     """
+
+    _repr_svg_ = svg_by("knowledge_base.drawing:draw")
 
     def __init__(self, state: WorldState, version: int) -> None:
         self._lock = ReadWriteLock()

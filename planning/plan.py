@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from knowledge_base._notebook import table
 from knowledge_base.errors import InputError
 
 
@@ -72,6 +73,14 @@ class Plan:
         """Return the plan as planners write it, one step per line."""
         return "\n".join(map(str, self.steps))
 
+    def _repr_html_(self) -> str:
+        numbered = enumerate(self.steps, start=1)
+        if not self.schedule:
+            return table(f"plan, {len(self.steps)} steps", ("", "step"), numbered)
+        times = [(f"{timing.start:g} s", f"{timing.duration:g} s") for timing in self.schedule]
+        rows = [(*step, *time) for step, time in zip(numbered, times, strict=True)]
+        return table(f"plan, {len(self.steps)} steps, {self.seconds:g} s", ("", "step", "start", "duration"), rows)
+
 
 @dataclass(frozen=True, slots=True)
 class PlanFound:
@@ -98,6 +107,9 @@ class PlanFound:
     from_cache: bool = False
     failures: tuple[EngineFailed, ...] = ()
     translated: float = 0.0
+
+    def _repr_html_(self) -> str:
+        return self.plan._repr_html_()
 
 
 @dataclass(frozen=True, slots=True)

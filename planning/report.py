@@ -9,6 +9,7 @@ from typing import Any, Literal
 from dsc.dynamic.library import Library
 from dsc.events import SKILL_FAILURES
 from dsc.sequencer.sequencer import RunEnd
+from knowledge_base._notebook import text
 from knowledge_base.language.syntax.expression import (
     And,
     Atom,
@@ -106,6 +107,9 @@ class Report:
         if self.faults and not self.skill_failures:
             lines.append(f"  {len(self.faults)} faults were drawn, and no skill reported a failure")
         return lines
+
+    def _repr_html_(self) -> str:
+        return text(self.lines())
 
     @property
     def _bug_is_told(self) -> bool:

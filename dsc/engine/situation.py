@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 from dsc.engine.tables import CompiledPlot
 from dsc.model.states import DynamicState
+from knowledge_base._notebook import table
 from knowledge_base.facts import Delta
 from knowledge_base.language.syntax.effect import Effect
 from knowledge_base.language.syntax.expression import (
@@ -70,6 +71,11 @@ class Decision:
     satisfied: bool = False
     verdicts: tuple[Verdict, ...] = ()
     version: int = 0
+
+    def _repr_html_(self) -> str:
+        title = "the goal holds" if self.satisfied else f"chosen: {self.chosen or 'no candidate fits'}"
+        rows = [("✓" if one.fits else "✕", one.plot, one.reason) for one in self.verdicts]
+        return table(f"{title} (version {self.version})", ("", "candidate", "reason"), rows)
 
 
 class Situation(Protocol):

@@ -24,6 +24,7 @@ from dsc.model.states import (
     Region,
     SubmachineState,
 )
+from knowledge_base._notebook import svg_by
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.spelling import is_plain_name
 
@@ -124,6 +125,7 @@ class ActionPlot(Written):
     generated: bool = Field(default=False, strict=True)
     dialect: Literal["dsc", "scxml"] = "dsc"
     _text: str | None = PrivateAttr(default=None)
+    _repr_svg_ = svg_by("dsc.drawing:draw")
 
     def with_default(self, name: str, value: object, who: Who) -> ActionPlot:
         """Return a copy of the plot with another default of a parameter, set by the role `who`.

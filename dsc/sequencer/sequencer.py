@@ -27,6 +27,7 @@ from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.recovery import recover, require_components
 from dsc.sequencer.watchdog import Watchdog
 from dsc.trace import Trace
+from knowledge_base._notebook import table
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
@@ -70,6 +71,10 @@ class RunEnd(Generic[Outputs]):
     def reached(self) -> bool:
         """Whether the run finished, and none of its goals ended with `no_plan` or `gave_up`."""
         return self.finished and not any(event.name in {NO_PLAN, GAVE_UP} for event in self.emitted)
+
+    def _repr_html_(self) -> str:
+        title = f"{'reached' if self.reached else 'not reached'}: {self.reason}"
+        return table(title, ("output", "value"), cast("Mapping[str, object]", self.outputs).items())
 
 
 class Sequencer:

@@ -18,7 +18,6 @@ from knowledge_base.spelling import value_text
 
 if TYPE_CHECKING:
     from knowledge_base.facts import Change, Delta
-    from knowledge_base.language.evaluation.explanation import Explanation
     from knowledge_base.pddl import ProblemText
     from knowledge_base.store import KnowledgeBase
 
@@ -245,12 +244,3 @@ def clock_time(seconds: float) -> str:
         return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
     except (OverflowError, ValueError, OSError):  # the time of another clock, e.g. simulated time in the far future
         return f"{seconds:g} s"
-
-
-def explanation_lines(why: Explanation, depth: int = 0, *, deciding: bool = True) -> Iterator[str]:
-    """Yield the tree of a condition, with one line for each part; arrows mark the parts that decide the truth."""
-    indent = "" if depth == 0 else "   " * (depth - 1) + ("-> " if deciding else "   ")
-    detail = f"   [{why.detail}]" if why.detail else ""
-    yield f"{indent}{'true ' if why.truth else 'false'}  {why.text}{detail}"
-    for number, child in enumerate(why.children):
-        yield from explanation_lines(child, depth + 1, deciding=deciding and number == why.decider)

@@ -17,7 +17,6 @@ from knowledge_base.cli.console import (
     change_form,
     clock_time,
     delta_lines,
-    explanation_lines,
     moment,
     opened,
     opened_store,
@@ -101,7 +100,7 @@ def ask(
     else:
         typer.echo("yes" if explanation.truth else "no")
         if why:
-            typer.echo("\n".join(explanation_lines(explanation)))
+            typer.echo("\n".join(explanation.lines()))
     raise typer.Exit(0 if explanation.truth else NO)
 
 

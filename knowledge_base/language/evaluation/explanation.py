@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from knowledge_base._notebook import text
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
 from knowledge_base.language.checking.binding import check_bound
@@ -73,6 +74,17 @@ class Explanation:
         """Return one line, e.g. `(< (failures cup1) 2) is false: 3 < 2`."""
         said = f"{self.text} is {'true' if self.truth else 'false'}"
         return f"{said}: {self.detail}" if self.detail else said
+
+    def lines(self, depth: int = 0, *, deciding: bool = True) -> Iterator[str]:
+        """Yield the tree, with one line for each part; arrows mark the parts that decide the truth."""
+        indent = "" if depth == 0 else "   " * (depth - 1) + ("-> " if deciding else "   ")
+        detail = f"   [{self.detail}]" if self.detail else ""
+        yield f"{indent}{'true ' if self.truth else 'false'}  {self.text}{detail}"
+        for number, child in enumerate(self.children):
+            yield from child.lines(depth + 1, deciding=deciding and number == self.decider)
+
+    def _repr_html_(self) -> str:
+        return text(self.lines())
 
     def to_json(self) -> dict[str, Any]:
         """Return the tree as plain data without empty fields; `decider` is the index of the deciding child, from 0."""
