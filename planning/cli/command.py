@@ -17,8 +17,9 @@ from dsc.cli.runs import app as runs_app
 from dsc.cli.runs import view_command
 from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import readers
-from planning.cli import bundles_command, doctor_command, plan_command
+from planning.cli import bundles_command, plan_command
 from planning.cli.check import check_command
+from planning.cli.doctor import doctor_command
 from planning.cli.new import new_command
 from planning.cli.run import components_of_target, robot_knowledge, run_command
 

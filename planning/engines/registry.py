@@ -6,21 +6,15 @@ query takes little time.
 
 from __future__ import annotations
 
-import platform
-import re
 import shutil
-import subprocess
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, requires, version
-from typing import Any
+from importlib.metadata import PackageNotFoundError, version
 
 from knowledge_base.errors import InputError, UnknownNameError
 from planning.plan import NobodyCan
 from planning.strips import Problem
-
-DISTRIBUTION = "dynamic-state-charts"
 
 WISHES = frozenset({"costs"})
 """Features that an engine may ignore; the plan is then still valid, but may be expensive."""
@@ -68,7 +62,7 @@ class Engine:
     @property
     def version(self) -> str | None:
         """The installed version of the package; `None` if the package is not installed."""
-        return _version(self.package)
+        return package_version(self.package)
 
     def lacks(self) -> str:
         """Return the steps that make the engine usable; empty if the engine is usable."""
@@ -85,7 +79,7 @@ class Engine:
 
 
 @cache
-def _version(package: str) -> str | None:
+def package_version(package: str) -> str | None:
     """Return the installed version; cached, since a lookup takes a millisecond and each race checks every engine."""
     try:
         return version(package)
@@ -210,56 +204,3 @@ def only(name: str) -> Callable[[Problem], Sequence[Engine]]:
     if lacks := named.lacks():
         raise InputError(f"the engine '{name}' is not installed: {lacks}")
     return lambda problem: [named] if named.can_do(problem.features) else []
-
-
-_JAVA_SECONDS = 10.0
-
-
-def findings() -> dict[str, Any]:
-    """Return plain data: `python`, `system`, `java` (version or null), `packages` (versions or null) and `engines`."""
-    return {
-        "python": platform.python_version(),
-        "system": f"{platform.system()} {platform.machine()}",
-        "java": _java(),
-        "packages": {name: _version(name) for name in (DISTRIBUTION, *_dependencies())},
-        "engines": [_engine(one) for one in ENGINES],
-    }
-
-
-def _engine(one: Engine) -> dict[str, Any]:
-    return {
-        "name": one.name,
-        "version": one.version,
-        "ready": not one.lacks(),
-        "to_do": one.lacks(),
-        "can_do": ["STRIPS", *sorted(one.features)],
-        "optimal": one.optimal,
-        "anytime": one.anytime,
-        "proves": one.proves,
-        "deterministic": one.deterministic,
-        "races": one.races,
-        "licence": one.licence,
-    }
-
-
-def _dependencies() -> list[str]:
-    """Return the distributions that every installation of this project requires."""
-    try:
-        needed = requires(DISTRIBUTION) or []
-    except PackageNotFoundError:  # the project is not installed, e.g. in a plain checkout
-        return []
-    return [re.split(r"[^\w.-]", one, maxsplit=1)[0] for one in needed if "extra ==" not in one]
-
-
-def _java() -> str | None:
-    program = shutil.which("java")
-    if program is None:
-        return None
-    try:
-        said = subprocess.run(  # noqa: S603  the first on the path, as the engine starts it
-            [program, "-version"], capture_output=True, text=True, timeout=_JAVA_SECONDS, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    found = re.search(r'version "([^"]+)"', said.stderr + said.stdout)
-    return found.group(1) if found else None

@@ -13,8 +13,9 @@ from typer.testing import CliRunner
 
 from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
-from planning.cli import doctor_command, plan_command
+from planning.cli import plan_command
 from planning.cli.command import app
+from planning.cli.doctor import doctor_command
 from planning.engines import registry
 from planning.engines.registry import ENGINES
 from planning.plan import EngineFailed, PlanFound
@@ -179,6 +180,7 @@ def test_the_doctor_lists_every_engine_with_what_it_can_do_and_what_it_lacks(mon
     found = json.loads(CliRunner().invoke(app, ["--json"], catch_exceptions=False).stdout)
     assert [one["name"] for one in found["engines"]] == [one.name for one in ENGINES]
     assert found["packages"]["unified-planning"]
+    assert found["extras"]["viewer"]["ready"]
     assert next(one for one in found["engines"] if one["name"] == "pyperplan")["ready"]
     monkeypatch.setattr("shutil.which", lambda _: None)
     shown = CliRunner().invoke(app, [], catch_exceptions=False)
@@ -190,13 +192,20 @@ def test_the_doctor_lists_every_engine_with_what_it_can_do_and_what_it_lacks(mon
 
 
 def test_the_doctor_fits_a_terminal_of_100_columns(monkeypatch):
-    monkeypatch.setattr("planning.cli.PIPE_WIDTH", 100)
+    monkeypatch.setattr("planning.cli.doctor.PIPE_WIDTH", 100)
     app = typer.Typer()
     app.command()(doctor_command)
     lines = CliRunner().invoke(app, [], catch_exceptions=False).stdout.splitlines()
     assert max(map(len, lines)) <= 100
     for one in ENGINES:
         assert any(one.name in line and one.licence in line for line in lines), one.name
+
+
+def test_the_doctor_says_what_a_missing_part_is_for_and_how_to_install_it(monkeypatch):
+    monkeypatch.setattr("planning.engines.registry.package_version", lambda name: None if "starl" in name else "1.0")
+    found = json.loads(CliRunner().invoke(app, ["doctor", "--json"]).stdout)["extras"]
+    assert (found["viewer"]["ready"], found["viewer"]["to_do"]) == (False, "pip install 'starlette>=0.40'")
+    assert found["bt"] == {"about": "behaviour trees of py_trees as skills", "ready": True, "to_do": ""}
 
 
 def test_nothing_to_do_is_a_plan(run):

@@ -18,8 +18,9 @@ from fake_engines import HANGING, PROBLEM, READY, answering, descendants, gone, 
 
 from knowledge_base.facts import Fact
 from knowledge_base.language.syntax.text import parse_condition
+from planning.cli.doctor import DISTRIBUTION
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
-from planning.engines.registry import DISTRIBUTION, ENGINES
+from planning.engines.registry import ENGINES
 from planning.engines.request import written
 from planning.plan import PlanStep
 from planning.problem.construction import build_problem
