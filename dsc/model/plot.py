@@ -8,13 +8,13 @@ import re
 from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Any, Literal, Self
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from dsc.model.language import ConditionField, Frozen, Setting, TermField, Written, constant
 from dsc.model.ranges import Range, Who, refuse_change
 from dsc.model.reading import LOCATED, FormPath
-from dsc.model.rules import Handler, Rule
+from dsc.model.rules import Handler, Rule, told_apart
 from dsc.model.states import (
     AnyState,
     CompositeState,
@@ -140,6 +140,16 @@ class ActionPlot(Written):
         refuse_change(full, who, parameter.changed_by)
         changed = parameter.model_copy(update={"default": constant(parameter.range.check(full, value))})
         return self.model_copy(update={"parameters": {**self.parameters, name: changed}})
+
+    @field_validator("rules")
+    @classmethod
+    def _rules_are_told_apart(cls, rules: tuple[Rule, ...]) -> tuple[Rule, ...]:
+        return told_apart(rules)
+
+    @field_validator("handlers")
+    @classmethod
+    def _handlers_are_told_apart(cls, handlers: tuple[Handler, ...]) -> tuple[Handler, ...]:
+        return told_apart(handlers)
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> ActionPlot:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 from pydantic import BeforeValidator, Field, Tag, model_validator
 
@@ -94,8 +95,10 @@ class Rule(Frozen):
         when: condition over the event's attributes, the step's arguments and the knowledge base.
         of: steps to which an `on` rule applies; empty means all steps.
         do: response of the rule.
+        name: name of the rule in records and reports, see `label`.
     """
 
+    name: str | None = None
     on: str | None = None
     before: Names = ()
     after: Names = ()
@@ -135,9 +138,8 @@ class Rule(Frozen):
 
     def after_outcome(self, outcome: str) -> Rule:
         """Return the rule with the continuation after an outcome of its plot, which passes no arguments."""
-        return self.model_copy(
-            update={"do": self.do.model_copy(update={"then": self.do.on[outcome], "passed": {}, "on": {}})}
-        )
+        do = self.do.model_copy(update={"then": self.do.on[outcome], "passed": {}, "on": {}})
+        return self.model_copy(update={"do": do, "name": self.name and f"{self.name}, {do.then}"})
 
     @property
     def leads_away(self) -> bool:
@@ -151,7 +153,9 @@ class Rule(Frozen):
 
     @property
     def label(self) -> str:
-        """A short name of the rule: the place and the response, e.g. `grasp_failed: reposition, retry`."""
+        """The name of the rule; by default the place and the response, e.g. `grasp_failed: reposition, retry`."""
+        if self.name is not None:
+            return self.name
         about = self.on or f"{self.place} {', '.join(self.steps)}"
         then = None if self.then == RESPONSES[self.place][0] and self.on is None and self.do.acts else self.then
         return f"{about}: " + ", ".join(part for part in (self.do.use, then) if part)
@@ -172,8 +176,10 @@ class Handler(Frozen):
         interrupt: whether the active state is exited and afterwards entered again; if not, the handler runs in
             parallel.
         do: actions of the handler.
+        name: name of the handler in records and reports, see `label`.
     """
 
+    name: str | None = None
     on: str
     listen: Trigger | None = None
     when: ConditionField | None = None
@@ -182,5 +188,19 @@ class Handler(Frozen):
 
     @property
     def label(self) -> str:
-        """A short name of the handler: the event and the used plot, e.g. `handler low_bat: announce`."""
-        return f"handler {self.on}" + (f": {self.do.use}" if self.do.use else "")
+        """The name of the handler; by default the event and the used plot, e.g. `handler low_bat: announce`."""
+        return self.name or f"handler {self.on}" + (f": {self.do.use}" if self.do.use else "")
+
+
+_Responding = TypeVar("_Responding", Rule, Handler)
+
+
+def told_apart(responses: Iterable[_Responding]) -> tuple[_Responding, ...]:
+    """Return rules or handlers with unique labels: further ones with an equal label get a name with a number."""
+    count: Counter[str] = Counter()
+    found: list[_Responding] = []
+    for one in responses:
+        count[one.label] += 1
+        number = count[one.label]
+        found.append(one if number == 1 else one.model_copy(update={"name": f"{one.label} ({number})"}))
+    return tuple(found)

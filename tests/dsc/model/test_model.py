@@ -448,3 +448,21 @@ def test_any_plot_survives_json_and_yaml(form, states, regions):
     assert ActionPlot.model_validate(json.loads(json.dumps(made.to_form()))) == made
     again = parse_plot(plot_to_yaml(made))
     assert again.digest == made.digest
+
+
+def test_rules_with_equal_responses_are_told_apart_by_name_or_number():
+    plot = parse_plot("""
+        plot: p
+        states: {x: {use: y, on: {done: e}}, e: {final: true}}
+        rules:
+          - {on: a, of: x, do: {then: retry}}
+          - {on: a, do: {then: retry}}
+          - {on: a, name: last resort, do: {use: z, then: retry, on: {lost: give_up}}}
+        handlers:
+          - {on: low, when: (p), do: {use: go}}
+          - {on: low, do: {use: go}}
+    """)
+    assert [rule.label for rule in plot.rules] == ["a: retry", "a: retry (2)", "last resort"]
+    assert [one.label for one in plot.rules[2].continuations] == ["last resort", "last resort, give_up"]
+    assert [one.label for one in plot.handlers] == ["handler low: go", "handler low: go (2)"]
+    assert ActionPlot.model_validate(plot.to_form()) == plot
