@@ -43,7 +43,7 @@ def with_handlers(plot: ActionPlot, written: ActionPlot, added: FreshNames, entr
     listening = {one.on: added.event(f"{one.on}_heard") for one in written.handlers if one.listen is not None}
     handling = _Handling(added, listening)
     if interrupting:
-        states = handling.interrupted(plot.states, interrupting, entrances)
+        states = handling.interrupted(plot.states, interrupting, entrances, at_top=True)
         plot = plot.model_copy(update={"states": states})
     plot = plot.model_copy(update={"states": handling.left(plot.states, written.handlers, entrances)})
     if listening or len(interrupting) < len(written.handlers):
@@ -58,7 +58,7 @@ class _Handling:
         self._leading: dict[str, str] = {}
 
     def interrupted(
-        self, states: Mapping[str, AnyState], handlers: list[Handler], entrances: Mapping[str, str]
+        self, states: Mapping[str, AnyState], handlers: list[Handler], entrances: Mapping[str, str], *, at_top: bool
     ) -> States:
         """Return the states of a scope with transitions to all handlers and back.
 
@@ -67,19 +67,29 @@ class _Handling:
         result: States = {}
         for name, state in states.items():
             if isinstance(state, CompositeState):
-                inside = self.interrupted(state.states, handlers, entrances)
+                inside = self.interrupted(state.states, handlers, entrances, at_top=False)
                 result[name] = state.model_copy(update={"states": inside})
             elif isinstance(state, State):
-                result.update(self._interrupted(name, state, handlers, entrances.get(name, name)))
+                result.update(self._interrupted(name, state, handlers, entrances, at_top=at_top))
             else:
                 result[name] = state
         return result
 
-    def _interrupted(self, name: str, state: State, handlers: list[Handler], back: str) -> States:
+    def _interrupted(
+        self, name: str, state: State, handlers: list[Handler], entrances: Mapping[str, str], *, at_top: bool
+    ) -> States:
         on, more = dict(state.on), dict[str, AnyState]()
         for handler in handlers:
             handled = self._added.state(f"{name}_{handler.on}_handled")
-            more[handled] = self._handled(handler, back, waiting=None)
+            leading: dict[str, Transition] = {}
+            for then in sorted({*handler.do.on.values()} - {RESUME}):
+                if at_top:
+                    leading[then] = Transition(target=entrances.get(then, then))
+                else:  # no transition leaves its scope; this state waits for the transition at the top level
+                    waiting = self._added.state(f"{handled}_then_{then}")
+                    more[waiting] = State(about=handler.label)
+                    leading[then] = Transition(target=waiting, do=(Emit(emit=self._leaving(then)),))
+            more[handled] = self._handled(handler, entrances.get(name, name), leading)
             heard = self._heard(handler.on)
             on[heard] = (*on.get(heard, ()), _way(handler, handled))
         return {name: state.model_copy(update={"on": on}), **more}
@@ -128,29 +138,32 @@ class _Handling:
             handled = None
             if handler.do.acts:
                 handled = self._added.state(f"{event}_handled")
-                more[handled] = self._handled(handler, awaited, waiting=awaited)
+                leading = {
+                    then: Transition(target=awaited, do=(Emit(emit=self._leaving(then)),))
+                    for then in sorted({*handler.do.on.values()} - {RESUME})
+                }
+                more[handled] = self._handled(handler, awaited, leading)
             ways.append(_way(handler, handled))
         return {awaited: State(on={self._heard(event): tuple(ways)}), **more}
 
     def _heard(self, event: str) -> str:
         return self._listening.get(event, event)
 
-    def _handled(self, handler: Handler, back: str, waiting: str | None) -> AnyState:
+    def _handled(self, handler: Handler, back: str, leading: Mapping[str, Transition]) -> AnyState:
         """Return the state with a handler's actions.
 
         Args:
             handler: the handler.
             back: target after the handler.
-            waiting: target if the handler's plot ends with an outcome that leads to another state; `None` to stay.
+            leading: for each state that an outcome of the handler's plot leads to, the transition.
         """
         do, onward = handler.do, (Transition(target=back),)
         if do.use is None:
             return State(entry=do.command, on={DONE: onward}, about=handler.label)
-        on = {DONE: onward}
-        for outcome, then in do.on.items():
-            leading = Transition(target=waiting, do=(Emit(emit=self._leaving(then)),)) if then != RESUME else onward[0]
-            on[outcome] = (leading,)
-        return SubmachineState(use=do.use, arguments=do.arguments, entry=do.command, on=on, about=handler.label)
+        ways = {outcome: onward if then == RESUME else (leading[then],) for outcome, then in do.on.items()}
+        return SubmachineState(
+            use=do.use, arguments=do.arguments, entry=do.command, on={DONE: onward, **ways}, about=handler.label
+        )
 
 
 def _ends(plot: ActionPlot) -> dict[str, FinalState]:

@@ -178,8 +178,10 @@ def test_an_outcome_of_a_handlers_plot_leads_to_the_named_state(handler):
         run = run_of(handler.replace("unheard: resume", "unheard: ended_well"))
         run.send("ok" if deep else "other")
         run.send("low", level=7)
-        assert [each.name for each in run.send("deaf").emitted] == ["good"]
+        step = run.send("deaf")
+        assert [each.name for each in step.emitted] == ["good"]
         assert run.machine.state.finished
+        assert not any(map(step.entered, ("one", "two", "a", "b", "work")))  # what was interrupted stays so
 
 
 @pytest.mark.parametrize("handler", [BESIDE, INTERRUPT])
