@@ -47,7 +47,7 @@ class BundleParts(TypedDict, total=False):
     knowledge: Delta
     simulation: type[Simulation] | None
     foresight: Foresight | None
-    failures: frozenset[str]
+    failures: Collection[str]
     profiles: Path | None
 
 
@@ -69,7 +69,8 @@ class Bundle:
         knowledge: the initial knowledge of the robot.
         simulation: the class of the simulated world. Its components replace real devices.
         foresight: simulates each plan before its execution.
-        failures: further outcomes of skills that count as failures in reports, see `planning.report.failure_events`.
+        failures: further outcomes of skills that count as failures in reports. By default these are the outcomes that
+            plots pass on to their caller, and the failures of all skills, e.g. `timed_out`.
         profiles: a folder of settings profiles (`*.yaml`), which `dsc run --profile` finds by name.
     """
 
@@ -84,8 +85,12 @@ class Bundle:
     knowledge: Delta = field(default_factory=Delta)
     simulation: type[Simulation] | None = None
     foresight: Foresight | None = None
-    failures: frozenset[str] = frozenset()
+    failures: Collection[str] = frozenset()
     profiles: Path | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.failures, str):
+            raise InputError(f"failures are a set of outcomes, not the text '{self.failures}'")
 
     @classmethod
     def in_folder(cls, folder: Path | str, *, name: str | None = None, **parts: Unpack[BundleParts]) -> Bundle:

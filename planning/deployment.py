@@ -180,7 +180,7 @@ class Deployment:
     def _report(self, end: RunEnd, wall_s: float) -> Report:
         knowledge, world = self.executive.knowledge, self.simulation
         judge, left = self._judged(end)
-        failures = failure_events(self.executive.library) | self._bundle.failures
+        failures = failure_events(self.executive.library).union(self._bundle.failures)
         report = summarise(self.name, judge, left, self.tally, end, failures, wall_s)
         if world is None:
             return report

@@ -12,6 +12,7 @@ from rich.live import Live
 from rich.text import Text
 
 from dsc.dynamic.knowledge_situation import ACHIEVE
+from dsc.model.rules import REPLAN
 from dsc.trace import Record
 
 _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
@@ -25,7 +26,6 @@ _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "plan.readmitted": lambda data: f"{', '.join(data['steps'])} may be planned again: there is no plan without",
     "plan.rejected": lambda data: f"a plan fails in the simulation: {data['reason']}",
     "plan.gave_up": lambda data: f"gave up: {data['reason']}",
-    "rule": lambda data: f"rule  {data['rule']}",
 }
 _STEP = re.compile(r"step_\d+")
 
@@ -104,6 +104,7 @@ class PlainProgress:
         self._write = write
         self._steps: dict[str, str] = {}
         self._stages: set[str] = set()
+        self._replans = False  # whether the last rule needs a new plan
         self._entered: list[str] = []  # the lines of the last macrostep; its rules come next, and are written first
 
     def __call__(self, record: Record) -> None:
@@ -132,6 +133,12 @@ class PlainProgress:
 
     def lines(self, record: Record) -> list[str]:
         """Return the lines of text for a record; empty for most record types."""
+        if record.type == "rule":
+            self._replans = record.data["rule"].endswith(f" {REPLAN}")
+            step = self._steps.get(record.data["state"].rsplit("/", 1)[-1])
+            return [f"rule  {record.data['rule']}" + (f"  at {step}" if step else "")]
+        if record.type == "plan.failed" and self._replans:  # the line of the rule has said so
+            return []
         if record.type in _SAYS:
             return [_SAYS[record.type](record.data)]
         if record.type == "end" and record.data["problem"]:
@@ -145,6 +152,7 @@ class PlainProgress:
         for path in micro["entered"]:
             name = path.rsplit("/", 1)[-1]
             if name in self._steps and path.endswith(f"execute/{name}"):
+                self._replans = False
                 lines.append(f"step {name.removeprefix('step_'):>3}  {self._steps[name]}")
             elif "/" not in path and name in self._stages:
                 lines.append(name.replace("_", " "))

@@ -136,7 +136,7 @@ class Simulation(ABC):
         same faults.
 
         Args:
-            action: the id of the action, `SkillCall.id`.
+            action: the id of the action, `SkillCall.action_id`.
             kinds: the faults that can hit the action.
         """
         if not kinds or uniform(self.seed, action, "fault") >= self.chance:

@@ -25,7 +25,9 @@ A delivery robot in eight steps. Each step is a program in [examples/tutorial](.
 output; a later step imports the parts of earlier ones. After `make demo`, run a
 step with `.venv/bin/python examples/tutorial/step1_skill.py`.
 
-Afterwards, `dsc new my_robot` makes a project with the same parts, see [Running a robot](run.md#start-a-project).
+The steps have all parts in one Python file, so that you see them together. Afterwards, `dsc new my_robot` makes a
+project with separate files for plots and domain, and a simulated house with faults; see [Running a
+robot](run.md#start-a-project). Both forms make a `Bundle`, as in step 8.
 """
 END = """
 `dsc check examples/tutorial/step8_browser.py` finds mistakes without a run. `dsc run

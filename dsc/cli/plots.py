@@ -78,7 +78,9 @@ def check(
     neighbours = Neighbours()
     components = None if robot is None else components_of_robot(robot)
     found = [(file, finding) for file in files for finding in _findings(file, domain, neighbours, components)]
-    print_findings(found, as_json=json, nothing=f"{len(files)} plot{'s' * (len(files) != 1)} checked, nothing found")
+    print_findings(
+        found, as_json=json, nothing=f"{len(files)} plot{'s' * (len(files) != 1)} checked, no mistakes found"
+    )
     wrong = [finding for _, finding in found if strict or finding.level == "error"]
     raise typer.Exit(BAD_INPUT if wrong else 0)
 

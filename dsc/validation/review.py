@@ -7,8 +7,10 @@ from itertools import chain, combinations, groupby, islice
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.responses import limit_of
-from dsc.dynamic.steps import answerable, concerns
+from dsc.dynamic.steps import Step, answerable, concerns, contents_of, is_planned
 from dsc.errors import Finding
+from dsc.events import TIMED_OUT
+from dsc.model.actions import Trigger, flat
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import CONTINUE, ENTER, Handler, Rule
 from dsc.model.states import CompositeState, DynamicState, State
@@ -16,6 +18,7 @@ from dsc.validation.library import MAX_FINDINGS
 from dsc.validation.subject import Subject
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.checking.contradiction import contradictory, implied, subjects
+from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.expression import (
     TRUE,
     Call,
@@ -110,9 +113,22 @@ def _leave_a_gap(conditions: Conditions) -> bool:
     """Return whether several candidates read equal facts, and their conditions do not cover all cases."""
     many = list(conditions.values())
     about = {subjects(condition) for condition in many}
-    if len(many) < 2 or len(about) != 1 or about == {frozenset()}:
+    if len(many) < 2 or len(about) != 1 or about == {frozenset()} or _by_name(many):
         return False
     return not contradictory(*map(Not, many), *_counts(many))
+
+
+def _by_name(conditions: Iterable[Expression]) -> bool:
+    """Return whether each condition compares one variable with a name, e.g. `(= ?arm left)`, which leaves no gap."""
+    return bool(set.intersection(*(set(_named(conjuncts(one))) for one in conditions)))
+
+
+def _named(parts: Iterable[Expression]) -> Iterator[Term]:
+    """Yield each variable that a part equates with a name."""
+    for part in parts:
+        match part:
+            case Comparison("=", Variable() as variable, Constant(str())):
+                yield variable
 
 
 def _counts(conditions: Sequence[Expression]) -> Iterator[Expression]:
@@ -166,6 +182,28 @@ def _handlers(subject: Subject) -> Iterator[Finding]:
         if why is not None:
             message = f"the '{handler.label}' can never answer: {why}{_listed(earlier)}"
             yield subject.finding(("handlers", number), "handlers", message, _LEFT_OUT, level="warning")
+        if handler.do.use is not None and TIMED_OUT not in handler.do.on:
+            for late in _late(subject.library, handler.do.use):
+                message = f"{late} may time out, which then ends the run"
+                fix = "add `on: {timed_out: resume}` here, or answer 'timed_out' there"
+                yield subject.finding(("handlers", number, "do", "use"), "handlers", message, fix, level="warning")
+
+
+def _late(library: Library, used: str) -> Iterator[str]:
+    """Yield the calls with a written time limit in a plot, and in the plots that it uses, without an answer to it."""
+    waiting, seen = [library.plot(used)], {used}
+    while waiting:
+        plot = waiting.pop()
+        unanswered = [] if any(rule.on == TIMED_OUT for rule in plot.rules) else list(plot.walk())
+        for name, state, _ in unanswered:
+            if not isinstance(state, State) or TIMED_OUT in state.on:
+                continue
+            for action in flat(state.entry):
+                if isinstance(action, Trigger) and action.within is not None:
+                    yield f"'{action.trigger}' in state '{name}' of plot '{plot.name}'"
+            if isinstance(state, Step) and not is_planned(state):
+                waiting += [one for one in contents_of(state, library) if one.name not in seen]
+                seen.update(one.name for one in waiting)
 
 
 def _all_answer(event: str, subject: Subject) -> bool:

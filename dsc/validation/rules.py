@@ -195,7 +195,7 @@ class RuleScope:
 
 def unknown_skill(subject: Subject, path: Path, trigger: Trigger) -> Finding:
     """Return the finding about a trigger whose component or skill is missing."""
-    message, found = f"no component offers the skill '{trigger.trigger}'", trigger.trigger
+    message, found = f"no component offers the skill or event '{trigger.trigger}'", trigger.trigger
     return subject.finding(path, "known skill", message, found=found, valid=subject.skills or ())
 
 

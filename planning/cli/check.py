@@ -29,6 +29,6 @@ def check_command(
         findings = check_project(target)
     finally:
         logging.disable(logging.NOTSET)
-    print_findings([(target, finding) for finding in findings], as_json=json, nothing=f"{target}: nothing found")
+    print_findings([(target, finding) for finding in findings], as_json=json, nothing=f"{target}: no mistakes found")
     wrong = [finding for finding in findings if strict or finding.level == "error"]
     raise typer.Exit(BAD_INPUT if wrong else 0)

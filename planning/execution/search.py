@@ -54,6 +54,7 @@ _Result = TypeVar("_Result")
 
 EXCLUDED_SECONDS = 120.0
 """Seconds of run time for which new plans omit a step that failed repeatedly."""
+_REMEDY = "a longer `budget: {seconds: ...}` or another engine may find one"
 MAX_ATTEMPTS = 3
 """The maximum number of searches for one plan if the world changes during each search."""
 MAX_REJECTED = 5
@@ -306,7 +307,7 @@ def _unknown(
         case NoneFound(reason=reason):
             return NotFound("unsolvable", reason)
         case TimedOut(engine=engine):
-            return NotFound("timed_out", f"no plan within {seconds:g} s ({engine})")
+            return NotFound("timed_out", f"no plan within {seconds:g} s ({engine}); {_REMEDY}")
         case EngineFailed(engine=engine, message=message):
             return NotFound("failed", f"{engine}: {message}")
         case NobodyCan():

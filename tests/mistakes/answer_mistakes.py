@@ -37,7 +37,7 @@ MOMENTS = {
 }
 """Moments of the first answer; a mistake that was mended for the user `works`."""
 KINDS = {"python": "Python", "yaml": "Plots and profiles", "pddl": "PDDL", "command": "Commands"}
-_NOISE = re.compile(r"^(INFO|\s+File|Traceback|\s+\d+\.\d s)|^\.?: nothing found")
+_NOISE = re.compile(r"^(INFO|\s+File|Traceback|\s+\d+\.\d s)|^\.?: no mistakes found")
 
 
 @dataclass(frozen=True)

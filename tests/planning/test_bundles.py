@@ -160,3 +160,9 @@ def test_the_command_lists_what_is_installed(monkeypatch):
 
 def test_the_table_is_an_installed_bundle():
     assert "clean_up_table" in [plot.name for plot in installed()["clean-up-table"].plots]
+
+
+def test_failures_may_be_any_collection_of_outcomes_but_no_text():
+    assert set(Bundle("mine", failures=["jammed", "stuck"]).failures) == {"jammed", "stuck"}
+    with pytest.raises(InputError, match="failures are a set of outcomes, not the text 'jammed'"):
+        Bundle("mine", failures="jammed")

@@ -21,7 +21,7 @@ PLANTED = [
     ("domain.pddl", "(robot-in ?at) (holding", "(robot-in ?att) (holding", "'?att' is not bound"),
     ("domain.pddl", "(not (holding ?parcel))", "(not (holds ?parcel))", "no predicate 'holds'; did you mean 'holding'"),
     ("domain.pddl", "?from ?to - room", "?from ?to - rom", "no type 'rom'; did you mean 'room'"),
-    ("plots/drive.yaml", "wheels.drive", "weels.drive", "no component offers the skill 'weels.drive'; did you mean"),
+    ("plots/drive.yaml", "wheels.drive", "weels.drive", "no component offers the skill or event 'weels.drive'; did you mean"),
     ("plots/drive.yaml", "stuck: {final: true}", "stuck: {final: true, emit: blokked}", "'blokked'; did you mean 'blocked'"),
     ("plots/put.yaml", "parcel: ?parcel", "parcel: ?parsel", "no variable '?parsel' here; did you mean 'parcel'"),
     ("plots/put.yaml", "implements: put", "implements: putt", "no planning action 'putt'; did you mean 'put'"),
@@ -114,7 +114,7 @@ def test_a_plot_file_is_a_project_too(project):
 def test_the_command_prints_the_list_and_has_a_status(project):
     good = subprocess.run([DSC, "check", project], capture_output=True, text=True, check=False)
     assert (good.returncode, good.stderr) == (0, "")
-    assert "nothing found" in good.stdout
+    assert "no mistakes found" in good.stdout
     planted(project, [PLANTED[0], PLANTED[16]])
     bad = subprocess.run([DSC, "check"], cwd=project, capture_output=True, text=True, check=False)
     assert (bad.returncode, bad.stderr) == (2, "")

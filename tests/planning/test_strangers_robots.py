@@ -197,7 +197,7 @@ def test_options_that_a_robot_does_not_have_are_refused_by_name(project):
 
 def test_other_commands_take_the_same_targets(project):
     assert "parcel1" in dsc("kb", "query", project, "(in ?p hall)")
-    assert "nothing found" in dsc("plot", "check", "--robot", project, project / "plots" / "take.yaml")
+    assert "no mistakes found" in dsc("plot", "check", "--robot", project, project / "plots" / "take.yaml")
     wrong = (project / "plots" / "take.yaml").read_text().replace("gripper.grasp", "griper.grasp")
     (project / "plots" / "take.yaml").write_text(wrong)
     done = subprocess.run(
@@ -205,7 +205,10 @@ def test_other_commands_take_the_same_targets(project):
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (2, "")
-    assert "take.yaml:5:16: no component offers the skill 'griper.grasp'; did you mean 'gripper.grasp'?" in done.stdout
+    assert (
+        "take.yaml:5:16: no component offers the skill or event 'griper.grasp'; did you mean 'gripper.grasp'?"
+        in done.stdout
+    )
 
 
 # -- bugs in the robot's code ------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.sequencer import Sequencer
 from planning.report import failure_events
 
-FAILURES = failure_events(Library(bundle().plots)) | bundle().failures
+FAILURES = failure_events(Library(bundle().plots)).union(bundle().failures)
 
 
 def a_new_id_on_retry(monkeypatch):

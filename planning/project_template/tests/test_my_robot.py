@@ -6,7 +6,7 @@ from my_robot.robot import robot
 from planning import Task, deploy
 
 
-def test_all_parcels_are_delivered():
+def test_all_parcels_are_delivered() -> None:
     with deploy(robot) as deployed:
         report = deployed.run()
     assert report.goal_reached, report.headline
@@ -14,13 +14,13 @@ def test_all_parcels_are_delivered():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_closed_doors_are_tried_again(seed):
+def test_closed_doors_are_tried_again(seed: int) -> None:
     with deploy(robot, seed=seed, faults=0.3) as deployed:
         report = deployed.run()
     assert report.goal_reached, report.headline
     assert report.skill_failures.get("door_closed", 0) == len(report.faults)
 
 
-def test_a_goal_is_enough():
+def test_a_goal_is_enough() -> None:
     with deploy(robot, Task(goal="(and (robot-in office) (carries book))")) as deployed:
         assert deployed.run().goal_reached

@@ -59,7 +59,7 @@ def test_shipped_plots_have_no_findings(file: Path) -> None:
 def test_good_plots_are_said_to_be_good(tmp_path: Path) -> None:
     file = written(tmp_path, good=GOOD, helper=HELPER)
     result = run("check", file, tmp_path / "helper.yaml")
-    assert (result.exit_code, result.output) == (0, "2 plots checked, nothing found\n")
+    assert (result.exit_code, result.output) == (0, "2 plots checked, no mistakes found\n")
 
 
 def test_a_typo_is_one_line_with_place_and_remedy(tmp_path: Path) -> None:
@@ -263,7 +263,10 @@ def test_with_a_robot_skills_are_checked_too(robot, name):
     assert result.exit_code == 2
     assert "state 's' does not handle its outcome 'slipped'" in result.output
     robot.write_text(GRASPS.replace("arm.grasp", "arm.grsp"))
-    assert "no component offers the skill 'arm.grsp'" in run("check", robot, "--robot", f"some_robot:{name}").output
+    assert (
+        "no component offers the skill or event 'arm.grsp'"
+        in run("check", robot, "--robot", f"some_robot:{name}").output
+    )
 
 
 @pytest.mark.parametrize(

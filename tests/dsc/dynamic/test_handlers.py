@@ -328,7 +328,7 @@ def test_a_right_handler_has_no_findings(handler):
         ("{on: low, interrupt: true, do: {tell: (p)}}", "interrupts nothing"),
         (
             "{on: low, listen: {trigger: battery.lo}, do: {use: say, on: {unheard: resume}}}",
-            "no component offers the skill 'battery.lo'",
+            "no component offers the skill or event 'battery.lo'",
         ),
         (
             "{on: weak, listen: {trigger: battery.low}, do: {use: say, on: {unheard: resume}}}",

@@ -180,6 +180,8 @@ def test_candidates_that_leave_a_gap():
         ["(p)", "(q)"],  # nobody knows
         ["(p)"],
         ["(and (p) (q))", "(p)", "(not (p))"],
+        ["(= ?arm left)", "(= ?arm right)"],  # one for each name
+        ["(and (= ?arm left) (< (f) 3))", "(and (= ?arm right) (< (f) 4))"],
     ],
 )
 def test_candidates_about_which_nothing_is_said(conditions):
@@ -313,6 +315,27 @@ def test_a_handler_that_can_never_answer_is_found_where_it_stands(handlers):
 )
 def test_a_handler_that_may_answer_is_no_warning(handlers):
     assert about_handlers(*handlers) == []
+
+
+LATE = "plot: late\nstates:\n  a: {entry: {trigger: arm.go, within: 5}, on: {gone: b}}\n  b: {final: true}\n"
+
+
+@pytest.mark.parametrize(
+    ("handler", "plot", "warned"),
+    [
+        ("{on: low, do: {use: late}}", LATE, True),
+        ("{on: low, do: {use: outer}}", LATE, True),
+        ("{on: low, do: {use: late, on: {timed_out: resume}}}", LATE, False),
+        ("{on: low, do: {use: late}}", LATE.replace("gone: b", "gone: b, timed_out: b"), False),
+        ("{on: low, do: {use: late}}", LATE.replace(", within: 5", ""), False),
+        ("{on: low, do: {use: late}}", LATE + "rules: [{on: timed_out, do: {then: retry}}]\n", False),
+    ],
+)
+def test_a_reaction_that_may_time_out_without_an_answer_is_a_warning(handler, plot, warned):
+    outer = "plot: outer\nstates:\n  a: {use: late, on: {done: b}}\n  b: {final: true}\n"
+    found = warnings_of(HANDLING + f"  - {handler}\n", parse_plot(plot), parse_plot(outer))
+    assert [one for one in found if "may time out, which then ends the run" in one] == found
+    assert len(found) == warned
 
 
 def test_a_handler_that_interrupts_is_never_asked_where_every_state_answers_itself():

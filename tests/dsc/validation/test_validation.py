@@ -162,7 +162,7 @@ WRONG = [
     (
         "known skill",
         S + "  a:\n    entry:\n      - {trigger: arm.grsp}\n    on: {error: e}\n" + E,
-        5, "no component offers the skill 'arm.grsp'; did you mean 'arm.grasp'", "",
+        5, "no component offers the skill or event 'arm.grsp'; did you mean 'arm.grasp'", "",
     ),
     (
         "known component",

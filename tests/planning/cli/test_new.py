@@ -27,7 +27,7 @@ def project(tmp_path_factory):
 
 
 def test_a_new_project_runs_and_has_no_findings(project):
-    assert "nothing found" in dsc("check", "--strict", cwd=project)
+    assert "no mistakes found" in dsc("check", "--strict", cwd=project)
     report = json.loads(dsc("run", ".", "--json", cwd=project).splitlines()[-1])
     assert (report["robot"], report["goal_reached"], report["judge"]) == ("night_porter", True, "world")
     assert "retry" in dsc("run", ".", "--seed", "3", "--faults", "0.5", cwd=project)
