@@ -19,7 +19,9 @@ from knowledge_base.errors import InputError, ParseError, Place, SchemaError
 from knowledge_base.facts import Content, Delta, Fact
 from knowledge_base.language.checking.vocabulary import Signature
 from knowledge_base.language.syntax.expression import TypedVariable
+from knowledge_base.language.syntax.text import parse_condition, to_text
 from knowledge_base.pddl.files import read_text
+from knowledge_base.world.derived import Axiom
 from knowledge_base.world.overlay import check_delta
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.schema_compatibility import missing_constants, require_extension
@@ -82,12 +84,14 @@ def world_of(form: Form, schema: Schema) -> WorldState:
 
 def schema_form(schema: Schema) -> Form:
     """Return the form of a schema: all declarations, without their places."""
+    axioms = [[one.predicate, _typed(one.parameters), to_text(one.condition)] for one in schema.axioms]
     return {
         "types": dict(schema.types),
         "constants": dict(schema.constants),
-        "predicates": {name: _parameters(signature) for name, signature in schema.predicates.items()},
-        "functions": {name: [f.result, *_parameters(f)] for name, f in schema.functions.items()},
+        "predicates": {name: _typed(signature.parameters) for name, signature in schema.predicates.items()},
+        "functions": {name: [f.result, *_typed(f.parameters)] for name, f in schema.functions.items()},
         "functional": sorted(schema.functional),
+        **({"axioms": axioms} if axioms else {}),
     }
 
 
@@ -103,6 +107,10 @@ def schema_of(form: Form) -> Schema:
         predicates={name: _signature(name, parameters) for name, parameters in form["predicates"].items()},
         functions={name: _signature(name, rest, result) for name, (result, *rest) in form["functions"].items()},
         functional=frozenset(form["functional"]),
+        axioms=tuple(
+            Axiom(name, _signature(name, parameters).parameters, parse_condition(condition))
+            for name, parameters, condition in form.get("axioms", ())
+        ),
     )
 
 
@@ -133,8 +141,8 @@ def _content(form: Any) -> Content:
     return tuple(form) if isinstance(form, list) else form
 
 
-def _parameters(signature: Signature) -> list[list[Any]]:
-    return [[p.name, *p.types] for p in signature.parameters]
+def _typed(parameters: Iterable[TypedVariable]) -> list[list[Any]]:
+    return [[p.name, *p.types] for p in parameters]
 
 
 def _signature(name: str, parameters: list[list[Any]], result: str | None = None) -> Signature:

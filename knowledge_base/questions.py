@@ -126,6 +126,7 @@ class Questions:
         kind = (free, frozenset(params))
         if kind not in passed:
             check(e, world.schema, dict.fromkeys(params), free, objects=_Things(world))
+            world.schema.require_defined(e)
             passed.add(kind)
         return e
 

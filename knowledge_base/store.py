@@ -321,7 +321,7 @@ class KnowledgeBase(View):
         with self._lock:
             self._require_open()
             params = self._questions.given(text, params, self._state, "answers")
-            e = self._questions.query(text, params, self._state)
+            e = self.schema.expanded(self._questions.query(text, params, self._state))
             condition = self._installed.install(e, params, firing, hysteresis)
         self._notifier.deliver()
         return condition

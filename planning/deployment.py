@@ -32,6 +32,7 @@ from planning.domain import PlanningDomain
 from planning.engines.planner import Planner
 from planning.executive import Executive, achieve_plot
 from planning.problem.construction import check_goal
+from planning.problem.derived import derivation
 from planning.progress import Tally
 from planning.report import Judge, Report, failure_events, reason_of_end, summarise, unmet
 from planning.simulation import Left, Setup, Simulation
@@ -200,7 +201,10 @@ class Deployment:
         if goal is None:
             return "outcome", []
         why = reason_of_end(end, self.tally.gave_up)
-        return "knowledge", [Left(what, reason=why) for what in unmet(parse_condition(goal), knowledge)]
+        wanted, derived = parse_condition(goal), derivation(self.executive.domain)
+        if derived.recursive:
+            wanted = derived.at(knowledge).condition(wanted)
+        return "knowledge", [Left(what, reason=why) for what in unmet(wanted, knowledge)]
 
 
 def deploy(

@@ -7,7 +7,7 @@ declares, in any order. Equal declarations are merged; contradictory declaration
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,8 +35,9 @@ from knowledge_base.language.syntax.sexpr import TypedName
 from knowledge_base.pddl.action_text import ActionText, united
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.pddl.writer import action_to_text, axiom_to_text, domain_to_text
+from knowledge_base.world.derived import Axiom, checked_axiom
 from knowledge_base.world.schema import Schema, agreed_names
-from planning.planning_actions import Axiom, PlanningAction, action_of, check_action, checked_axiom, refuse_changed
+from planning.planning_actions import PlanningAction, action_of, check_action, refuse_changed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
 
 _MOST_GROUND = 1024  # steps; a plan for 50 items has about 130 steps
 
-__all__ = ["Axiom", "Duration", "PlanningAction", "PlanningDomain"]
+__all__ = ["Duration", "PlanningAction", "PlanningDomain"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +139,7 @@ class PlanningDomain:
         Raises:
             InputError: the text contains an error; the message contains the place.
         """
-        schema = Schema.from_text(read).with_computed(*computed)
+        schema = Schema.from_text(replace(read, axioms=())).with_computed(*computed)
         actions, axioms = {action.name: action_of(action) for action in read.actions}, list[Axiom]()
         for action in read.actions:
             with tolerated():
@@ -147,6 +148,7 @@ class PlanningDomain:
             with tolerated():
                 axioms.append(checked_axiom(axiom, schema))
         with tolerated():
+            schema = schema.with_axioms(axioms)
             refuse_changed(actions.values(), axioms)
         return cls(read.name, schema, actions, tuple(axioms), tuple(dict.fromkeys(read.remarks())))
 

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from knowledge_base.errors import InputError, Place, SchemaError, tolerated
-from knowledge_base.language.checking.check import check, check_arity, check_effect, check_parameters
+from knowledge_base.language.checking.check import check, check_effect, check_parameters
 from knowledge_base.language.syntax.durative import Duration, DurativeParts
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, effect_leaves
-from knowledge_base.language.syntax.expression import And, Atom, Comparison, Expression, TypedVariable, Variable
+from knowledge_base.language.syntax.expression import And, Comparison, Expression, TypedVariable
 from knowledge_base.pddl.action_text import ActionText
-from knowledge_base.pddl.domain_text import AxiomText
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from knowledge_base.world.derived import Axiom
     from knowledge_base.world.schema import Schema
 
 
@@ -43,20 +43,6 @@ class PlanningAction:
     place: Place | None = field(default=None, compare=False, repr=False)
     duration: Duration | None = None
     timed: DurativeParts | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Axiom:
-    """Definition of a derived predicate (PDDL 2.2).
-
-    The predicate holds for the arguments for which the condition holds. Several axioms of one predicate are
-    alternatives.
-    """
-
-    predicate: str
-    parameters: tuple[TypedVariable, ...]
-    condition: Expression
-    place: Place | None = field(default=None, compare=False, repr=False)
 
 
 def action_of(action: ActionText) -> PlanningAction:
@@ -102,22 +88,6 @@ def _check_all(whole: _Form, parts: Iterable[_Form], check_one: Callable[[_Form]
         if not before:
             with tolerated():
                 raise
-
-
-def checked_axiom(axiom: AxiomText, schema: Schema) -> Axiom:
-    """Return the axiom of a parsed axiom, checked against the schema.
-
-    A parameter without a type receives the type that the predicate declares.
-    """
-    head = axiom.head
-    signature = schema.predicate(head.name, head.place)
-    check_arity(signature, len(head.parameters), head.place)
-    declared = zip(head.parameters, signature.parameters, strict=True)
-    parameters = tuple(own if own.types else replace(own, types=theirs.types) for own, theirs in declared)
-    variables = check_parameters(parameters, schema)
-    check(Atom(head.name, tuple(Variable(p.name) for p in parameters), place=head.place), schema, variables)
-    check(axiom.condition, schema, variables, objects=schema.constants)
-    return Axiom(head.name, parameters, axiom.condition, head.place)
 
 
 def refuse_changed(actions: Iterable[PlanningAction], axioms: Iterable[Axiom]) -> None:

@@ -209,7 +209,7 @@ class CoverageItem:
 
 
 def items_of(plot: ActionPlot) -> Iterator[CoverageItem]:
-    """Yield all items of a plot in its written form, in document order; rules with equal labels are one item.
+    """Yield all items of a plot in its written form, in document order.
 
     The expansion of a rule adds no items: a rule is one item, for any number of states. A history state is not an item,
     as it refers to other states and is never entered itself.
@@ -226,6 +226,5 @@ def items_of(plot: ActionPlot) -> Iterator[CoverageItem]:
     reactions = {"rules": [rule.label for rule in plot.rules], "handlers": [one.label for one in plot.handlers]}
     for group, labels in reactions.items():
         for number, label in enumerate(labels):
-            if label not in labels[:number]:
-                here = (group, number)
-                yield CoverageItem(("rule", label, ()), f"rule '{label}' never answered", here, plot.place(here))
+            here = (group, number)
+            yield CoverageItem(("rule", label, ()), f"rule '{label}' never answered", here, plot.place(here))

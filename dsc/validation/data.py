@@ -110,7 +110,7 @@ class _Data:
         if isinstance(state, Step):
             yield from self._given(state.arguments, None, (*path, "with"), contents_of(state, self._library))
         if isinstance(state, DynamicState) and state.goal is not None:
-            yield from self._condition(state.goal, self._own, (*path, "goal"))
+            yield from self._condition(state.goal, self._own, (*path, "goal"), planned=True)
 
     def _selection(self, state: SelectState, path: Path) -> Iterator[Finding]:
         """Yield findings about the selected term, and about cases whose type differs from the term's type."""
@@ -251,7 +251,10 @@ class _Data:
 
     # -- the language ------------------------------------------------------------------------------------
 
-    def _condition(self, condition: Expression, scope: Types | None, path: Path) -> Iterator[Finding]:
+    def _condition(
+        self, condition: Expression, scope: Types | None, path: Path, *, planned: bool = False
+    ) -> Iterator[Finding]:
+        """Yield findings about a condition; `planned` is whether planning reads it, so that it may be recursive."""
         for name in asked_states(condition):
             if name not in self._subject.names:
                 message, valid = f"there is no state '{name}'", self._subject.names
@@ -264,6 +267,8 @@ class _Data:
             return
         try:
             check(condition, self._schema, self._known(names))
+            if not planned:
+                self._schema.require_defined(condition)
         except InputError as error:
             yield self._subject.caught(error, path, "condition")
 

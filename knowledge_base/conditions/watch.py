@@ -158,7 +158,7 @@ def touches(pattern: Expression, params: Mapping[str, Value], schema: Schema) ->
         valid = (*schema.predicates, *schema.functions, *schema.types)
         message = f"there is no predicate, function or type '{name}'"
         raise UnknownNameError(message, place=pattern.place, found=name, valid=valid)
-    check_arity(schema.predicates[name], len(pattern.args), pattern.place)
+    check_arity(schema.told(name, pattern.place), len(pattern.args), pattern.place)
     return lambda change: any(
         f.predicate == name and fits(f.args) for facts in (change.delta.removed, change.delta.added) for f in facts
     )

@@ -11,10 +11,11 @@ from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import GEOMETRY, UNSET, Content
 from knowledge_base.language.checking.check import check_reads
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature
-from knowledge_base.language.syntax.expression import KEYWORDS
+from knowledge_base.language.syntax.expression import KEYWORDS, Expression
 from knowledge_base.language.syntax.sexpr import TypedName
 from knowledge_base.pddl.domain_text import DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.world.computation import Computed, in_reading_order
+from knowledge_base.world.derived import Axiom, Definitions, checked_axiom
 
 MAX_TYPES = 10_000
 MAX_TYPE_DEPTH = 100
@@ -36,6 +37,8 @@ class Schema:
         places: places of the declarations of types and constants, for messages.
         functional: predicates whose last argument depends on the other arguments, see `with_functional`.
         computed: computed predicates, by name; no world or store contains facts of them.
+        axioms: definitions of derived predicates. Conditions read a derived predicate by its definition; a recursive
+            one, only planning computes.
 
     Raises:
         SchemaError: a declared type, parameter or constant refers to an unknown type; types form a cycle; or a name is
@@ -49,6 +52,8 @@ class Schema:
     places: Mapping[str, Place] = field(default_factory=dict, repr=False)
     functional: frozenset[str] = frozenset()
     computed: Mapping[str, Computed[Any]] = field(default_factory=dict)
+    axioms: tuple[Axiom, ...] = ()
+    _definitions: Definitions = field(init=False, repr=False)
     _ancestors: Mapping[str, tuple[str, ...]] = field(init=False, repr=False)
     _unset: Mapping[str, Content] = field(init=False, repr=False)
     _fitting: dict[tuple[str, ...], frozenset[str]] = field(init=False, repr=False, default_factory=dict)
@@ -74,6 +79,7 @@ class Schema:
         self._check_types()
         self._check_computed()
         self._check_functional()
+        object.__setattr__(self, "_definitions", Definitions(self.axioms, self.predicates, typed=True))
         object.__setattr__(self, "_unset", {name: UNSET[self.result(name)] for name in self.functions})
 
     @classmethod
@@ -103,13 +109,34 @@ class Schema:
         """
         types = typed_names((*domain.types, *domain.implied_types()), "type")
         constants = typed_names(domain.constants, "constant")
-        return cls(
+        schema = cls(
             types={name: declared.types[0] for name, declared in types.items()},
             constants={name: declared.types[0] for name, declared in constants.items()},
             predicates=_signatures(domain.predicates, "predicate"),
             functions=_signatures(domain.functions, "function"),
             places={name: declared.place for name, declared in {**types, **constants}.items()},
         )
+        return schema.with_axioms(checked_axiom(axiom, schema) for axiom in domain.axioms)
+
+    def with_axioms(self, axioms: Iterable[Axiom]) -> Schema:
+        """Return this schema with more definitions of derived predicates.
+
+        Raises:
+            SchemaError: a predicate follows from its own negation.
+        """
+        new = tuple(dict.fromkeys((*self.axioms, *axioms)))
+        return self if new == self.axioms else replace(self, axioms=new)
+
+    def expanded(self, e: Expression) -> Expression:
+        """Return the condition with the definitions of derived predicates; recursive predicates stay."""
+        return self._definitions.expanded(e)
+
+    def require_defined(self, e: Expression) -> None:
+        """Raise `SchemaError` if the condition reads a recursive derived predicate, which only planning computes."""
+        atom = self._definitions.recursive_part(e)
+        if atom is not None:
+            message = f"'{atom.predicate}' is a recursive derived predicate, which only goals and planning actions read"
+            raise SchemaError(message, place=atom.place)
 
     def with_functional(self, *predicates: str) -> Schema:
         """Return this schema with functional predicates: two true facts never differ only in the last argument.
@@ -146,6 +173,7 @@ class Schema:
             functions=_united(functions, "function"),
             places={**other.places, **self.places},
             functional=self.functional | other.functional,
+            axioms=tuple(dict.fromkeys((*self.axioms, *other.axioms))),
         ).with_computed(*self.computed.values(), *other.computed.values())
 
     def with_computed(self, *predicates: Computed[Any]) -> Schema:
@@ -244,9 +272,14 @@ class Schema:
 
         Raises:
             UnknownNameError: the predicate is not declared.
-            SchemaError: the predicate is computed.
+            SchemaError: the predicate is computed, or derived and not recursive.
         """
         found = self.predicates.get(name)
+        if name in self._definitions.axioms and name not in self._definitions.recursive:
+            defined = self._definitions.axioms[name][0].place
+            where = f" (at {defined})" if defined else ""
+            message = f"'{name}' is derived{where}; change the facts from which it follows"
+            raise SchemaError(message, place=place)
         if found is not None:
             return found
         if name in self.computed:

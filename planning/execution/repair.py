@@ -12,6 +12,7 @@ from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.effect import effect_conditions
 from knowledge_base.language.syntax.expression import Expression, Not
 from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.rewriting import names_of
 from knowledge_base.language.syntax.text import to_text
 from planning.execution.outcomes import GaveUp, GoalHolds, PlotFound, Repaired, Replan
 from planning.execution.plan_progress import PlanProgress, is_true, shortest_end
@@ -23,7 +24,6 @@ from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import PartialOrder, in_sequence
 from planning.ordering.timed_links import linked
 from planning.plan import Plan, PlanStep
-from planning.problem.expressions import names_of
 from planning.problem.relevance import relevant
 
 if TYPE_CHECKING:

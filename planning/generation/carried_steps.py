@@ -29,9 +29,10 @@ from knowledge_base.language.syntax.expression import (
     substitute,
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.rewriting import names_of
 from planning.domain import PlanningAction, PlanningDomain
 from planning.plan import PlanStep
-from planning.problem.expressions import changed, names_of
+from planning.problem.expressions import changed
 
 
 @dataclass(frozen=True, slots=True)

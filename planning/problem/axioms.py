@@ -18,13 +18,15 @@ from dataclasses import dataclass, replace
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, effect_conditions, effect_leaves
 from knowledge_base.language.syntax.expression import Atom, Exists, Expression, Or, TypedVariable, Variable
+from knowledge_base.language.syntax.rewriting import denied, names_of
 from knowledge_base.pddl.problem_text import Metric
+from knowledge_base.world.derived import Axiom
 from planning.cancellable_work import WorkLimit
-from planning.domain import Axiom, PlanningDomain
+from planning.domain import PlanningDomain
 from planning.planning_actions import PlanningAction
 from planning.problem.construction import build_problem
 from planning.problem.derived import Derivation, derivation
-from planning.problem.expressions import denied, name_of, names_of
+from planning.problem.expressions import name_of
 from planning.problem.relevance import relevant
 from planning.strips import GroundAction, Problem, UnsupportedActionError, UnsupportedGoalError
 

@@ -22,13 +22,13 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import Expression, Term
 from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.rewriting import names_of
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.pddl.problem_text import Metric
 from planning.cancellable_work import WorkLimit
 from planning.domain import PlanningDomain
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, Some
 from planning.problem.derived import derivation
-from planning.problem.expressions import names_of
 from planning.problem.grounding import Variant
 from planning.problem.operators import OperatorCache, ignored, metric_of, numbered, things_of
 from planning.problem.reduction import pruned, spared

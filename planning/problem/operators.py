@@ -20,13 +20,13 @@ from knowledge_base.language.syntax.expression import (
     Variable,
     parts_of,
 )
+from knowledge_base.language.syntax.rewriting import names_of
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.pddl.problem_text import TOTAL_TIME, Metric
 from planning.cancellable_work import WorkLimit
 from planning.domain import PlanningAction
 from planning.plan import PlanStep
 from planning.problem.conditions import Grounder
-from planning.problem.expressions import names_of
 from planning.problem.grounding import JoinRule, ReachedFacts, Variant, joined_atoms, variants
 from planning.problem.relevance import Relevant
 from planning.problem.task import GroundOperator, Numbering, OperatorIndex

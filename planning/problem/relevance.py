@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from knowledge_base.errors import Place
 from knowledge_base.language.syntax.effect import Add, Delete, NumericEffect, effect_leaves
 from knowledge_base.language.syntax.expression import Atom, Comparison, Expression, Term
+from knowledge_base.language.syntax.rewriting import inside, name_in, names_of
 from knowledge_base.language.syntax.text import to_text
 from planning.domain import PlanningAction, PlanningDomain
 from planning.plan import NobodyCan
 from planning.problem.derived import Derivation, derivation
-from planning.problem.expressions import changed, conditions_of, inside, name_in, name_of, names_of
+from planning.problem.expressions import changed, conditions_of, name_of
 from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 

@@ -58,7 +58,7 @@ def check(
     checker = _Checker(schema, objects, variables or {}, free)
     checker.condition(e)
     if free == "answers":
-        check_answers(e, frozenset(variables or ()), schema)
+        check_answers(schema.expanded(e), frozenset(variables or ()), schema)
 
 
 def check_effect(

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from knowledge_base.errors import Place, SchemaError
 from knowledge_base.facts import Content
-from knowledge_base.language.syntax.expression import Atom, Term, TypedVariable
+from knowledge_base.language.syntax.expression import Atom, Expression, Term, TypedVariable
 
 ROOT_TYPE = "object"
 VALUE_TYPES = ("number", "text", "boolean")
@@ -105,6 +105,12 @@ class Vocabulary(Protocol):
     @property
     def computed(self) -> Mapping[str, Computing]:
         """Computed predicates by name."""
+
+    def expanded(self, e: Expression) -> Expression:
+        """Return the condition with the definitions of derived predicates; recursive predicates stay."""
+
+    def require_defined(self, e: Expression) -> None:
+        """Raise `SchemaError` if the condition reads a recursive derived predicate."""
 
     def is_a(self, type_name: str, ancestor: str) -> bool:
         """Return whether `ancestor` is `type_name` or one of its ancestors."""

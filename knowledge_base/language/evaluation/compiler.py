@@ -131,11 +131,13 @@ def compile_answers(e: Expression, schema: Vocabulary, bound: frozenset[str], na
 
 def witnesses(e: Exists, schema: Vocabulary) -> Search:
     """Return a search for the choices of objects that make the body true."""
+    e = replace(e, body=schema.expanded(e.body))
     return _search(_witnessing(e, schema), schema, free_variables(e))
 
 
 def counterexamples(e: Forall, schema: Vocabulary) -> Search:
     """Return a search for the choices of objects that make the body false."""
+    e = replace(e, body=schema.expanded(e.body))
     return _search(_refuting(e, schema), schema, free_variables(e))
 
 

@@ -100,7 +100,7 @@ def asked(e: Expression, schema: Vocabulary) -> Asked:
     found = _conditions.find(e, schema)
     if found is None:
         check_depth(e)
-        found = _conditions.keep(e, schema, Asked(e, free_variables(e), compile_test(e, schema)))
+        found = _conditions.keep(e, schema, Asked(e, free_variables(e), compile_test(schema.expanded(e), schema)))
     return found
 
 
@@ -124,9 +124,9 @@ def rows(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDING
     """
     check_depth(e)
     bound = free_variables(e).intersection(bindings)
-    check_answers(e, bound, world.schema)
+    check_answers(world.schema.expanded(e), bound, world.schema)
     names = asked_for(e, bound)
-    found = compile_query(e, world.schema, bound)(world, bindings)
+    found = compile_query(world.schema.expanded(e), world.schema, bound)(world, bindings)
     return ({name: each[name] for name in names} for each in found)
 
 
@@ -140,8 +140,9 @@ def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried
     bound = free.intersection(params)
     found = by_bound.get(bound)
     if found is None:
-        check_answers(e, bound, schema)
-        found = by_bound[bound] = Queried(e, compile_answers(e, schema, bound, asked_for(e, bound)))
+        expanded = schema.expanded(e)
+        check_answers(expanded, bound, schema)
+        found = by_bound[bound] = Queried(e, compile_answers(expanded, schema, bound, asked_for(e, bound)))
     return found
 
 

@@ -113,6 +113,9 @@ def explain(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BIND
 def _explain(e: Expression, world: World, bindings: Bindings) -> Explanation:
     text = to_text(substitute(e, bindings))
     match e:
+        case Atom() if (definition := world.schema.expanded(e)) is not e:
+            inner = _explain(definition, world, bindings)
+            found = Explanation(text, inner.truth, (inner,), decider=0)
         case Atom() | Comparison():
             found = Explanation(text, holds(e, world, bindings), detail=_detail(e, world, bindings))
         case Not(body):

@@ -108,8 +108,9 @@ def plan_query(e: Expression, world: World, bindings: Mapping[str, Value] = NO_B
     """
     check_depth(e)
     bound = free_variables(e).intersection(bindings)
-    check_answers(e, bound, world.schema)
-    follower = _Follower(SearchPlan(conjuncts(e), world.schema, bound), world, bindings)
+    defined = world.schema.expanded(e)
+    check_answers(defined, bound, world.schema)
+    follower = _Follower(SearchPlan(conjuncts(defined), world.schema, bound), world, bindings)
     return QueryPlan(to_text(substitute(e, bindings)), asked_for(e, bound), tuple(follower.steps()))
 
 

@@ -191,11 +191,14 @@ def test_a_rule_counts_where_it_was_written_when_a_plan_inherited_it():
     assert "rule 'slipped: retry' never answered" in missing(coverage, "fetch")
 
 
-def test_rules_of_one_label_are_one():
+def test_rules_with_equal_responses_are_told_apart():
     twice = plot(
         "{plot: p, states: {a: {final: true}}, rules: [{on: x, when: (open), do: {then: retry}}, {on: x, do: {then: retry}}]}"
     )
-    assert [item.path for item in Coverage([twice]).missing() if item.kind == "rule"] == [("rules", 0)]
+    assert [item.path for item in Coverage([twice]).missing() if item.kind == "rule"] == [
+        ("rules", 0),
+        ("rules", 1),
+    ]
 
 
 def test_history_is_never_entered_and_not_asked_for():

@@ -1,4 +1,4 @@
-"""Robots whose goals and actions ask for derived predicates, which the bare knowledge base knows nothing of."""
+"""Robots whose goals, actions and plots ask for derived predicates."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import pytest
 from breadth_first import BreadthFirst
 from obedient_robot import FAILED, ObedientRobot, plots
 
+from dsc import PlotError, parse_plot
 from knowledge_base import Delta, fact
 from planning import Executive, PlanningDomain
 
@@ -110,3 +111,33 @@ def test_a_transient_failure_is_retried_with_derived_conditions():
 )
 def test_what_cannot_be_reached_is_never_claimed(goal):
     assert Run(goal).outcome.name == "no_plan"
+
+
+@pytest.mark.parametrize(("held", "chosen"), [((), "idle"), ((fact("held", "cup"),), "hurry")])
+def test_plots_read_derived_predicates_in_conditions_and_guards(held, chosen):
+    look = """
+    plot: look
+    states:
+      first: {dynamic: [idle, hurry], on: {done: then, no_candidate: lost}}
+      then: {choice: [{when: (near c d), to: over}, lost]}
+      over: {final: true}
+      lost: {final: true, emit: lost}
+    emits: {lost: }
+    """
+    parts = [
+        f"{{plot: {name}, when: {when}, states: {{e: {{final: true}}}}}}"
+        for name, when in (("idle", "(not (busy))"), ("hurry", "(busy)"))
+    ]
+    chosen_plots: list[str] = []
+    with Executive(DOMAIN, [parse_plot(text) for text in (look, *parts)], []) as program:
+        known = (fact("door", "d", "c"), *held)
+        program.knowledge.apply(Delta(nodes={"c": "room", "d": "room", "cup": "thing"}, added=known), "t")
+        program.listen(lambda one: chosen_plots.append(one.data["chosen"]) if one.type == "decision" else None)
+        end = program.run("look")
+    assert (end.finished, end.emitted, chosen_plots) == (True, (), [chosen])
+
+
+def test_a_plot_that_reads_a_recursive_predicate_is_refused():
+    text = "{plot: p, states: {a: {always: {when: (connected c d), to: e}}, e: {final: true}}}"
+    with pytest.raises(PlotError, match="'connected' is a recursive derived predicate, which only goals"):
+        Executive(DOMAIN, [parse_plot(text)], [])
