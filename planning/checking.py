@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from dsc.components.hooks import contained
 from dsc.components.robot import require_deployed, require_instances, require_whole, require_wired
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, ProgrammingError
-from dsc.model.plot import ActionPlot
+from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import DynamicState
 from dsc.profiles import adapted, configure
 from dsc.skills import SkillSignature, signatures
@@ -21,17 +22,20 @@ from dsc.text.plot_files import load_plot
 from dsc.text.profiles import Profile, load_profile
 from dsc.validation import review_plot, validate_plot
 from knowledge_base.errors import InputError, Place, UnknownNameError, collecting, tolerated
+from knowledge_base.language.syntax.expression import Expression, free_variables
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.pddl.domain_text import read_domain
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.bundles import Bundle, components_of, gathered, plots_of, shipped_by
+from planning.cancellable_work import WorkLimit, WorkLimitError
 from planning.deployment import begin, simulated
 from planning.domain import PlanningDomain
 from planning.engines.registry import able, installed, nobody
 from planning.execution.planning_component import PlanningComponent
 from planning.executive import achieve_plot
-from planning.problem.construction import check_goal
+from planning.explanation import why_unsolvable
+from planning.problem.construction import build_problem, check_goal
 from planning.problem.relevance import numeric_constructs
 from planning.simulation import Setup, Simulation
 from planning.soundness import IMPLEMENTED, check_implementations
@@ -40,6 +44,8 @@ from planning.targets import bundle_at
 READABLE = "readable"
 """The rule of findings about files and parts that cannot be read."""
 _KNOWN_PLOT = "known plot"
+_PATIENT_SECONDS = 5.0
+"""Time limit, in seconds, of the check whether the first goal can be reached."""
 _SKIPPED = frozenset({"build", "dist", "node_modules", "site-packages", "__pycache__"})
 _NAMES_PLOT = re.compile(r"^plot:\s*[\"']?([\w.-]+)", re.MULTILINE)
 _IMPLEMENTS = re.compile(r"^implements:\s*[\"']?([\w.-]+)", re.MULTILINE)
@@ -60,7 +66,10 @@ def check_project(target: str) -> list[Finding]:
         bundle = _bundle(target) if not path.is_dir() or _has_robot(path) else None
         unread = any(str(one.place.source).endswith(".pddl") for one in errors if one.place is not None)
         whole = bundle is not None and (bundle.domain is not None or not unread)
-        findings = [] if bundle is None else _Robot(bundle, whole=whole).findings()
+        robot = None if bundle is None else _Robot(bundle, whole=whole)
+        findings = [] if robot is None else robot.findings()
+        if robot is not None and not errors and not findings:
+            findings += robot.unreachable()
     findings += [Finding(error, READABLE) for error in errors]
     if path.is_dir():
         read = {Path(one.place.source or "").resolve() for one in findings if one.place is not None}
@@ -216,6 +225,30 @@ class _Robot:
         for construct in constructs.values():
             error = InputError(f"{replace(construct, place=None)}; {nobody({'numeric'}).who}", place=construct.place)
             yield Finding(error, "engine", level="warning")
+
+    def unreachable(self) -> Iterator[Finding]:
+        """Yield a warning if the goal with which a run of a robot without mistakes begins cannot be reached."""
+        domain, (goal, place) = self._domain, self._first_goal()
+        if domain is None or goal is None or free_variables(goal):
+            return
+        world = KnowledgeBase(domain.schema)
+        begin(world, self._bundle, self._simulation, "check")
+        patience = WorkLimit(_PATIENT_SECONDS)
+        with suppress(InputError, WorkLimitError):  # errors of the goal are findings already
+            if build_problem(domain, world, goal, patience=patience).unreachable:
+                why = "; ".join(why_unsolvable(domain, world, goal, patience))
+                error = InputError(f"the goal cannot be reached from the initial knowledge: {why}", place=place)
+                yield Finding(error, "goal", level="warning")
+
+    def _first_goal(self) -> tuple[Expression | None, Place | None]:
+        """Return the goal that a run plans for before anything else, and its place; `None` without such a goal."""
+        if self._bundle.main is None:
+            return None if self._bundle.goal is None else parse_condition(self._bundle.goal), None
+        plot = next((one for one in self._plots if one.name == self._bundle.main), None)
+        first = None if plot is None else plot.states.get(initial_of(plot))
+        if plot is None or not isinstance(first, DynamicState) or first.dynamic:
+            return None, None
+        return first.goal, plot.place(("states", initial_of(plot), "goal"))
 
     def _check_main(self, main: str) -> None:
         plots = {plot.name: plot for plot in self._plots}

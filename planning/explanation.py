@@ -124,12 +124,14 @@ class _Reach:
 class _Nearest:
     """A step that adds a fact, with its missing facts and conditions.
 
-    `fixed` is the number of missing facts and conditions that no action can change.
+    `inner` has the missing facts in the conditions. `fixed` is the number of missing facts and conditions that no
+    action can change.
     """
 
     step: PlanStep
     facts: tuple[Fact, ...]
     conditions: tuple[str, ...]
+    inner: tuple[Fact, ...]
     fixed: int
 
 
@@ -170,9 +172,10 @@ class _Causes:
                 rooted = True
                 said.append(f"{here} does not hold, and no planning action makes it true")
                 continue
-            rooted |= not nearest.facts or bool(nearest.conditions)
+            missing = (*nearest.facts, *nearest.inner)
+            rooted |= not missing or bool(nearest.conditions and not nearest.inner)
             said.append(f"{here} needs {nearest.step}, which needs {_listed(nearest)}")
-            fresh = [missing for missing in nearest.facts if missing not in seen]
+            fresh = [one for one in dict.fromkeys(missing) if one not in seen]
             seen.update(fresh)
             agenda.extend(fresh)
         return "; ".join(said if rooted or agenda else [*said, "none of these can come first"])
@@ -215,12 +218,23 @@ class _Causes:
         step = PlanStep(rule.action.name, tuple(str(bindings[p.name]) for p in parameters))
         needed = [self.grounder.fact(atom, bindings) for atom in rule.atoms]
         others = conjuncts(rule.action.precondition)
-        unmet = [
-            c for c in others if c not in rule.atoms and not self.reach.allows(self.grounder.residual(c, bindings))
-        ]
+        residuals = {c: self.grounder.residual(c, bindings) for c in others if c not in rule.atoms}
+        unmet = [c for c, residual in residuals.items() if not self.reach.allows(residual)]
+        inner = dict.fromkeys(fact for c in unmet for fact in self.unreached(residuals[c]))
         missing = tuple(fact for fact in needed if fact not in self.reached)
         fixed = len(unmet) + sum(fact.predicate not in self.grounder.changing for fact in missing)
-        return _Nearest(step, missing, tuple(to_text(substitute(c, bindings)) for c in unmet), fixed)
+        conditions = tuple(to_text(substitute(c, bindings)) for c in unmet)
+        return _Nearest(step, missing, conditions, tuple(inner), fixed)
+
+    def unreached(self, condition: Residual) -> Iterator[Fact]:
+        """Yield the positive facts in a condition that no action sequence reaches."""
+        match condition:
+            case Literal(fact, positive):
+                if positive and fact not in self.reached:
+                    yield fact
+            case Every(parts) | Some(parts):
+                for part in parts:
+                    yield from self.unreached(part)
 
 
 def _cases(action: PlanningAction) -> Iterator[PlanningAction]:

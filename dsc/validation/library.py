@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import chain, islice
 
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, PlotError
 from dsc.model.plot import ActionPlot
+from dsc.model.rules import Rule
 from dsc.skills import SkillSignature
 from dsc.validation.arguments import check_arguments, check_components, check_outputs, check_parameters
 from dsc.validation.data import check_data
@@ -79,11 +80,24 @@ def _with_others(findings: list[Finding], subject: Subject) -> list[Finding]:
     A check may be unable to read a plot of unsound structure; then its findings come after the structure is repaired.
     """
     found = {finding.place: finding for finding in reversed(findings)}
-    for check in (check_data, check_components):
+    for check in (check_data, check_components, _check_outcomes):
         with suppress(InputError, LookupError):
             for finding in islice(check(subject), MAX_FINDINGS):
                 found.setdefault(finding.place, finding)
     return [*findings, *(one for one in found.values() if one not in findings)][:MAX_FINDINGS]
+
+
+def _check_outcomes(subject: Subject) -> Iterator[Finding]:
+    """Yield the findings about unanswered outcomes; a rule whose target does not exist still answers."""
+    plot = subject.plot
+    rules = [rule if not rule.leads_away or rule.then in subject.names else _here(rule) for rule in plot.rules]
+    copied = plot.model_copy(update={"rules": tuple(rules)})
+    again = Subject(copied, subject.library, subject.schema, subject.skills, subject.components)
+    return (finding for finding in check_wiring(again) if finding.rule == "every outcome is wired")
+
+
+def _here(rule: Rule) -> Rule:
+    return rule.model_copy(update={"do": rule.do.model_copy(update={"then": None})})
 
 
 def _require_parts(library: object, schema: object) -> None:

@@ -39,6 +39,9 @@ PLANTED = [
     ("delivery.py", 'main="deliver_all"', 'main="deliver_al"', "no plot 'deliver_al'; did you mean 'deliver_all'"),
     ("delivery.py", "(in ?p ?r))))\",", "(on ?p ?r))))\",", "no predicate 'on'"),
     ("delivery.py", 'fact("robot-in", self.robot_at),\n', 'fact("robot-at", self.robot_at),\n', "no predicate 'robot-at'; did you mean 'robot-in'"),
+    ("plots/deliver_all.yaml", "then: retry", "then: retri", "'retri'; did you mean 'retry'"),
+    ("plots/drive.yaml", "{to: room}\nimpl", "{to: rooom}\nimpl", "no type 'rooom'; did you mean 'room'"),
+    ("plots/take.yaml", "  there: {final: true}", "  there: {final: true}\n  rest: {final: true}", "'rest'"),
 ]  # fmt: skip
 
 
@@ -143,7 +146,7 @@ def test_numbers_that_no_installed_engine_can_plan_with_are_a_warning_with_the_r
     monkeypatch.setattr("planning.checking.installed", lambda one: has_engine or one.name == "pyperplan")
     planted(project, [
         ("domain.pddl", "(full))\n", "(full)) (:functions (charge))\n", ""),
-        ("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (> (charge) 2))", ""),
+        ("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (>= (charge) 0))", ""),
         ("domain.pddl", "(robot-in ?to))", "(robot-in ?to) (decrease (charge) 1))", ""),
     ])  # fmt: skip
     found = [str(one) for one in check_project(str(project))]
@@ -151,3 +154,14 @@ def test_numbers_that_no_installed_engine_can_plan_with_are_a_warning_with_the_r
     if found:
         assert found[0].startswith(f"{project / 'domain.pddl'}:7:")
         assert found[0].endswith("enhsp could (pip install 'up-enhsp>=0.1.1') [warning]")
+
+
+def test_a_first_goal_that_cannot_be_reached_is_a_warning_with_the_reason(project):
+    planted(
+        project, [("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (full))", "")]
+    )
+    (found,) = check_project(str(project))
+    assert found.level == "warning"
+    assert str(found).startswith(f"{project / 'plots' / 'deliver_all.yaml'}:")
+    assert "the goal cannot be reached from the initial knowledge" in str(found)
+    assert "(full) does not hold, and no planning action makes it true" in str(found)

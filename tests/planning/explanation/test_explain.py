@@ -5,6 +5,7 @@ import pytest
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
 from planning.explanation import why_unsolvable
 from planning.problem.construction import build_problem
@@ -146,3 +147,18 @@ def test_a_numeric_problem_does_not_claim_that_each_goal_fact_can_be_reached(wor
     world = world_of(domain.schema, dict.fromkeys("ab", "tank"), values=values)
     why = why_unsolvable(domain, world, parse_condition(goal))
     assert why == ("no goal fact is unreachable if numbers change without bound, but no plan reaches the goal",)
+
+
+def test_a_missing_fact_inside_a_condition_is_followed_to_its_cause():
+    domain = PlanningDomain.parse("""(define (domain lab) (:types tube place) (:constants centrifuge camera rack - place)
+      (:predicates (at ?t - tube ?p - place) (spun ?t - tube) (shot ?t - tube) (to-spin ?t - tube) (reached ?p - place))
+      (:action put :parameters (?t - tube ?f ?p - place) :precondition (and (reached ?p) (at ?t ?f)) :effect (at ?t ?p))
+      (:action spin :parameters (?t - tube) :precondition (at ?t centrifuge) :effect (spun ?t))
+      (:action photo :parameters (?t - tube)
+        :precondition (and (at ?t camera) (imply (to-spin ?t) (spun ?t))) :effect (shot ?t)))""")
+    kb = KnowledgeBase(domain.schema)
+    known = (fact("at", "blood", "rack"), fact("to-spin", "blood"), fact("reached", "camera"))
+    kb.apply(Delta(nodes={"blood": "tube"}, added=known), "test")
+    (why,) = why_unsolvable(domain, kb, parse_condition("(shot blood)"))
+    assert "(shot blood) needs (photo blood), which needs (imply (to-spin blood) (spun blood))" in why
+    assert why.endswith("(reached centrifuge) does not hold, and no planning action makes it true")
