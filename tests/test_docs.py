@@ -190,3 +190,22 @@ def test_the_run_on_the_first_screen_is_what_the_command_prints():
     printed = iter(subprocess.run([dsc, *words], capture_output=True, text=True, check=True).stdout.splitlines())
     for line in lines:
         assert line.strip() == "…" or line in printed, line  # `in` goes on where the last line was found
+
+
+def test_the_first_robot_is_made_as_its_page_says(tmp_path):
+    page = (ROOT / "docs" / "first-robot.md").read_text()
+    home, dsc = tmp_path / "coffee", Path(sys.executable).with_name("dsc")
+    subprocess.run([dsc, "new", "coffee"], cwd=tmp_path, check=True, capture_output=True)
+    for old in [*home.glob("coffee/plots/*"), *home.glob("coffee/profiles/*")]:
+        old.unlink()
+    files = re.findall(r"^`((?:coffee|tests)/\S+)`[^\n]*:\n\n```\w+\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)
+    for name, text in files:
+        (home / name).write_text(text)
+    assert len(files) == 13
+    for block in blocks(ROOT / "docs" / "first-robot.md", "console")[1:]:
+        for shown in block.split("$ dsc ")[1:]:
+            command, _, expected = shown.partition("\n")
+            done = subprocess.run([dsc, *shlex.split(command)], cwd=home, check=False, capture_output=True, text=True)
+            assert done.stdout == expected
+    tested = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    assert subprocess.run(tested, cwd=home, check=False, capture_output=True).returncode == 0

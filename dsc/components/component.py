@@ -241,7 +241,7 @@ class Component(ComponentHooks, RestartHooks):
         else:
             await self.switch(mode)
 
-    async def take(self, port: str, message: Mapping[str, Any]) -> None:
+    async def receive(self, port: str, message: Mapping[str, Any]) -> None:
         """Pass a one-way message to the method `port`, which has the decorator `takes`; for the *send* port.
 
         Raises:

@@ -51,7 +51,7 @@ class Host:
         self.endpoint.answer("switch", self._switch)
         self._answer("set", "configure", lambda said: component.configure(said["parameter"], said["value"]))
         self._answer("set all", "configure_all", component.configure_all)
-        self._answer("take", "take", lambda said: component.take(said["port"], said["message"]))
+        self._answer("take", "take", lambda said: component.receive(said["port"], said["message"]))
         self._answer("diagnose", "diagnose", lambda _: component.diagnose())
         self._is_active = asyncio.Event()
         self._heart = Heartbeat(self.endpoint, self._needed, self._activated)

@@ -233,7 +233,7 @@ class RemoteComponent(Component):
         """Change the mode at the host; raise `NoAnswerError` or `RefusedError`."""
         self._condition.take(await self._ask("switch", {"mode": mode}))
 
-    async def take(self, port: str, message: Mapping[str, Any]) -> None:
+    async def receive(self, port: str, message: Mapping[str, Any]) -> None:
         """Send a message to the host; raise `NoAnswerError` or `RefusedError`."""
         await self._ask("take", {"port": port, "message": dict(message)})
 

@@ -132,7 +132,7 @@ async def _take(component: Component, told: Told) -> None:
         case SwitchMode():
             await component.change_mode(told.mode)
         case SendMessage():
-            await component.take(told.port, encoded(told.arguments))
+            await component.receive(told.port, encoded(told.arguments))
 
 
 async def _restore_mode(component: Component, mode: str) -> None:

@@ -420,7 +420,7 @@ class TransportSuite:
         async with self._robot() as (robot, remote, _):
             for n in range(10):
                 await remote.configure("speed", n)
-                await remote.take("say", {"text": f"now {n}"})
+                await remote.receive("say", {"text": f"now {n}"})
             assert robot.log == [one for n in range(10) for one in (("speed", n), f"now {n}")]
             robot.log.clear()
             await remote.configure_all({"speed": 3, "gear": 2})

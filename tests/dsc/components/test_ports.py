@@ -199,9 +199,9 @@ def test_a_message_that_cannot_be_taken_is_told():
 def test_what_a_component_does_not_take_is_refused():
     battery = Battery()
     with pytest.raises(UnknownNameError, match="did you mean 'label'"):
-        asyncio.run(battery.take("labl", {}))
+        asyncio.run(battery.receive("labl", {}))
     with pytest.raises(InputError, match="needs its parameter 'text'"):
-        asyncio.run(battery.take("label", {}))
+        asyncio.run(battery.receive("label", {}))
     with pytest.raises(UnknownNameError, match="did you mean 'low'"):
         battery.update("lov", 1)
 

@@ -237,7 +237,7 @@ def two_answers():
 def a_hidden_method():
     class Arm(Component):
         @skill
-        async def take(self, call) -> Ok:  # type: ignore[override]
+        async def receive(self, call) -> Ok:  # type: ignore[override]
             return Ok()
 
 
@@ -261,7 +261,7 @@ def a_hidden_method():
         (two_classes_of_one_event, "the returned value of 'Arm.go' names two classes for the event 'ok'"),
         (an_unknown_report, "names 'Progres', which does not exist when the class is made; did you mean 'Progress'?"),
         (two_answers, "query 'Arm.free' returns one outcome class, the answer, not 2"),
-        (a_hidden_method, "'take' of a_hidden_method.<locals>.Arm hides an attribute of every component"),
+        (a_hidden_method, "'receive' of a_hidden_method.<locals>.Arm hides an attribute of every component"),
     ],
 )
 def test_a_skill_that_can_never_work_is_refused_when_it_is_made_with_its_line(make, said):
