@@ -22,6 +22,7 @@ from dsc.text.plot_files import load_plot
 from dsc.text.profiles import Profile, load_profile
 from dsc.validation import review_plot, validate_plot
 from knowledge_base.errors import InputError, Place, UnknownNameError, collecting, tolerated
+from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.expression import Expression, free_variables
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.pddl.domain_text import read_domain
@@ -36,6 +37,7 @@ from planning.execution.planning_component import PlanningComponent
 from planning.executive import achieve_plot
 from planning.explanation import why_unsolvable
 from planning.problem.construction import build_problem, check_goal
+from planning.problem.derived import derivation
 from planning.problem.relevance import numeric_constructs
 from planning.simulation import Setup, Simulation
 from planning.soundness import IMPLEMENTED, check_implementations
@@ -69,7 +71,7 @@ def check_project(target: str) -> list[Finding]:
         robot = None if bundle is None else _Robot(bundle, whole=whole)
         findings = [] if robot is None else robot.findings()
         if robot is not None and not errors and not findings:
-            findings += robot.unreachable()
+            findings += robot.pointless()
     findings += [Finding(error, READABLE) for error in errors]
     if path.is_dir():
         read = {Path(one.place.source or "").resolve() for one in findings if one.place is not None}
@@ -226,8 +228,11 @@ class _Robot:
             error = InputError(f"{replace(construct, place=None)}; {nobody({'numeric'}).who}", place=construct.place)
             yield Finding(error, "engine", level="warning")
 
-    def unreachable(self) -> Iterator[Finding]:
-        """Yield a warning if the goal with which a run of a robot without mistakes begins cannot be reached."""
+    def pointless(self) -> Iterator[Finding]:
+        """Yield a warning if the goal with which a run begins holds already, or cannot be reached.
+
+        The parts of the robot must be without mistakes.
+        """
         domain, (goal, place) = self._domain, self._first_goal()
         if domain is None or goal is None or free_variables(goal):
             return
@@ -235,7 +240,10 @@ class _Robot:
         begin(world, self._bundle, self._simulation, "check")
         patience = WorkLimit(_PATIENT_SECONDS)
         with suppress(InputError, WorkLimitError):  # errors of the goal are findings already
-            if build_problem(domain, world, goal, patience=patience).unreachable:
+            if holds(derivation(domain).at(world).condition(goal), world):
+                error = InputError("the goal holds in the initial knowledge, so nothing is planned", place=place)
+                yield Finding(error, "goal", level="warning")
+            elif build_problem(domain, world, goal, patience=patience).unreachable:
                 why = "; ".join(why_unsolvable(domain, world, goal, patience))
                 error = InputError(f"the goal cannot be reached from the initial knowledge: {why}", place=place)
                 yield Finding(error, "goal", level="warning")

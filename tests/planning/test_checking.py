@@ -156,6 +156,14 @@ def test_numbers_that_no_installed_engine_can_plan_with_are_a_warning_with_the_r
         assert found[0].endswith("enhsp could (pip install 'up-enhsp>=0.1.1') [warning]")
 
 
+def test_a_first_goal_that_holds_already_is_a_warning(project):
+    planted(project, [("delivery.py", '*(fact("goes-to", parcel', '*(fact("in", parcel', "")])
+    planted(project, [("plots/deliver_all.yaml", "(exists (?r - room) (and (goes-to ?p ?r) (in ?p ?r)))", "(exists (?r - room) (in ?p ?r))", "")])  # fmt: skip
+    (found,) = check_project(str(project))
+    assert "the goal holds in the initial knowledge, so nothing is planned" in str(found)
+    assert (found.level, found.place is not None) == ("warning", True)
+
+
 def test_a_first_goal_that_cannot_be_reached_is_a_warning_with_the_reason(project):
     planted(
         project, [("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (full))", "")]
