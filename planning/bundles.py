@@ -147,20 +147,52 @@ class Bundle:
         }
 
 
-def installed() -> dict[str, Bundle]:
-    """Return the bundles of all installed packages, by name.
+class InstalledBundles(dict[str, Bundle]):
+    """Bundles of installed packages, by name.
 
-    Raises:
-        InputError: an entry point does not refer to a bundle, or two bundles have equal names; the message identifies
-            the packages.
+    Attributes:
+        errors: by name, the error about a bundle that cannot be loaded; the other bundles are usable nevertheless.
     """
-    found: dict[str, Bundle] = {}
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.errors: dict[str, InputError] = {}
+
+    def require(self, name: str) -> Bundle:
+        """Return the bundle of that name.
+
+        Raises:
+            UnknownNameError: there is no such bundle.
+            InputError: the bundle cannot be loaded.
+        """
+        if name in self.errors:
+            raise self.errors[name]
+        if name not in self:
+            raise UnknownNameError(f"there is no bundle '{name}'", found=name, valid=self)
+        return self[name]
+
+
+def installed() -> InstalledBundles:
+    """Return the bundles of all installed packages.
+
+    A broken package stops no other: its error is an attribute of the result.
+    """
+    found = InstalledBundles()
     whose: dict[str, str] = {}
     for point in entry_points(group=GROUP):
-        bundle = _loaded(point)
-        if bundle.name in found:
-            raise InputError(f"two bundles are named '{bundle.name}': that of {whose[bundle.name]} and of {_of(point)}")
-        found[bundle.name], whose[bundle.name] = bundle, _of(point)
+        try:
+            bundle = _loaded(point)
+        except InputError as error:
+            found.errors[point.name] = error
+            continue
+        name = bundle.name
+        if name in whose:
+            found.pop(name, None)
+            found.errors[name] = InputError(
+                f"two bundles are named '{name}': that of {whose[name]} and of {_of(point)}"
+            )
+        else:
+            found[name], whose[name] = bundle, _of(point)
     return found
 
 
@@ -191,6 +223,8 @@ def gathered(wanted: Iterable[Bundle | str], among: Mapping[str, Bundle] | None 
         if name in begun:  # two bundles may need each other
             return
         bundle = given.get(name) or there().get(name)
+        if bundle is None and isinstance(among, InstalledBundles) and name in among.errors:
+            raise among.errors[name]
         if bundle is None:
             raise UnknownNameError(f"there is no bundle '{name}'{whose}", found=name, valid=[*given, *there()])
         begun.add(name)

@@ -48,9 +48,9 @@ def value_at(target: str) -> object:
     if ":" in target:
         return made(named_part(target), target)
     found = installed()
-    if target not in found:
+    if target not in found and target not in found.errors:
         raise UnknownNameError(f"there is no robot '{target}'; a robot is {_FORMS}", found=target, valid=found)
-    return found[target]
+    return found.require(target)
 
 
 def _as_bundle(found: object, target: str) -> Bundle:

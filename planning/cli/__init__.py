@@ -20,13 +20,12 @@ def bundles_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Show the bundles of the installed packages: components, plots and planning actions to build a robot of."""
-    from knowledge_base.errors import UnknownNameError
     from planning.bundles import GROUP, installed
 
     found = installed()
-    if name is not None and name not in found:
-        raise UnknownNameError(f"there is no bundle '{name}'", found=name, valid=found)
-    shown = list(found.values()) if name is None else [found[name]]
+    shown = list(found.values()) if name is None else [found.require(name)]
+    for error in found.errors.values() if name is None else ():
+        typer.echo(f"dsc: {error}", err=True)
     if as_json:
         said = [bundle.to_json() for bundle in shown]
         typer.echo(json.dumps(said if name is None else said[0]))

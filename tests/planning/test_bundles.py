@@ -14,6 +14,7 @@ from knowledge_base import Delta, InputError, UnknownNameError, fact
 from planning import Bundle, Executive, PlanningDomain, bundles
 from planning.bundles import gathered, installed
 from planning.cli.command import app
+from planning.targets import bundle_at
 
 Item = Annotated[str, "item"]
 
@@ -134,10 +135,23 @@ def test_a_folder_is_read_with_its_mistakes_named(tmp_path):
         (5, "the entry point 'odd' of 'robots:odd' leads to 5, not to a Bundle"),
     ],
 )
-def test_an_installed_one_that_is_wrong_is_named(monkeypatch, found, said):
-    points(monkeypatch, odd=found)
-    with pytest.raises(InputError, match=said):
-        installed()
+def test_an_installed_one_that_is_wrong_is_named_and_stops_no_other(monkeypatch, found, said):
+    points(monkeypatch, odd=found, handling=HANDLING, tasks=TASKS)
+    assert list(installed()) == ["handling", "tasks"]
+    assert gathered(["tasks"]) == (HANDLING, TASKS)
+    for ask in (installed().require, bundle_at, lambda name: gathered([name])):
+        with pytest.raises(InputError, match=said):
+            ask("odd")
+    shown = CliRunner().invoke(app, ["bundles"])
+    assert [line.split()[0] for line in shown.stdout.splitlines()] == ["handling", "tasks"]
+    assert said in shown.stderr
+
+
+def test_two_packages_with_bundles_of_one_name_are_named(monkeypatch):
+    points(monkeypatch, handling=HANDLING, more=Bundle("handling"))
+    assert not installed()
+    with pytest.raises(InputError, match="two bundles are named 'handling': that of 'robots:handling' and of"):
+        bundle_at("handling")
 
 
 def test_primitive_plots_use_components_and_abstract_ones_plots_alone():
