@@ -25,6 +25,7 @@ from typing import Any, ClassVar, Never, NoReturn, dataclass_transform
 from dsc.annotations import Namespace, class_statement, evaluated, is_class_variable, lower_name, members, type_of
 from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.facts import Delta
+from knowledge_base.spelling import is_plain_name
 
 _UNCHANGED = Delta()
 _NONE: Mapping[str, Any] = MappingProxyType({})
@@ -142,6 +143,9 @@ def declared_outcomes(
 
 def _types(outcome: str, annotations: Mapping[str, object], names: Namespace) -> Iterator[tuple[str, str | None]]:
     for name, annotation in annotations.items():
+        if not is_plain_name(name):
+            message = f"attribute '{name}' of outcome {outcome} cannot be read in plots, which have lower-case names"
+            raise SchemaError(f"{message}; write '{lower_name(name)}'", found=name)
         if name in _TAKEN:
             message = f"outcome {outcome} cannot have the attribute '{name}', which every outcome has"
             raise SchemaError(message, found=name)

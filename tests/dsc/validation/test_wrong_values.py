@@ -234,6 +234,11 @@ def two_answers():
             return Ok()
 
 
+def an_attribute_with_capitals():
+    class Low(Outcome):
+        batteryLevel: float  # noqa: N815
+
+
 def a_hidden_method():
     class Arm(Component):
         @skill
@@ -261,6 +266,10 @@ def a_hidden_method():
         (two_classes_of_one_event, "the returned value of 'Arm.go' names two classes for the event 'ok'"),
         (an_unknown_report, "names 'Progres', which does not exist when the class is made; did you mean 'Progress'?"),
         (two_answers, "query 'Arm.free' returns one outcome class, the answer, not 2"),
+        (
+            an_attribute_with_capitals,
+            "attribute 'batteryLevel' of outcome an_attribute_with_capitals.<locals>.Low cannot be read in plots, which have lower-case names; write 'battery_level'",
+        ),
         (a_hidden_method, "'receive' of a_hidden_method.<locals>.Arm hides an attribute of every component"),
     ],
 )
@@ -269,4 +278,4 @@ def test_a_skill_that_can_never_work_is_refused_when_it_is_made_with_its_line(ma
         make()
     assert refused.value.place is not None
     line = Path(__file__).read_text().splitlines()[(refused.value.place.line or 0) - 1]
-    assert line.split("#")[0].strip() in {"@skill", "@query", '@skill(blocking="thread")'}
+    assert line.split("#")[0].strip() in {"@skill", "@query", '@skill(blocking="thread")', "class Low(Outcome):"}
