@@ -55,9 +55,6 @@ def _candidates(subject: Subject) -> Iterator[Finding]:
         conditions = {one: _condition(subject.library.plot(one), state.arguments) for one in state.dynamic}
         for message in (*_never_chosen(conditions), *_overlapping(conditions)):
             yield _unclear(subject, name, path, message, "make their conditions exclude each other")
-        if state.goal is None and _leave_a_gap(conditions):
-            message = "the conditions of its candidates leave a gap, where none of them fits"
-            yield _unclear(subject, name, path, message, "widen one of them, or add a last one without `when`")
     if subject.planned:
         yield from _for_steps(subject.library)
 
