@@ -25,6 +25,9 @@ from planning.generation.carried_steps import expectation
 from planning.plan import Plan, PlanStep
 from planning.validation import validate
 
+OWN_STEPS, EARLIER = "the steps before", "earlier"
+"""Authors of changes that no other author has made: completed steps, and changes before the monitoring."""
+
 
 @dataclass(frozen=True, slots=True)
 class Broken:
@@ -43,6 +46,11 @@ class Broken:
     user: int
     author: str
     version: int
+
+    @property
+    def foreign(self) -> bool:
+        """Whether another author has made the change during the plan."""
+        return self.author not in {OWN_STEPS, EARLIER}
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +124,7 @@ class Monitor:
         if progress.running and leads_to(progress.coming(), self._domain, self._knowledge, progress.goal):
             self.update()
         else:
-            self.look("earlier")
+            self.look(EARLIER)
 
     def look(self, author: str) -> None:
         """Validate all remaining steps after a change by `author`, and report news if there are any."""

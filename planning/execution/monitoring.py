@@ -12,7 +12,7 @@ from dsc.sequencer.clock import PastClock
 from knowledge_base.errors import described
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
-from planning.execution.monitor import Broken, GoalReached, Monitor, News, Shorter
+from planning.execution.monitor import EARLIER, OWN_STEPS, Broken, GoalReached, Monitor, News, Shorter
 from planning.execution.outcomes import GoalHolds, Monitored, PlanInvalid
 from planning.execution.plan_progress import cost_of, shortest_end
 from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, StepEnded, Successor
@@ -135,7 +135,7 @@ class Monitoring:
             case NotFound():
                 outcome = _invalid("", news.reason, "earlier")
             case Broken() if self._may_continue(news):
-                run.attempt.replans += 1
+                run.attempt.replans += not news.foreign
                 self._search_meanwhile(self._clock.now())
             case Broken():
                 outcome = _invalid(news.needed, news.why, news.author)
@@ -178,13 +178,13 @@ class Monitoring:
             return
         self._run.progress.begin(number)
         if self._monitor is not None:
-            self._monitor.look("the steps before")
+            self._monitor.look(OWN_STEPS)
 
     def _may_continue(self, news: Broken) -> bool:
         """Return whether the running step may continue during a search, since only a later step needs the condition."""
         run, running = self._run, self._run.progress.running
         later = len(running) == 1 and bool(news.needed) and news.user > running[0]
-        return later and run.attempt.replans < run.replans and run.successor is None
+        return later and (news.foreign or run.attempt.replans < run.replans)
 
     def _search_meanwhile(self, since: float) -> None:
         self._run.searching_since = since
@@ -236,7 +236,7 @@ class Monitoring:
         self._records.found(answer, name)
         if not run.follow(replace(successor, name=name)):
             return self._replaced("a new plan begins in another way")
-        self._look("earlier")
+        self._look(EARLIER)
         return None
 
     def _replaced(self, why: str) -> Monitored:

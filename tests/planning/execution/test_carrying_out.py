@@ -137,6 +137,15 @@ def test_a_running_step_that_the_new_plan_begins_with_is_not_interrupted():
     assert why_broken(broken).endswith("which the goal needs, does not hold since version 2 (somebody)")
 
 
+def test_a_running_step_continues_through_any_number_of_changes_by_others_which_use_up_no_budget():
+    then = [(0.4 * n, Delta(added=(fact("in", f"t{n}", "a"),), nodes={f"t{n}": "thing"})) for n in range(1, 7)]
+    run = Run("(forall (?t - thing) (in ?t b))", then=then, replans=2)
+    assert run.how == "reached"
+    assert len(run.said("broken")) > 2
+    starts = [one for one in run.records if one.type == "action" and one.data["action"] == "start"]
+    assert len([one for one in starts if one.data["skill"] == "robot.act"]) == len(run.done) == 15
+
+
 def test_a_running_step_that_is_hit_itself_is_interrupted_and_the_reason_can_be_told():
     gone = (0.5, Delta(removed=(fact("in", "cup", "a"),), added=(fact("in", "cup", "b"),)))
     run = Run("(in cup c)", then=[gone])
