@@ -276,7 +276,10 @@ def _followed(
             deployed.executive.listen(PlainProgress(typer.echo))
         else:
             stack.enter_context(redirect_stdout(sys.stderr))
-        return deployed.run(simulated=simulated, speed=speed, prepare=prepare)
+        report = deployed.run(simulated=simulated, speed=speed, prepare=prepare)
+    if not quiet:
+        typer.echo("")  # between the progress and the report
+    return report
 
 
 def _print(report: Report, *, as_json: bool) -> None:
@@ -285,7 +288,6 @@ def _print(report: Report, *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(report.to_json()))
         return
-    typer.echo("")
     for line in report.lines():
         typer.echo(line)
 

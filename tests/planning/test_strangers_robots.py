@@ -242,6 +242,7 @@ def test_a_bug_ends_the_command_with_status_3_and_its_line(project, kind):
 
 def test_the_log_is_as_long_as_the_user_wants_it(project):
     silent = dsc_both("run", project, "-q")
+    assert silent[0].startswith("Goal ")
     assert "drives to" not in silent[0]
     assert len(silent[0].splitlines()) < len(dsc_both("run", project)[0].splitlines())
     assert silent[1] == ""
