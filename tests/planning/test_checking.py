@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from planning.checking import check_project
+from planning.engines.registry import Engine
 
 ROOT = Path(__file__).parents[2]
 PROJECT = ROOT / "tests" / "support" / "delivery_project"
@@ -143,7 +144,8 @@ def test_a_programming_error_is_one_line_of_the_list(project):
 
 @pytest.mark.parametrize("has_engine", [True, False])
 def test_numbers_that_no_installed_engine_can_plan_with_are_a_warning_with_the_remedy(project, monkeypatch, has_engine):
-    monkeypatch.setattr("planning.checking.installed", lambda one: has_engine or one.name == "pyperplan")
+    lacks = "" if has_engine else "pip install 'up-enhsp>=0.1.1'"
+    monkeypatch.setattr(Engine, "lacks", lambda one: lacks if one.name == "enhsp" else "")
     planted(project, [
         ("domain.pddl", "(full))\n", "(full)) (:functions (charge))\n", ""),
         ("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (>= (charge) 0))", ""),

@@ -6,6 +6,7 @@ from knowledge_base.facts import fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import Executive
 from planning.domain import PlanningDomain
+from planning.engines.registry import Engine
 from planning.plan import NobodyCan
 from planning.problem.relevance import numeric_constructs, why_no_engine
 
@@ -62,11 +63,11 @@ def test_without_such_a_construct_it_is_said_what_is_needed(jars):
     assert said == "the problem needs STRIPS; no installed engine can do that, enhsp could (name it as the planner)"
 
 
-def test_a_robot_says_which_condition_no_engine_that_it_may_ask_can_do(jars, world_of):
-    """In simulated time that is pyperplan alone."""
+def test_a_robot_says_which_condition_no_installed_engine_can_do(jars, world_of, monkeypatch):
+    monkeypatch.setattr(Engine, "lacks", lambda one: "" if one.name == "pyperplan" else f"install {one.name}")
     robot = Executive(jars, [], [], world_of(jars.schema, {"a": "jar"}, values={fact("size", "a"): 2}))
     with robot:
         [outcome] = robot.achieve("(sealed a)").emitted
     reason = outcome.attributes["reason"]
     assert (outcome.name, "jars.pddl:6:" in reason, "(> (litres ?j) 2)" in reason) == ("no_plan", True, True)
-    assert "no installed engine can do that, enhsp could (" in reason
+    assert "no installed engine can do that, enhsp could (install enhsp)" in reason
