@@ -185,21 +185,20 @@ def test_watching_prints_what_others_commit(store) -> None:
     def write() -> None:
         with KnowledgeBase.open(None, store) as kb:
             waiting.wait(timeout=60)
-            for _ in range(200):  # until the command has seen two of them
+            while not done.wait(timeout=0.05):  # until the command has seen two of them
                 with kb.transaction("eyes") as world:
                     world.tell("clean", "mug")
                 with kb.transaction("eyes") as world:
                     world.retract("clean", "mug")
-                if done.is_set():
-                    return
-                done.wait(timeout=0.05)
 
     done, writer = threading.Event(), threading.Thread(target=write)
     writer.start()
     waiting.set()
-    printed = run("watch", store, "(clean ?c)", "--count", "2", "--json").splitlines()
-    done.set()
-    writer.join()
+    try:
+        printed = run("watch", store, "(clean ?c)", "--count", "2", "--seconds", "120", "--json").splitlines()
+    finally:
+        done.set()
+        writer.join()
     told = [json.loads(line) for line in printed]
     assert [change["author"] for change in told] == ["eyes", "eyes"]
     assert told[1]["version"] == told[0]["version"] + 1
