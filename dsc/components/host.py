@@ -7,6 +7,7 @@ A host stores an action's reports and end until the client releases them, within
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -15,7 +16,7 @@ from dsc.calls import OBSERVED, Clock, Reports, SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, Transport, encoded
 from dsc.components.heartbeat import Heartbeat
-from dsc.components.hooks import contained, reason_of
+from dsc.components.hooks import GRACE, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import HostedStreams, Publisher
 from dsc.errors import ProgrammingError
@@ -23,6 +24,8 @@ from dsc.outcomes import Outcome
 from knowledge_base.errors import InputError
 from knowledge_base.exchange import delta_form, delta_of
 from knowledge_base.language.checking.inputs import require_delta, require_time, shown
+
+_LOG = logging.getLogger(__package__)
 
 MOST_ACTIONS = 1_000
 """Number of running actions of a host, and of ended actions that were not forgotten; the latest ends are kept."""
@@ -70,13 +73,18 @@ class Host:
         self.endpoint.answer(kind, answers)
 
     async def close(self) -> None:
-        """Stop all services without a message; clients treat the component as failed."""
+        """Stop all services without a message, then the component; clients treat the component as failed."""
         self._component.life.leave(self._changed)
         await self.endpoint.close()
         tasks = [self._beating, *self._actions.tasks(), *self._streams.close()]
         for task in tasks:
             task.cancel()
         await asyncio.wait(tasks)
+        try:
+            async with asyncio.timeout(GRACE):
+                await self._component.life.retire(self._component.stop)
+        except Exception as error:  # noqa: BLE001  # the host ends after any error
+            _LOG.warning("component '%s' could not stop: %s", self._component.name, reason_of(error))
 
     def _changed(self) -> None:
         life = self._component.life

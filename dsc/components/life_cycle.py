@@ -76,6 +76,7 @@ class LifeCycle(Announcer):
         reason: the cause of FatalError, else empty.
         bug: the programming error that is the cause of FatalError, else `None`.
         starting: whether the component's `start` is running.
+        runs: the number of runs in which the component is deployed; the last of them stops it.
     """
 
     def __init__(self, component: str = "", raises: Classes = ()) -> None:
@@ -86,6 +87,7 @@ class LifeCycle(Announcer):
         self.reason = ""
         self.bug: ProgrammingError | None = None
         self.starting = False
+        self.runs = 0
         self._activators: set[int] = set()
         self._mode = NEUTRAL
 
@@ -137,6 +139,23 @@ class LifeCycle(Announcer):
                 self.become(Life.ALIVE)
             else:
                 self.fail(error)
+
+    async def retire(self, stop: Callable[[], Awaitable[None]]) -> None:
+        """Return a component that is alive to Init at the end of a run, so that a later run starts it again.
+
+        Args:
+            stop: the component's hook; its error leads to FatalError, and is raised.
+        """
+        if self.state is not Life.ALIVE:
+            return
+        try:
+            with contained(f"{self._component}.stop", self._raises):
+                await stop()
+        except Exception as error:
+            self.fail(error)
+            raise
+        if self.state is Life.ALIVE:  # else `stop` itself has set the state
+            self.become(Life.INIT)
 
     async def become_active(self, activator: int, activate: Callable[[bool], Awaitable[None]], *, active: bool) -> None:
         """Add or remove an activator.

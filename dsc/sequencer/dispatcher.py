@@ -1,8 +1,9 @@
 """The dispatcher: executes actions on components and posts their answers as messages; no other part calls skills.
 
 A skill is cancelled when the activation that started it ends (S0.15). Before a skill begins, its component has received
-all earlier parameters, modes and messages. Unless the component is `concurrent`, its cancelled skills clean up first.
-Arguments and answers are encoded, so that chart and component share no object by accident.
+all earlier parameters, modes and messages. All components have then received the parameters and modes of its macrostep.
+Unless the component is `concurrent`, its cancelled skills clean up first. Arguments and answers are encoded, so that
+chart and component share no object by accident.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from dsc.components.life_cycle import Life
 from dsc.components.robot import Wiring, require_instances
 from dsc.engine import steps
 from dsc.errors import UncertainActionError
+from dsc.events import COMPONENT_FAILED, Event
 from dsc.messages import LateMessage, SkillMessage, TimerMessage
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, PastClock
@@ -30,6 +32,7 @@ from dsc.sequencer.running_skills import InterruptedSkill, PendingCleanups, Runn
 from dsc.skills import SkillSignature
 from dsc.supervision.activation import ComponentActivation
 from dsc.supervision.component_registry import ComponentRegistry
+from dsc.supervision.lives import ComponentLives
 from dsc.supervision.skill_dependencies import SkillDependencies
 from knowledge_base.errors import InputError, UnknownNameError
 
@@ -61,12 +64,13 @@ class Dispatcher:
         self,
         components: Iterable[Component],
         clock: LoopClock,
-        post: Callable[[SkillMessage | TimerMessage | steps.SendLater | LateMessage], None],
+        post: Callable[[SkillMessage | TimerMessage | steps.SendLater | LateMessage | Event], None],
         part_of: str = "",
     ) -> None:
         self._part_of = part_of
         self._components = {component.name: component for component in require_instances(components)}
         self.activation = ComponentActivation(ComponentRegistry(self._components), self._in_use)
+        self._lives = ComponentLives(self._components.values(), self._failed)
         self._wiring = Wiring(self._components)
         self._faults: list[str] = []
         self._clock = clock
@@ -79,6 +83,7 @@ class Dispatcher:
 
     def deploy(self, component: Component) -> None:
         """Add a component, which replaces one with an equal name; skills that wait for it begin."""
+        self._lives.add(component)
         self.activation.deploy(component)
         self._wiring.deployed(component)
 
@@ -107,6 +112,16 @@ class Dispatcher:
         Periods do not count, as they are always pending. Skills without a deadline do not count, as they may never end.
         """
         return self.timers.waiting or any(math.isfinite(one.due) for one in self._running.values())
+
+    def dispatch_all(self, outputs: Iterable[steps.Output]) -> None:
+        """Execute the outputs of a macrostep.
+
+        Raises:
+            UnknownNameError: a component is not deployed; the later outputs are not executed.
+        """
+        self.outbox.begin_step()
+        for output in outputs:
+            self.dispatch(output)
 
     def dispatch(self, output: steps.Output) -> None:
         """Execute one output of the machine.
@@ -258,7 +273,7 @@ class Dispatcher:
                 failure(task)  # marks the error as retrieved; the skill was cancelled
         await self.activation.close()
         self._wiring.close()
-        return [*self.outbox.failures(), *self._faults]
+        return [*self.outbox.failures(), *self._faults, *(await self._lives.close(stop=not self.is_part))]
 
     def _start(self, start: steps.Start, interrupted: InterruptedSkill | None = None) -> None:
         component = self.component(start.component)
@@ -267,6 +282,7 @@ class Dispatcher:
         due = within + (self._clock.now() if interrupted is None else interrupted.began)
         raises = component.device_errors
         running = RunningSkill(start, signature, raises, within, due, self._clock, self._post, self._fault)
+        running.configuring = self.outbox.configuring
         running.task = asyncio.get_running_loop().create_task(self._execute(component, running, interrupted))
         running.task.add_done_callback(running.ended)
         self._running[start.action_id] = running
@@ -279,7 +295,7 @@ class Dispatcher:
         try:
             outcome = await self._outcome(component, running, dependencies, interrupted)
         except BaseException as error:
-            failed = running.failed(error, dependencies.missing)
+            failed = running.failed(error, dependencies.missing or self.outbox.unconfigured(running.configuring))
             if failed is None:
                 raise
             outcome = failed
@@ -307,6 +323,8 @@ class Dispatcher:
         call = SkillCall(self._part_of + start.action_id, clock, report, running.due, self._fault)
         if component.name in self._cleanups.pending and not component.concurrent and signature.pattern == "skill":
             await self._cleanups.over(component.name)
+        if running.configuring:
+            await self.outbox.configured(running.configuring)
         if component.name in self.outbox.untaken:
             await self.outbox.taken(component)
         if dependencies.concerned or component.life.state is not Life.ALIVE:
@@ -323,6 +341,13 @@ class Dispatcher:
         outcome = validated(await dependencies.carrying(work), start, signature)
         # The observations are true, also if they arrive late.
         return late(start, running.within, observed=outcome.observed) if running.is_late else outcome
+
+    def _failed(self, component: Component) -> None:
+        """Post an event about a failed component, unless a running skill of the component reports the failure."""
+        if component.name in self.in_use:
+            return
+        attributes = {"component": component.name, "reason": component.life.reason}
+        self._post(Event(COMPONENT_FAILED, attributes))
 
     async def _forget(self, component: Component, action_id: str) -> None:
         try:

@@ -16,8 +16,14 @@ from dsc.sequencer.message_checks import encoded
 
 CLOSING = GRACE
 """Seconds for components to receive their last outputs, and for cancelled skills to stop."""
+_LIFE_HOOKS = frozenset({"start", "stop"})
+"""Hooks that a component in Init may receive; it is started before all others."""
 _MOST_REFUSED = 1000
 """Upper bound of the number of stored refusals; a run without a store never reads them."""
+
+
+Configuring = dict[str, asyncio.Task[None]]
+"""Deliveries of the parameters and modes of a macrostep, by component."""
 
 
 class Outbox:
@@ -25,10 +31,12 @@ class Outbox:
 
     Attributes:
         untaken: by component, the task that delivers the latest output; removed when a skill has waited for the task.
+        configuring: by component, the task that delivers the latest parameter or mode of the present macrostep.
     """
 
     def __init__(self) -> None:
         self.untaken: dict[str, asyncio.Task[None]] = {}
+        self.configuring: Configuring = {}
         self._under_way: dict[int, Told] = {}
         self._refused: deque[Told] = deque(maxlen=_MOST_REFUSED)
         self._last = 0
@@ -46,9 +54,16 @@ class Outbox:
         self._refused.clear()
         return refused
 
+    def begin_step(self) -> None:
+        """Begin the outputs of another macrostep."""
+        if self.configuring:
+            self.configuring = {}
+
     def send(self, component: Component, told: Told) -> None:
         """Deliver an output to the component, after all earlier outputs."""
         self._begin(component, _hook_of(told), (told,), lambda: _take(component, told))
+        if not isinstance(told, SendMessage):
+            self.configuring[component.name] = self.untaken[component.name]
 
     def restore(self, component: Component, effective: Sequence[SetParameter | SwitchMode]) -> None:
         """Deliver the settings that were effective before a restart: the parameters as one set, then the modes."""
@@ -73,6 +88,8 @@ class Outbox:
             if before is not None and not before.done():  # otherwise it arrives before a skill of this step can end
                 await asyncio.wait([before])
             try:
+                if hook not in _LIFE_HOOKS and component.life.state is Life.INIT:
+                    await component.life.come_alive(component.start)
                 with contained(f"{component.name}.{hook}", component.device_errors):
                     await take()
             except Exception:
@@ -86,6 +103,17 @@ class Outbox:
                 raise why
 
         self.untaken[component.name] = asyncio.get_running_loop().create_task(in_order())
+
+    async def configured(self, tasks: Configuring) -> None:
+        """Wait until the components have received or refused the parameters and modes of a macrostep."""
+        await asyncio.wait(
+            tasks.values()
+        )  # also for tasks that are done, so that skills begin in the order of the chart
+
+    def unconfigured(self, tasks: Configuring) -> str:
+        """Return a component that has not received its parameters and modes, as text; empty if there is none."""
+        name = next((name for name, task in tasks.items() if not task.done()), None)
+        return "" if name is None else f"component '{name}', which has not received its parameters and modes"
 
     async def taken(self, component: Component) -> None:
         """Wait until the component has received its `untaken` outputs; raise the error of a delivery, one time."""

@@ -54,6 +54,11 @@ class PlotComponent(Component):
         self._knowledge = knowledge
         self._signatures = {plot.name: _signature(self.name, plot, after_crash) for plot in library}
 
+    async def stop(self) -> None:
+        """Stop the components that the plots have started."""
+        for component in reversed(self._components):
+            await component.life.retire(component.stop)
+
     def skills(self) -> dict[str, SkillSignature]:
         """Return a signature for each plot, by name."""
         return dict(self._signatures)

@@ -19,6 +19,7 @@ from dsc.messages import SkillMessage
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.message_checks import failed, faulty, late, validated
+from dsc.sequencer.outbox import Configuring
 from dsc.skills import SkillSignature
 from knowledge_base.errors import described
 from knowledge_base.tracebacks import waits_at
@@ -60,6 +61,7 @@ class RunningSkill:
         reports: the reports; `None` before the first.
         stopped: whether the chart has cancelled the skill.
         answered: whether the end was posted.
+        configuring: deliveries of parameters and modes that end before the skill begins.
     """
 
     task: asyncio.Task[None]
@@ -82,6 +84,7 @@ class RunningSkill:
         self.reports: Reports | None = None
         self.stopped = False
         self.answered = False
+        self.configuring: Configuring = {}
         self._clock = clock
         self._post = post
         self._fault = fault

@@ -391,8 +391,7 @@ class Sequencer:
 
     def _carry_out(self, output: Iterable[Output]) -> None:
         try:
-            for one in output:
-                self.dispatcher.dispatch(one)
+            self.dispatcher.dispatch_all(output)
         except InputError as error:
             self._reactor.problem = str(error)
 

@@ -175,7 +175,7 @@ def test_mode_and_life_are_as_they_were(tmp_path):
     whole = crashes(tmp_path, LIVES)
     for what, run in whole.resumed():
         assert run.outcome() == whole.whole.outcome(), what
-        assert (run.robot.mode, run.robot.life.state) == ("careful", "alive"), what
+        assert (run.robot.mode, run.robot.life.state) == ("careful", "init"), what
 
 
 def test_what_was_to_start_anew_before_the_crash_starts_once_after_it(tmp_path):
