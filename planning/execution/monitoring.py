@@ -131,13 +131,18 @@ class Monitoring:
             case Shorter(steps):
                 outcome = self._shorten(steps)
             case StepEnded():
+                run.attempt.disturbances = 0
                 outcome = self._replaced("another plan takes its place")
             case NotFound():
                 outcome = _invalid("", news.reason, "earlier")
             case Broken() if self._may_continue(news):
                 run.attempt.replans += not news.foreign
+                if news.user in run.progress.running:
+                    run.withdraw(news.user)
+                    self._install().update()
                 self._search_meanwhile(self._clock.now())
             case Broken():
+                run.disturbed = news.foreign
                 outcome = _invalid(news.needed, news.why, news.author)
             case Found():
                 outcome = self._follow(news.answer, Successor(news.steps, kept=news.kept, found=news))
@@ -176,15 +181,19 @@ class Monitoring:
         if self._run.successor is not None:
             self._put(StepEnded())
             return
-        self._run.progress.begin(number)
+        progress = self._run.progress
+        remaining = len(progress.remaining)
+        progress.begin(number)
+        if len(progress.remaining) < remaining:
+            self._run.attempt.disturbances = 0
         if self._monitor is not None:
             self._monitor.look(OWN_STEPS)
 
     def _may_continue(self, news: Broken) -> bool:
-        """Return whether the running step may continue during a search, since only a later step needs the condition."""
-        run, running = self._run, self._run.progress.running
-        later = len(running) == 1 and bool(news.needed) and news.user > running[0]
-        return later and (news.foreign or run.attempt.replans < run.replans)
+        """Return whether running steps that do not need the condition may continue during a search."""
+        run = self._run
+        others = set(run.progress.running) - {news.user}
+        return bool(others) and bool(news.needed) and (news.foreign or run.attempt.replans < run.replans)
 
     def _search_meanwhile(self, since: float) -> None:
         self._run.searching_since = since
@@ -194,9 +203,7 @@ class Monitoring:
         run, goal, progress = self._run, self._run.goal, self._run.progress
         self._records.asked(to_text(goal), self._knowledge.version)
         try:
-            found = await self._escalation.search.plan(goal, run.seconds, progress, clock.sleep)
-            if isinstance(found, Found):
-                await found.close()
+            found = await self._escalation.search.plan_during(goal, run.seconds, progress, clock.sleep)
         except Exception as error:  # noqa: BLE001  an error of the search must not end the monitoring
             found = NotFound("failed", described(error))
         self._put(found)
@@ -231,7 +238,7 @@ class Monitoring:
         return None
 
     def _follow(self, answer: PlanFound, successor: Successor) -> Monitored | None:
-        """Replace the plan by a new plan; the running step continues if the new plan begins with an equal step."""
+        """Replace the plan by a new plan; running steps continue if the new plan begins with equal steps."""
         run, name = self._run, self._escalation.runs.new_name()
         self._records.found(answer, name)
         if not run.follow(replace(successor, name=name)):
@@ -241,7 +248,9 @@ class Monitoring:
 
     def _replaced(self, why: str) -> Monitored:
         """Return the outcome with the successor's plot; `plan_invalid` if the successor no longer leads to the goal."""
-        return self._escalation.succeeded(self._run, why) or _invalid("", why, "earlier")
+        outcome = self._escalation.succeeded(self._run, why)
+        self._run.disturbed = outcome is None
+        return outcome or _invalid("", why, "earlier")
 
 
 def _invalid(which: str, why: str, author: str) -> PlanInvalid:

@@ -46,6 +46,10 @@ class Held(Outcome):
     """No further step of the plan may begin."""
 
 
+class Withdrawn(Outcome):
+    """The step ends, because another author's change broke its condition; parallel steps continue."""
+
+
 class Replan(Outcome):
     """A new plan is necessary, which only the planner can find."""
 

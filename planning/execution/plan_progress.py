@@ -36,6 +36,8 @@ _MOST_UNMET = 3
 """The largest number of unmet conditions with which a repair keeps an end of a plan."""
 _MOST_LEFT_OUT = 2
 """The largest number of first steps that a repair may replace."""
+_MOST_THINNED = 60
+"""The largest number of steps of a repaired plan from which useless steps are removed, in quadratic time."""
 
 
 def is_true(e: Expression, world: World) -> bool:
@@ -168,6 +170,22 @@ class PlanProgress:
             progress.begin(number)
         return progress
 
+    def after_running(self) -> PlanProgress:
+        """Return an equal progress in which all running steps are done."""
+        progress = self.renewed(self.domain, self.goal)
+        progress.end_running()
+        return progress
+
+    def end_running(self) -> None:
+        """Record that all running steps are done."""
+        self.remaining, self._done = self._after(self.running), self._done | set(self.running)
+        self.running = ()
+
+    def withdraw(self, number: int) -> None:
+        """Record that a running step was interrupted, and has not begun."""
+        self._begun.discard(number)
+        self.running = tuple([one for one in self.running if one != number])
+
     def take_order(self, before: AbstractSet[tuple[int, int]]) -> None:
         """Replace the order of the steps; valid only before the first step begins."""
         self._before = before
@@ -183,6 +201,19 @@ class PlanProgress:
             agenda += earlier
         self.running = tuple(sorted(self._begun - self._done))
         self.remaining = self._after(self._done)
+
+    @classmethod
+    def continuing(
+        cls, running: Sequence[PlanStep], then: Sequence[PlanStep], domain: PlanningDomain, goal: Expression
+    ) -> PlanProgress:
+        """Return the progress of a plan whose first steps are running in parallel; the sequence `then` follows them."""
+        number = len(running)
+        following = range(number + 1, number + len(then) + 1)
+        before = {(first, second) for second in following[:1] for first in range(1, second)}
+        progress = cls((*running, *then), domain, goal, before.union(itertools.pairwise(following)))
+        for first in range(1, number + 1):
+            progress.begin(first)
+        return progress
 
     def _earlier(self, later: int) -> set[int]:
         if self._before is None:
@@ -248,10 +279,15 @@ class LocalRepair:
     def repaired(
         self, first: Plan, before: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression
     ) -> Plan | None:
-        """Return the plan of the solution `first` and the kept end; `None` if this plan is invalid or too long."""
-        plan = Plan((*first.steps, *self.end))
-        short = len(plan.steps) <= len(before) + MOST_LONGER
-        return plan if short and validate(plan, domain, world, goal).valid else None
+        """Return the plan of the solution `first` and the kept end; `None` if this plan is invalid or too long.
+
+        The plan contains no useless steps, unless it is long.
+        """
+        steps = (*first.steps, *self.end)
+        short = len(steps) <= len(before) + MOST_LONGER
+        if not short or not validate(Plan(steps), domain, world, goal).valid:
+            return None
+        return Plan(thinned(steps, domain, world, goal) if len(steps) <= _MOST_THINNED else steps)
 
 
 def local_repair(
@@ -295,7 +331,8 @@ def local_repair(
     near = [(end, needed, gap) for end, needed, gap in gaps if len(gap) <= _MOST_UNMET]
     if not near:
         return None
-    end, needed, gap = min(near, key=lambda one: len(one[0]) + len(one[2]))
+    # Of equal ends, the shortest leaves most to the planner, which then finds no detour to an abandoned place.
+    end, needed, gap = min(near, key=lambda one: (len(one[0]) + len(one[2]), len(one[0])))
     if not all(map(derived.may_change, gap)):
         return None
     try:

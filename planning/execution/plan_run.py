@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning.execution.monitor import Broken, GoalReached, News, Shorter, news_form, news_from
+from planning.execution.outcomes import Held, Withdrawn
 from planning.execution.plan_progress import PlanProgress
 from planning.execution.search import Found, NotFound
 from planning.plan import PlanStep
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 MOST_UNMONITORED = 64
 """The maximum number of unmonitored plans that are kept. The chart may abandon a plan without a message."""
-_PLAIN = ("name", "holder", "seconds", "replans", "replaces", "searching_since")
+_PLAIN = ("name", "holder", "seconds", "replans", "replaces", "searching_since", "disturbed")
 
 
 MOST_RESUMED = 3
@@ -70,9 +71,11 @@ class Attempt:
         replans: the number of plans that replaced a failed plan.
         failures: the number of occurrences of each failure.
         resumed: the number of times that a plan resumed at each step.
+        disturbances: the number of plans that another author's changes ended since a step was last completed.
     """
 
     replans: int = 0
+    disturbances: int = 0
     failures: Counter[Failure] = field(default_factory=Counter)
     resumed: Counter[PlanStep] = field(default_factory=Counter)
 
@@ -80,7 +83,12 @@ class Attempt:
         """Return the attempt as plain data."""
         failures = [[one.step.to_json(), one.why, one.situation, often] for one, often in self.failures.items()]
         resumed = [[step.to_json(), often] for step, often in self.resumed.items()]
-        return {"replans": self.replans, "failures": failures, "resumed": resumed}
+        return {
+            "replans": self.replans,
+            "disturbances": self.disturbances,
+            "failures": failures,
+            "resumed": resumed,
+        }
 
     @classmethod
     def from_json(cls, form: Mapping[str, Any]) -> Attempt:
@@ -89,7 +97,7 @@ class Attempt:
             Failure(PlanStep.from_json(step), why, where): often for step, why, where, often in form["failures"]
         }
         resumed = {PlanStep.from_json(step): often for step, often in form["resumed"]}
-        return cls(form["replans"], Counter(failures), Counter(resumed))
+        return cls(form["replans"], form["disturbances"], Counter(failures), Counter(resumed))
 
     def failed(self, failure: Failure, *, stands: bool, others: bool) -> EscalationStep:
         """Count a failure, and return the next escalation step for it.
@@ -117,6 +125,15 @@ class Attempt:
             EscalationStep.RESUME if step is not None and self.resumed[step] < MOST_RESUMED else EscalationStep.REPLAN
         )
 
+    def replan(self, budget: int, *, disturbed: bool) -> bool:
+        """Count a replan, or a disturbance by another author, and return whether `budget` allows it."""
+        count = self.disturbances if disturbed else self.replans
+        if count >= budget:
+            return False
+        self.replans += not disturbed
+        self.disturbances += disturbed
+        return True
+
 
 class PlanState(Enum):
     """The states of a `PlanRun`."""
@@ -135,7 +152,7 @@ class PlanState(Enum):
 class Successor:
     """The steps that replace a plan, immediately or after its running step.
 
-    The running step continues if the successor begins with an equal step.
+    The running steps continue if the successor begins with equal steps.
 
     Attributes:
         steps: the steps of the successor.
@@ -194,7 +211,10 @@ class PlanRun:
         searching_since: the run time, in seconds, at which a search for a successor began.
         missed: the numbers of the steps that began after a restart of the program and before a restart of the monitor.
         on_begin: receives the number of each step that begins; `None` while the plan is not monitored.
-        superseded: set when no further step of the plan may begin while the running step continues.
+        disturbed: whether changes by another author, and no failure, ended the plan.
+        superseded: whether no further step of the plan may begin while the running steps continue.
+        plot_steps: the steps of the plot, which the numbers in `begun` and `withdrawn` count from 1.
+        withdrawn: the numbers of the plot's steps that end while parallel steps continue.
     """
 
     name: str
@@ -213,7 +233,14 @@ class PlanRun:
     searching_since: float | None = None
     missed: list[int] = field(default_factory=list)
     on_begin: Callable[[int], None] | None = None
-    superseded: asyncio.Event = field(default_factory=asyncio.Event)
+    disturbed: bool = False
+    superseded: bool = False
+    plot_steps: tuple[PlanStep, ...] = ()
+    withdrawn: set[int] = field(default_factory=set)
+    _holds: dict[int, tuple[Callable[[Held], None], asyncio.Future[None]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.plot_steps = self.plot_steps or self.progress.steps
 
     def begin(self, number: int) -> None:
         """Record that a step of the plot begins; after a restart, a number may arrive twice."""
@@ -227,15 +254,55 @@ class PlanRun:
             self.missed.append(number)
 
     def follow(self, successor: Successor) -> bool:
-        """Set the successor; return whether it begins with the running step, so that this step continues."""
+        """Set the successor; return whether it begins with running steps, so that these steps continue.
+
+        Other running steps end: the successor does not need them, or they are done.
+        """
         self.successor = successor
-        if self.progress.steps_of(self.progress.running) != successor.steps[:1]:
+        progress = self.progress
+        others = {number: progress.steps[number - 1] for number in progress.running}
+        continuing = []
+        for step in successor.steps:
+            same = next((number for number, other in others.items() if other == step), None)
+            if same is None:
+                break
+            continuing.append(others.pop(same))
+        if not continuing:
             return False
-        self.progress = PlanProgress(successor.steps, self.progress.domain, self.progress.goal)
-        self.progress.begin(1)
-        self.superseded.set()
+        for number in others:
+            self.withdraw(number)
+        then = successor.steps[len(continuing) :]
+        self.progress = PlanProgress.continuing(continuing, then, progress.domain, progress.goal)
+        self._supersede()
         self.state = PlanState.MONITORED
         return True
+
+    async def hold(self, number: int, report: Callable[[Held], None]) -> Withdrawn:
+        """Report that no further step may begin, as soon as that is so; return when step `number` is withdrawn."""
+        withdrawn = asyncio.get_running_loop().create_future()
+        self._holds[number] = report, withdrawn
+        try:
+            if self.superseded:
+                report(Held())
+            if number not in self.withdrawn:
+                await withdrawn
+            return Withdrawn()
+        finally:
+            del self._holds[number]
+
+    def _supersede(self) -> None:
+        self.superseded = True
+        for report, _ in self._holds.values():
+            report(Held())
+
+    def withdraw(self, number: int) -> None:
+        """End the running step `number` of the progress, while parallel steps continue."""
+        step = self.progress.steps[number - 1]
+        self.progress.withdraw(number)
+        in_plot = max(one for one in self.begun if self.plot_steps[one - 1] == step)
+        self.withdrawn.add(in_plot)
+        if in_plot in self._holds:
+            self._holds[in_plot][1].set_result(None)
 
     def shortened(self, steps: tuple[PlanStep, ...]) -> Successor:
         """Return the successor with other steps; without a successor, return these steps of the plan as one."""
@@ -255,6 +322,8 @@ class PlanRun:
             "state": self.state.value,
             "successor": None if self.successor is None else self.successor.to_json(),
             "begun": sorted(self.begun),
+            "withdrawn": sorted(self.withdrawn),
+            "plot_steps": [step.to_json() for step in self.plot_steps],
             "news": [_form(one) for one in self.news if isinstance(one, Broken | Shorter | GoalReached | StepEnded)],
         }
 
@@ -269,11 +338,13 @@ class PlanRun:
             state=PlanState(form["state"]),
             successor=None if form["successor"] is None else Successor.from_json(form["successor"]),
             begun=set(form["begun"]),
+            withdrawn=set(form["withdrawn"]),
+            plot_steps=tuple(map(PlanStep.from_json, form["plot_steps"])),
             news=deque(StepEnded() if one is None else news_from(one) for one in form["news"]),
             **{name: form[name] for name in _PLAIN},
         )
         if run.successor is not None and run.state is not PlanState.STOPPED:
-            run.superseded.set()
+            run.superseded = True
         return run
 
 

@@ -24,6 +24,7 @@ from planning.execution.outcomes import (
     NoPlan,
     PlotFound,
     Repaired,
+    Withdrawn,
 )  # fmt: skip
 from planning.execution.plan_progress import PlanProgress
 from planning.execution.plan_records import PlanRecords
@@ -195,12 +196,16 @@ class PlanningComponent(Component):
         return outcome
 
     @skill(after_crash="repeat")
-    async def hold(self, call: SkillCall, plan: str) -> Held:  # noqa: ARG002
-        """End with `held` when no further step of the plan may begin, since a successor follows the running step."""
+    async def hold(self, call: SkillCall[Held], plan: str, step: int) -> Withdrawn:
+        """Report `held` when no further step of the plan may begin, since a successor follows the running steps.
+
+        `step` is a number in the plot of the plan; `withdrawn` ends this step, and parallel steps continue.
+        """
         run = self._runs.get(plan)
-        superseded = asyncio.Event() if run is None else run.superseded
-        await superseded.wait()
-        return Held()
+        if run is None:
+            unending: asyncio.Future[Withdrawn] = asyncio.get_running_loop().create_future()
+            return await unending
+        return await run.hold(step, call.report)
 
     @skill(after_crash="repeat")
     async def repair(self, call: SkillCall, plan: str, why: str) -> Repaired:  # noqa: ARG002

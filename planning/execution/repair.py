@@ -167,6 +167,7 @@ class Escalation:
         end = self._end(run)
         failed = None if run.state is PlanState.STOPPED else self._failed_step(progress)
         if end is not None and (run.successor is not None if failed is None else failed not in end):
+            attempt.disturbances = 0
             return self._continued(run, end, why)
         step, choice = self._chosen(run, failed, end, why)
         if step is EscalationStep.REPLAN and run.state is PlanState.MONITORED:
@@ -178,9 +179,11 @@ class Escalation:
             remedy = self._remedy(failed) if failed is not None and why.startswith(NOT_OBSERVED) else ""
             reason = f"{failed} has failed before, in the same way and the same situation: {why}{remedy}"
             return self._give_up(run, reason)
-        if attempt.replans >= run.replans:
-            return self._give_up(run, f"the budget of {run.replans} new plans is used up: {why}")
-        attempt.replans += 1
+        disturbed = run.disturbed or (failed is None and run.successor is not None)
+        if not attempt.replan(run.replans, disturbed=disturbed):
+            used = f"the budget of {run.replans} new plans is used up"
+            ended = f"changes by others ended {run.replans} plans before a step was completed"
+            return self._give_up(run, f"{ended if disturbed else used}: {why}")
         if step is EscalationStep.EXCLUDE and failed is not None:
             self.search.exclude(failed, why)
         return Replan()

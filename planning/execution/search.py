@@ -7,19 +7,22 @@ to the goal.
 from __future__ import annotations
 
 import contextlib
+import itertools
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from knowledge_base.errors import InputError
+from knowledge_base.world.overlay import Overlay
 from planning.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.engines.registry import timing
-from planning.execution.plan_progress import local_repair
+from planning.execution.plan_progress import PlanProgress, cost_of, leads_to, local_repair
 from planning.execution.planner_call import Answer, Improvements, PlannerCalls
 from planning.explanation import why_unsolvable
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import PartialOrder
 from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
 from planning.problem.construction import build_problem
+from planning.problem.derived import derivation
 from planning.problem.relevance import why_no_engine
 from planning.validation import Validation, validate
 
@@ -30,10 +33,8 @@ if TYPE_CHECKING:
     from knowledge_base.language.evaluation.world_protocol import World
     from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
-    from knowledge_base.world.state import WorldState
     from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
-    from planning.execution.plan_progress import PlanProgress
     from planning.execution.plan_records import PlanRecords
     from planning.strips import Problem
 
@@ -56,7 +57,7 @@ EXCLUDED_SECONDS = 120.0
 """Seconds of run time for which new plans omit a step that failed repeatedly."""
 _REMEDY = "a longer `budget: {seconds: ...}` or another engine may find one"
 MAX_ATTEMPTS = 3
-"""The maximum number of searches for one plan if the world changes during each search."""
+"""The number of searches for one plan, and of their time limits, after which a changing world ends the search."""
 MAX_REJECTED = 5
 """The maximum number of plans that the simulation may reject."""
 _IN_CONCERT = "the only plan has concurrent steps that need each other, which no plot executes yet"
@@ -90,6 +91,10 @@ class Found:
     def known_order(self, steps: tuple[PlanStep, ...], version: int) -> PartialOrder | None:
         """Return the partial order if the plan has these steps and was validated on this version; otherwise `None`."""
         return self.order if self.version == version and self.steps == steps else None
+
+    def with_steps(self, steps: tuple[PlanStep, ...]) -> Found:
+        """Return the result with other steps of the plan."""
+        return replace(self, answer=replace(self.answer, plan=Plan(steps)), order=None)
 
     async def close(self) -> None:
         """Close the generator of better plans."""
@@ -149,53 +154,124 @@ class Search:
         """Restore the excluded steps from the data that `remember` returned."""
         self._excluded = {PlanStep.from_json(step): until for step, until in memory}
 
+    async def plan_during(
+        self, goal: Expression, seconds: float, before: PlanProgress, sleep: Callable[[float], Awaitable[None]]
+    ) -> Found | NotFound:
+        """Return a plan for which the running steps of `before` continue, unless a plan without them costs less.
+
+        The running steps count as done in that comparison, since an interruption wastes the time that they took. For
+        arguments and errors see `plan`.
+        """
+        found: Found | NotFound = await self.plan(goal, seconds, before, sleep)
+        running, later = self._running(before), found
+        if isinstance(found, Found):
+            await found.close()
+            first = _running_first(found.steps, running)
+            if first is not None and leads_to(first, before.domain, self._knowledge.snapshot(), before.goal):
+                return found if first == found.steps else found.with_steps(first)
+        while running:
+            later = await self.plan(goal, seconds, before.after_running(), sleep, running)
+            if isinstance(later, Found):
+                await later.close()
+            searched, running = running, self._running(before)
+            if searched == running:
+                break
+        if isinstance(found, NotFound) or isinstance(later, NotFound):
+            return found if isinstance(later, NotFound) else later
+        world = self._knowledge.snapshot()
+        ahead = _ahead(running, self._domain, world)
+        if ahead is None or not leads_to(found.steps, before.domain, world, before.goal):
+            return later  # the world changed during the second search
+        then = later.steps[len(running) :]
+        return later if cost_of(then, before.domain, ahead) <= cost_of(found.steps, before.domain, world) else found
+
+    def _running(self, progress: PlanProgress) -> tuple[PlanStep, ...]:
+        """Return the running steps that are applicable; the others are done, or cannot be completed."""
+        steps = progress.steps_of(progress.running)
+        return tuple([step for step in steps if _ahead((step,), progress.domain, self._knowledge) is not None])
+
     async def plan(
-        self, goal: Expression, seconds: float, before: PlanProgress | None, sleep: Callable[[float], Awaitable[None]]
+        self,
+        goal: Expression,
+        seconds: float,
+        before: PlanProgress | None,
+        sleep: Callable[[float], Awaitable[None]],
+        running: tuple[PlanStep, ...] = (),
     ) -> Found | NotFound:
         """Return a plan that is valid in the world at the end of the search.
+
+        A search during which the world changed is repeated; then a local repair may keep steps of the plan found.
 
         Args:
             goal: the condition to reach.
             seconds: real time for one search.
             before: the plan to replace; a local repair may keep some of its steps.
             sleep: waits for the simulated duration of a search. After an interruption it counts from the first start.
+            running: the first steps of the plan; the search begins in the world after them.
 
         Raises:
             InputError: the goal contains a missing object, or needs a feature that no engine supports.
         """
         rejected: dict[PlanStep, str] = {}
-        changed = 0
+        changed, begun = 0, self._clock.now()
         while True:
             version, snapshot = self._knowledge.version, self._knowledge.snapshot()
-            found = await self._in_time(self._found(goal, seconds, before, rejected, snapshot), seconds)
+            found = await self._found_after(running, goal, seconds, before, rejected, snapshot)
             if isinstance(found, NotFound):
                 return found
             if self._clock.simulated:
                 await sleep(found.answer.simulated_seconds)
             verdict, order = self._judged(found.answer.plan, goal)
             if verdict.valid:
-                if found.answer.plan.schedule:
-                    alone = validate(Plan(found.steps), self._domain, self._knowledge, goal)
-                    if not alone.valid:
-                        await found.close()
-                        return NotFound("failed", f"{_IN_CONCERT}: {alone.why} ({found.answer.engine})")
-                found = replace(found, order=order, version=self._knowledge.version)
-                verdict = await self._foreseen(found)
-                if verdict.valid:
-                    return found
-                await found.close()
+                accepted = await self._accepted(
+                    replace(found, order=order, version=self._knowledge.version), goal, rejected
+                )
+                if accepted is not None:
+                    return accepted
                 before = None
-                if verdict.failing_step is None or len(rejected) == MAX_REJECTED:
-                    return NotFound("failed", f"the simulation foresees that it fails: {verdict.why}")
-                rejected[found.steps[verdict.failing_step]] = verdict.why
                 continue
             await found.close()
             changed += 1
             if version == self._knowledge.version:
                 wrong = f"the plan found does not lead to the goal: {verdict.why} ({found.answer.engine})"
                 return NotFound("failed", wrong)
-            if changed == MAX_ATTEMPTS:
+            if changed >= MAX_ATTEMPTS and self._clock.now() - begun > MAX_ATTEMPTS * seconds:
                 return NotFound("failed", f"the world changes faster than plans are made: {verdict.why}")
+            if not found.answer.plan.schedule:
+                now = derivation(self._domain).at(self._knowledge)
+                before = PlanProgress(found.steps[len(running) :], now.domain, now.condition(goal))
+
+    async def _found_after(
+        self,
+        running: tuple[PlanStep, ...],
+        goal: Expression,
+        seconds: float,
+        before: PlanProgress | None,
+        rejected: dict[PlanStep, str],
+        snapshot: World,
+    ) -> Found | NotFound:
+        """Return the running steps and a plan from the world after them."""
+        world = _ahead(running, self._domain, snapshot)
+        if world is None:
+            return NotFound("failed", "a running step is no longer applicable")
+        found = await self._in_time(self._found(goal, seconds, before, rejected, world), seconds)
+        return found.with_steps((*running, *found.steps)) if running and isinstance(found, Found) else found
+
+    async def _accepted(self, found: Found, goal: Expression, rejected: dict[PlanStep, str]) -> Found | NotFound | None:
+        """Return the valid plan if the simulation accepts it; `None` after adding the step it rejects to `rejected`."""
+        if found.answer.plan.schedule:
+            alone = validate(Plan(found.steps), self._domain, self._knowledge, goal)
+            if not alone.valid:
+                await found.close()
+                return NotFound("failed", f"{_IN_CONCERT}: {alone.why} ({found.answer.engine})")
+        verdict = await self._foreseen(found)
+        if verdict.valid:
+            return found
+        await found.close()
+        if verdict.failing_step is None or len(rejected) == MAX_REJECTED:
+            return NotFound("failed", f"the simulation foresees that it fails: {verdict.why}")
+        rejected[found.steps[verdict.failing_step]] = verdict.why
+        return None
 
     def _judged(self, plan: Plan, goal: Expression) -> tuple[Validation, PartialOrder | None]:
         """Validate the plan and compute its partial order, in one pass over the steps."""
@@ -218,7 +294,7 @@ class Search:
         seconds: float,
         before: PlanProgress | None,
         rejected: dict[PlanStep, str],
-        snapshot: WorldState,
+        snapshot: World,
     ) -> Found | NotFound:
         """Search for a plan in the world of the snapshot, first by local repair, then by a planner call."""
         budget = WorkLimit(seconds)
@@ -263,7 +339,7 @@ class Search:
         return answer, better
 
     async def _repaired(
-        self, goal: Expression, seconds: float, before: PlanProgress, snapshot: WorldState
+        self, goal: Expression, seconds: float, before: PlanProgress, snapshot: World
     ) -> Found | TimedOut | None:
         """Return a local repair of the plan `before`; `TimedOut` at the time limit, or `None` without a repair."""
         excluded, patience = self._excluded_now(), WorkLimit(seconds)
@@ -279,8 +355,10 @@ class Search:
         answer, _ = await self._planner.solve(without(how.problem, excluded), seconds, going_on=False)
         if not isinstance(answer, PlanFound):
             return answer if isinstance(answer, TimedOut) else None
-        plan = how.repaired(answer.plan, before.remaining_steps, self._domain, snapshot, goal)
-        return None if plan is None else Found(replace(answer, plan=plan), kept=len(how.end))
+        plan = await self._aside(
+            lambda: how.repaired(answer.plan, before.remaining_steps, self._domain, snapshot, goal)
+        )
+        return None if plan is None else Found(replace(answer, plan=plan), kept=_equal_at_end(plan.steps, how.end))
 
     def _excluded_now(self) -> set[PlanStep]:
         now = self._clock.now()
@@ -297,6 +375,34 @@ class Search:
             step = None if verdict.failing_step is None else plan.steps[verdict.failing_step]
             self._records.rejected(step, verdict.why, found.answer.engine)
         return verdict
+
+
+def _running_first(steps: tuple[PlanStep, ...], running: tuple[PlanStep, ...]) -> tuple[PlanStep, ...] | None:
+    """Return the steps in an order that begins with the running steps; `None` if a running step is missing."""
+    rest = list(steps)
+    for step in running:
+        if step not in rest:
+            return None
+        rest.remove(step)
+    return (*running, *rest)
+
+
+def _equal_at_end(one: Iterable[PlanStep], other: Iterable[PlanStep]) -> int:
+    """Return the number of last steps that two plans share."""
+    pairs = zip(reversed(tuple(one)), reversed(tuple(other)), strict=False)
+    return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))
+
+
+def _ahead(running: Collection[PlanStep], domain: PlanningDomain, world: World) -> World | None:
+    """Return the world after the running steps; `None` if a step is not applicable."""
+    ahead = Overlay(world)
+    with contextlib.suppress(InputError):  # an object is missing, or a value cannot be computed
+        for step in running:
+            if not domain.applicable(step, ahead):
+                return None
+            ahead.apply(domain.effects(step, ahead))
+        return ahead if running else world
+    return None
 
 
 def _unknown(

@@ -8,7 +8,7 @@ r"""Control flows of a generated plot: sequences of steps, some of which wait fo
   conditions of step n. No step therefore begins with a false precondition. If step n need not wait for other flows,
   the previous `after` state tests the conditions of step n.
 - The variable `held` becomes true when the planning component announces that other steps replace the plan. No step
-  begins after that.
+  begins after that. Parallel steps that the planning component does not withdraw continue to their ends.
 - The state `step_n_skipped` exists if rules may skip step n. It replaces `after_n` and does not wait for effects.
 """
 
@@ -119,9 +119,12 @@ class Writer:
         done = {"to": f"after_{number}", **({"tell": step.effect} if step.assumed else {})}
         state: dict[str, Any] = {"about": step.text, **step.content, "on": {"done": done}}
         if self._plan is not None:
-            listen = {"trigger": "planner.hold", "with": {"plan": self._plan}, "within": MOST_WATCHED}
+            arguments = {"plan": self._plan, "step": number}
+            listen = {"trigger": "planner.hold", "with": arguments, "within": MOST_WATCHED}
             state["entry"] = [{"set": f"planner.{self._plan}", "to": number}, listen]
             state["on"]["held"] = {"assign": {HELD: True}}
+            if lane.mark:
+                state["on"]["withdrawn"] = {"to": lane.finished}
         if step.over_all:
             state["always"] = [
                 self._replan(lane, f"lost during {step.text}: {to_text(one)}", Not(one)) for one in step.over_all
@@ -164,13 +167,18 @@ class Writer:
         begin = {"to": f"step_{number}", **({"assign": assigned} if assigned else {})}
         both = _joined((*first, *step.needed)) if after is None else _between(after, step)
         otherwise = [] if both == begun else [self._replan(lane, f"not applicable: {step.text}", begun)]
-        return [*self._held(lane, first, after), _guarded(begin, both), *otherwise]
+        return [*self._held(lane, after), _guarded(begin, both), *otherwise]
 
-    def _held(self, lane: ControlFlow, first: Iterable[Expression], after: CarriedStep | None) -> list[dict[str, Any]]:
-        """Return the transition to `replan` that prevents the step if another plan replaces it."""
+    def _held(self, lane: ControlFlow, after: CarriedStep | None) -> list[dict[str, Any]]:
+        """Return the transition that prevents the step if another plan replaces it.
+
+        Running steps of parallel chains continue, since a chain that ends at `finished` interrupts no other chain.
+        """
         if self._plan is None:
             return []
-        when = _joined((_HELD, *first)) if after is None else _held_after(after)
+        when = _HELD if after is None else _held_after(after)
+        if lane.mark:
+            return [_guarded({"to": lane.finished}, when)]
         return [self._replan(lane, "another plan takes its place", when)]
 
     def _replan(self, lane: ControlFlow, reason: str, when: Expression | None = None) -> dict[str, Any]:

@@ -113,7 +113,7 @@ def test_what_little_is_broken_is_mended_and_the_rest_of_the_plan_kept():
     dropped = Delta(removed=(fact("at", "b"), fact("holding", "cup")), added=(fact("at", "c"), fact("in", "cup", "c")))
     run = Run("(and (in cup d) (clean d) (clean c))", {"(go b c)": [dropped]}, links=("a b", "b c", "c d"))
     assert run.how == "reached"
-    assert run.done == ["(take cup a)", "(go a b)", "(go b c)", "(take cup c)", "(sweep c)", "(go c d)", *run.done[-2:]]
+    assert run.done == ["(take cup a)", "(go a b)", "(go b c)", "(sweep c)", "(take cup c)", "(go c d)", *run.done[-2:]]
     (replaced,) = run.said("replaced")
     assert replaced["kept"] > 0
     assert len(run.planner.asked[-1].goal) > 0

@@ -47,11 +47,19 @@ def solved(how):
 def test_the_nearest_end_is_kept_and_reached_in_the_fewest_steps():
     here = world("d")
     how = local_repair(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL)
-    assert how.end == STEPS[1:]  # from d to b at once, not by way of a
+    assert how.end == STEPS[2:]  # as near as the end with one more step, and without a way over a
     plan = how.repaired(solved(how), STEPS, DOMAIN, here, GOAL)
     assert plan is not None
     assert plan.steps == (PlanStep("go", ("d", "b")), *STEPS[1:])
     assert validate(plan, DOMAIN, here, GOAL).valid
+
+
+def test_a_mended_plan_omits_what_became_useless():
+    here = world("d", fact("have", "nut"))
+    how = local_repair(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, world("d"), GOAL)
+    plan = how.repaired(solved(how), STEPS, DOMAIN, here, GOAL)
+    assert plan is not None
+    assert PlanStep("buy", ("nut", "b")) not in plan.steps
 
 
 def test_an_end_with_a_step_that_is_done_without_is_not_kept():

@@ -1,5 +1,6 @@
 """A plan in execution: its state, its successor, and which plans are kept."""
 
+import asyncio
 import json
 
 import pytest
@@ -10,6 +11,7 @@ from knowledge_base import Delta, KnowledgeBase, UnknownNameError, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanStep
 from planning.execution.monitor import Broken, GoalReached, Shorter
+from planning.execution.outcomes import Held, Withdrawn
 from planning.execution.plan_progress import PlanProgress
 from planning.execution.plan_run import Attempt, PlanRun, PlanRuns, PlanState, StepEnded, Successor
 from planning.problem.derived import derivation
@@ -51,7 +53,7 @@ def test_a_successor_that_begins_with_the_running_step_takes_over_after_it():
     run = plan_run(state=PlanState.BROKEN)
     run.progress.begin(1)
     assert run.follow(Successor(STEPS[:1]))
-    assert (run.state, run.superseded.is_set()) == (PlanState.MONITORED, True)
+    assert (run.state, run.superseded) == (PlanState.MONITORED, True)
     assert (run.progress.steps, run.progress.running) == (STEPS[:1], (1,))
 
 
@@ -59,7 +61,56 @@ def test_a_successor_that_begins_in_another_way_does_not():
     run = plan_run(state=PlanState.BROKEN)
     run.progress.begin(1)
     assert not run.follow(Successor(ROUND_ABOUT, "plan_2"))
-    assert (run.state, run.superseded.is_set(), run.progress.steps) == (PlanState.BROKEN, False, STEPS)
+    assert (run.state, run.superseded, run.progress.steps) == (PlanState.BROKEN, False, STEPS)
+
+
+SIDE_BY_SIDE = PlanStep("take", ("cup", "a"))
+
+
+def parallel_run():
+    """A plan with two running parallel steps, and the messages about its steps 1 and 2."""
+    progress = PlanProgress((SIDE_BY_SIDE, *STEPS), DOMAIN, GOAL, {(2, 3)})
+    run = PlanRun("plan_1", GOAL, progress, Attempt(), "errand", 5, 4, state=PlanState.BROKEN)
+    for number in (1, 2):
+        run.begun.add(number)
+        progress.begin(number)
+    return run
+
+
+async def hear(run, act):
+    """Hold both steps, act, and return what the messages said, and the steps that were withdrawn."""
+    said: list[Held] = []
+    holds = {number: asyncio.ensure_future(run.hold(number, said.append)) for number in (1, 2)}
+    await asyncio.sleep(0)
+    act()
+    await asyncio.sleep(0)
+    ended = {number: hold.result() for number, hold in holds.items() if hold.done()}
+    for hold in holds.values():
+        hold.cancel()
+    return said, ended
+
+
+def test_parallel_running_steps_continue_in_a_successor_that_begins_with_them_in_any_order():
+    run = parallel_run()
+    said, ended = asyncio.run(hear(run, lambda: run.follow(Successor((STEPS[0], SIDE_BY_SIDE, *STEPS[1:]), "plan_2"))))
+    assert (said, ended) == ([Held(), Held()], {})
+    assert (run.progress.running, run.progress.remaining) == ((1, 2), (1, 2, 3))
+
+
+def test_of_parallel_running_steps_only_those_continue_with_which_the_successor_begins():
+    run = parallel_run()
+    said, ended = asyncio.run(hear(run, lambda: run.follow(Successor(STEPS, "plan_2"))))
+    assert (said, ended) == ([Held(), Held()], {1: Withdrawn()})
+    assert run.progress.steps_of(run.progress.running) == STEPS[:1]
+
+
+def test_a_withdrawn_step_ends_alone_also_after_a_restart():
+    run = parallel_run()
+    assert asyncio.run(hear(run, lambda: run.withdraw(2))) == ([], {2: Withdrawn()})
+    world = KnowledgeBase(DOMAIN.schema)
+    world.apply(Delta(nodes={**dict.fromkeys("abcd", "room"), "cup": "thing"}), "test")
+    again = PlanRun.from_json(json.loads(json.dumps(run.to_json())), derivation(DOMAIN).at(world))
+    assert asyncio.run(hear(again, lambda: None)) == ([], {2: Withdrawn()})
 
 
 @pytest.mark.parametrize("state", PlanState)
@@ -73,7 +124,7 @@ def test_what_is_remembered_of_a_plan_is_plain_data_and_is_recalled(state):
     again = PlanRun.from_json(form, derivation(DOMAIN).at(world))
     assert again.to_json() == form
     assert (again.state, again.successor, again.news) == (run.state, run.successor, run.news)
-    assert again.superseded.is_set() == (state is not PlanState.STOPPED)
+    assert again.superseded == (state is not PlanState.STOPPED)
 
 
 def test_a_step_that_begins_before_its_monitor_is_back_is_not_forgotten():
