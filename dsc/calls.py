@@ -11,6 +11,7 @@ from typing import Any, Generic, Never, Protocol, cast
 from typing_extensions import TypeVar
 
 from dsc.outcomes import Outcome
+from dsc.rank import ORDINARY, Rank
 from knowledge_base.facts import Delta
 
 OBSERVED = "(observed)"
@@ -65,6 +66,7 @@ class SkillCall(Generic[Reported_contra]):
         report: posts an intermediate event while the skill continues (e.g. progress, a perception).
         deadline: second of run time at which the skill is cancelled.
         give_up: reports, as text, that a part of the skill continues and cannot be stopped.
+        rank: the rank of the skill among those that wait for its component.
 
     After a crash, a resumed run may repeat a call with an equal id. The clock of the repeated call begins at the start
     of the action, and repeated reports are dropped. So a skill that acts only one time for each id executes the same
@@ -76,6 +78,7 @@ class SkillCall(Generic[Reported_contra]):
     report: Callable[[Reported_contra], None]
     deadline: float = math.inf
     give_up: Callable[[str], None] = lambda _: None
+    rank: Rank = ORDINARY
 
     def observe(self, observed: Delta) -> None:
         """Report observed facts immediately, before the outcome and without an event for the chart."""

@@ -60,6 +60,14 @@ class SkillError(Exception):
     """
 
 
+class PreemptedError(SkillError):
+    """A skill with a higher priority, which `by` names, has taken the component at its host."""
+
+    def __init__(self, by: str) -> None:
+        super().__init__(f"{by} has taken the component")
+        self.by = by
+
+
 class ProgrammingError(Exception):
     """An undeclared exception of user code; the message has the hook or skill, the exception, the file and the line."""
 

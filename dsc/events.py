@@ -29,6 +29,8 @@ PROGRAMMING_ERROR = "programming_error"
 
 Only a transition, rule or handler that names the event responds to it; otherwise the event ends the run.
 """
+PREEMPTED = "preempted"
+"""Loss of a component to a skill with a higher priority; by default, the state is entered again and waits (S1.21)."""
 COMPONENT_FAILED = "component_failed"
 """Failure of a component without a running skill, which could report the failure; all plots see the event."""
 ERROR = "error"
@@ -51,7 +53,9 @@ ERRORS = frozenset({ERROR, EXECUTION_ERROR, PROGRAMMING_ERROR})
 
 TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
 """Events of the executive's clock for one state; no transition may have them under `on`."""
-RESERVED = TIMERS | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, COMPONENT_FAILED, ERROR} | SKILL_FAILURES
+RESERVED = (
+    TIMERS | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, PREEMPTED, COMPONENT_FAILED, ERROR} | SKILL_FAILURES
+)
 """Events that only the executive fires, with one exception.
 
 Plots and skills for planning may also end with `no_plan` and `gave_up`.

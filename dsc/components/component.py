@@ -15,6 +15,7 @@ from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
 from dsc.components.parameters import Configuration, Parameters
 from dsc.components.ports import TAKES, EventActivations
 from dsc.components.streams import Push, Stream
+from dsc.components.turns import Turns
 from dsc.outcomes import Outcome
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
@@ -30,8 +31,8 @@ class ComponentHooks:
     Attributes:
         name: the name in charts; the deployment may choose another name.
         domain: the component's part of the planning domain: a PDDL file or PDDL text; `None` without such a part.
-        concurrent: whether the component executes several skills concurrently. If not, steps of a plan that use the
-            component never overlap; plots may still start its skills in parallel.
+        concurrent: whether the component executes several skills concurrently. If not, it executes one skill at a
+            time, and the other skills wait, see `dsc.components.turns`.
         modes: the sub-states of Alive besides `neutral`; if empty, any mode is valid.
         device_errors: exceptions that report a failed device, e.g. `(OSError,)`: a skill that raises one ends with
             `skill_error`, and a hook leads to FatalError. Every other exception is a programming error.
@@ -154,6 +155,7 @@ class Component(ComponentHooks, RestartHooks):
         self.parameters = self.configuration.parameters
         self.life = LifeCycle(self.name, self.device_errors)
         self.activations = EventActivations()
+        self.turns = Turns()
         self.pushes: dict[str, Push] = {}
         self.streams: dict[str, Stream] = {}
         for port, declared in self._ports.items():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping
+from contextlib import AbstractAsyncContextManager, nullcontext
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -19,8 +20,10 @@ from dsc.components.heartbeat import Heartbeat
 from dsc.components.hooks import GRACE, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import HostedStreams, Publisher
-from dsc.errors import ProgrammingError
+from dsc.components.turns import turn_of
+from dsc.errors import PreemptedError, ProgrammingError
 from dsc.outcomes import Outcome
+from dsc.rank import ORDINARY, Rank
 from knowledge_base.errors import InputError
 from knowledge_base.exchange import delta_form, delta_of
 from knowledge_base.language.checking.inputs import require_delta, require_time, shown
@@ -109,7 +112,8 @@ class Host:
     async def _hull(self, _: str, __: Any) -> dict[str, Any]:
         skills = [asdict(signature) for signature in self._component.skills().values()]
         pushes = {name: {"values": dict(port.values)} for name, port in self._component.pushes.items()}
-        return {"skills": skills, "pushes": pushes, "condition": self._condition.newest}
+        said = {"skills": skills, "pushes": pushes, "concurrent": self._component.concurrent}
+        return {**said, "condition": self._condition.newest}
 
     async def _come_alive(self, _: str, __: Any) -> dict[str, Any]:
         life = self._component.life
@@ -225,18 +229,29 @@ class HostedActions:
             if said["seconds"] is not None:
                 require_time(said["seconds"])
                 seconds["deadline"] = self._clock.now() + said["seconds"]
-            call = SkillCall(said["id"], self._clock, lambda outcome: reports.put(_plain(outcome)), **seconds)
-            async with asyncio.timeout(said["seconds"]):
+            rank = _rank_of(said.get("rank"))
+            call = SkillCall(said["id"], self._clock, lambda one: reports.put(_plain(one)), rank=rank, **seconds)
+            async with asyncio.timeout(said["seconds"]), self._turn(said["skill"], action.client, rank):
                 with contained(f"{self._component.name}.{said['skill']}", self._component.device_errors):
                     outcome = await self._component.execute(said["skill"], call, said["arguments"])
                     form = outcome_form(_plain(outcome))
             end = {"ended": form}
+        except PreemptedError as error:
+            end = {"preempted": error.by}
         except ProgrammingError as error:
             end = {"bug": str(error)}
         except Exception as error:  # noqa: BLE001  # any error reaches the client as text
             end = {"failed": reason_of(error)}
         reports.flush()
         self._tell(said["id"], action, end)
+
+    def _turn(self, skill: str, client: str, rank: Rank) -> AbstractAsyncContextManager[None]:
+        """Return the turn of the component for a skill; a concurrent component needs none."""
+        component = self._component
+        signature = component.skills().get(skill)
+        if component.concurrent or signature is None or signature.pattern != "skill":
+            return nullcontext()
+        return turn_of(component.turns, f"{component.name}.{skill} {client}", rank)
 
     async def _how(self, _: str, said: dict[str, Any]) -> list[dict[str, Any]] | None:
         """Return the messages that the client has not received; `None` for an unknown action."""
@@ -264,6 +279,16 @@ def _plain(outcome: Outcome) -> Outcome:
     require_delta(outcome.observed)
     encoded(outcome_form(outcome))
     return outcome
+
+
+def _rank_of(said: object) -> Rank:
+    """Return the rank that a client has sent; raise `InputError` for anything else."""
+    match said:
+        case None:
+            return ORDINARY
+        case [int() | float() as priority, bool(handles), int(depth), bool(preempts)]:
+            return Rank(priority, handles, depth, preempts)
+    raise InputError(f"a rank is a list of priority, handles, depth and preempts, not {shown(said)}")
 
 
 def _key(said: Mapping[str, Any]) -> tuple[str, str]:

@@ -21,7 +21,7 @@ from dsc.components.heartbeat import Heartbeat
 from dsc.components.host import CONDITION, outcome_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import RENEWED, RemotePush, Subscription
-from dsc.errors import ProgrammingError
+from dsc.errors import PreemptedError, ProgrammingError
 from dsc.outcomes import Outcome
 from dsc.skills import SkillSignature
 from knowledge_base.errors import InputError, described, text_of
@@ -76,6 +76,7 @@ class RemoteComponent(Component):
         try:
             skills = {form["name"]: SkillSignature(**form) for form in said["skills"]}
             remote = cls(name, transport, endpoint, skills)
+            remote.concurrent = bool(said["concurrent"])
             for port, form in said["pushes"].items():
                 remote.pushes[port] = RemotePush(endpoint, name, port, form["values"])
             remote._condition.take(said["condition"])
@@ -161,6 +162,7 @@ class RemoteComponent(Component):
         """Execute the skill at the host, and return its outcome.
 
         Raises:
+            PreemptedError: a skill with a higher priority has taken the component.
             RefusedError: the skill failed there, or the host no longer knows the action.
             ProgrammingError: the skill's code failed there.
             NoAnswerError: the host does not answer.
@@ -169,7 +171,13 @@ class RemoteComponent(Component):
         self._endpoint.hear(f"news {call.action_id}", lambda _, __: news.set())
         seconds = call.remaining if call.remaining < float("inf") else None
         try:
-            await self._ask_about(call.action_id, "start", skill=skill_name, arguments=dict(arguments), seconds=seconds)
+            said: dict[str, Any] = {
+                "skill": skill_name,
+                "arguments": dict(arguments),
+                "seconds": seconds,
+                "rank": list(call.rank),
+            }
+            await self._ask_about(call.action_id, "start", **said)
             return await self._end_of(call, news)
         except asyncio.CancelledError:
             with suppress(NoAnswerError):  # if the host is lost, the action is lost too
@@ -192,6 +200,8 @@ class RemoteComponent(Component):
                     call.report(outcome_of(form["report"]))
                 elif "bug" in form:
                     raise ProgrammingError(text_of(form["bug"], str))
+                elif "preempted" in form:
+                    raise PreemptedError(text_of(form["preempted"], str))
                 elif "failed" in form:
                     raise RefusedError(text_of(form["failed"], str))
                 else:

@@ -162,8 +162,9 @@ class _Handling:
             return State(entry=do.command, on={DONE: onward}, about=handler.label)
         ways = {outcome: onward if then == RESUME else (leading[then],) for outcome, then in do.on.items()}
         return SubmachineState(
-            use=do.use, arguments=do.arguments, entry=do.command, on={DONE: onward, **ways}, about=handler.label
-        )
+            use=do.use, arguments=do.arguments, entry=do.command, on={DONE: onward, **ways}, about=handler.label,
+            priority=handler.priority, preempt=handler.preempt, handles=True,
+        )  # fmt: skip
 
 
 def _ends(plot: ActionPlot) -> dict[str, FinalState]:

@@ -157,7 +157,10 @@ class Responses:
         if do.use is None:
             return State(entry=do.command, on=on, about=about)
         arguments = self._kept(do.arguments, key, kept) if self._interrupted else do.arguments
-        return SubmachineState(use=do.use, arguments=arguments, entry=do.command, on=on, about=about)
+        return SubmachineState(
+            use=do.use, arguments=arguments, entry=do.command, on=on, about=about,
+            priority=rule.priority, preempt=rule.preempt,
+        )  # fmt: skip
 
     def _limit(self, rule: Rule, key: str) -> tuple[lang.Expression | None, dict[str, lang.Term]]:
         limit = limit_of(rule, generated=self._plot.generated)

@@ -30,6 +30,7 @@ from dsc.model.actions import (
 )
 from dsc.model.language import TermField
 from dsc.model.plot import ActionPlot
+from dsc.rank import Rank
 from knowledge_base.errors import InputError, UnknownNameError, UserCodeError
 from knowledge_base.language.syntax.expression import Constant, Expression, Term, Variable
 from knowledge_base.tracebacks import whole_traceback
@@ -128,7 +129,7 @@ class Performer:
                 if isinstance(action, Internal):
                     self._perform(frame, state, action)
                 else:
-                    self.output.append(self._output_of(frame, action, activation, number))
+                    self.output.append(self._output_of(frame, state, action, activation, number))
             except InputError as error:
                 self.fail(frame, f"{frame.prefix}{state}", error)
                 if frame.compiled.scxml:
@@ -153,14 +154,19 @@ class Performer:
         else:
             self.output.append(steps.StartTimer(activation, index, delay, event))
 
-    def _output_of(self, frame: Frame, action: ExternalAction, activation: int, number: int) -> steps.Output:
+    def _output_of(
+        self, frame: Frame, state: str, action: ExternalAction, activation: int, number: int
+    ) -> steps.Output:
         """Return the output for an external action, with evaluated arguments."""
         match action:
             case Trigger():
                 component, skill = action.trigger.split(".")
                 arguments = self.values(frame, action.arguments)
                 action_id = f"a{activation}.{number}"
-                return steps.Start(action_id, activation, component, skill, arguments, action.names, action.within)
+                rank = _rank(frame, state)
+                return steps.Start(
+                    action_id, activation, component, skill, arguments, action.names, action.within, rank
+                )
             case Configure():
                 component, parameter = action.set.split(".")
                 return steps.SetParameter(component, parameter, self.value(frame, action.to))
@@ -218,6 +224,20 @@ class Performer:
         elif not frame.gone:
             self.internal.append(Event(name, attributes, to=frame.parent.activations[frame.host]))
         # Otherwise another transition of this microstep exited the host, and the outcome is dropped.
+
+
+def _rank(frame: Frame, state: str) -> Rank:
+    """Return the rank of the skills of a state: the innermost declared priority, also of states around the plot."""
+    depth, preempts, handles = 0, False, False
+    priority: float | None = None
+    around: Frame | None = frame
+    while around is not None:
+        node = around.compiled.nodes[around.compiled.index[state]]
+        depth += len(node.around)
+        if priority is None:
+            preempts, handles, priority = preempts or node.preempts, handles or node.handles, node.priority
+        state, around = around.host, around.parent
+    return Rank(priority or 0.0, handles, depth, preempts)
 
 
 def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: Situation) -> Mapping[str, Any]:

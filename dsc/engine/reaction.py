@@ -175,7 +175,11 @@ class _Work:
 
     def taking(self, edges: tuple[TransitionEdge, ...], keeps: tuple[str, ...]) -> CompiledReaction:
         left_of = [left_by(self.compiled, edge, self.present, self.remembered) for edge in edges]
-        own = {edge.source for edge, left in zip(edges, left_of, strict=True) if edge.source in left}
+        own = {
+            edge.source
+            for edge, left in zip(edges, left_of, strict=True)
+            if edge.source in left and not edge.interrupts
+        }
         exits = self._exits(set().union(*left_of), own)
         effects = [self._settled(edge.effect) for edge in edges]
         for edge in edges:

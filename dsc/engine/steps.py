@@ -10,6 +10,7 @@ from dsc.engine.machine_state import NOTHING, MachineState
 from dsc.engine.situation import Decision
 from dsc.events import AFTER, Event
 from dsc.model.plot import ActionPlot
+from dsc.rank import ORDINARY, Rank
 from knowledge_base.facts import Delta
 
 
@@ -24,6 +25,7 @@ class Start:
         arguments: values for the skill's parameters, by name.
         names: event of the skill -> the name of this event in the chart.
         within: seconds after which the skill is cancelled; `None` means no limit.
+        rank: the order in which skills get a component that executes one skill at a time.
     """
 
     action_id: str
@@ -33,6 +35,12 @@ class Start:
     arguments: Mapping[str, Any]
     names: Mapping[str, str] = field(default_factory=dict)
     within: float | None = None
+    rank: Rank = ORDINARY
+
+    @classmethod
+    def from_json(cls, form: Mapping[str, Any]) -> Start:
+        """Return the start with these fields, whose rank is a list."""
+        return cls(**{**form, "rank": Rank(*form["rank"])})
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ class TransitionEdge:
         place: keys of the transition in its source state, e.g. `("on", "grasped", 0)`.
         passed: arguments for the plot inside the target, by name.
         cleared: indices of the history nodes whose memory the transition clears.
+        interrupts: whether the source is exited as by another state's transition, with `on_break`.
     """
 
     source: int
@@ -40,6 +41,7 @@ class TransitionEdge:
     place: tuple[str | int, ...] = ()
     passed: Mapping[str, TermField] = field(default_factory=dict)
     cleared: tuple[int, ...] = ()
+    interrupts: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +96,9 @@ class StateNode:
         holds_plot: whether the node is a submachine or dynamic state, which contains another plot.
         timed: whether the entry starts a timer.
         addressed: whether events are sent to single activations of the node, which therefore need serial numbers.
+        priority, preempts, handles: as in `Rank`, for the skills of the node; `priority` is `None` where no state of
+            the plot around the node declares one.
+        again: the transition by which the state is interrupted and entered again, once it was needed.
     """
 
     index: int
@@ -109,6 +114,10 @@ class StateNode:
     at_least: TermField | None = None
     histories: list[int] = field(default_factory=list)
     transparent: bool = False
+    priority: float | None = None
+    preempts: bool = False
+    handles: bool = False
+    again: TransitionEdge | None = None
 
     lay_out: Callable[[StateNode], None] = field(default=_nothing, repr=False)
     edges: dict[str, tuple[TransitionEdge, ...]] = field(init=False, repr=False)
@@ -242,7 +251,12 @@ class _Layout:
     def _append(self, name: str, parent: StateNode, state: states.AnyState | None) -> StateNode:
         index = len(self.nodes)
         node = StateNode(index, name, (parent.index, *parent.around), state, last=index)
+        node.priority, node.preempts, node.handles = parent.priority, parent.preempts, parent.handles
         if isinstance(state, states.State):
+            if state.priority is not None:
+                node.priority, node.preempts, node.handles = state.priority, False, False
+            node.preempts = node.preempts or state.preempt
+            node.handles = node.handles or (state.handles and state.priority is None)
             node.entry, node.exit, node.broken = state.entry, state.exit, state.on_break or state.exit
             node.at_least = state.at_least
         elif isinstance(state, states.FinalState):

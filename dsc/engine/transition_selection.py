@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from dsc.engine.frames import Frame
 from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
-from dsc.events import AFTER, EVERY
+from dsc.events import AFTER, EVERY, PREEMPTED
 from dsc.model.actions import Internal
 
 Guard = Callable[[Frame, TransitionEdge], bool]
@@ -150,9 +150,21 @@ def _addressed_edges(compiled: CompiledPlot, index: int, trigger: Addressed) -> 
     if not is_seen:
         return ()
     if trigger.number is None:
-        return edges_of(compiled, index, trigger.event)
+        edges = edges_of(compiled, index, trigger.event)
+        is_lost = trigger.event == PREEMPTED and index == trigger.node and not edges
+        return _entering_again(compiled, index) if is_lost else edges
     timed = {AFTER: compiled.nodes[index].timeouts, EVERY: compiled.nodes[index].cycles}[trigger.event]
     return (timed[trigger.number].edge,)
+
+
+def _entering_again(compiled: CompiledPlot, index: int) -> tuple[TransitionEdge, ...]:
+    """Return the transition of a state that has lost a component, unless a state around it handles that."""
+    node = compiled.nodes[index]
+    if any(PREEMPTED in compiled.nodes[around].edges for around in node.around):
+        return ()
+    if node.again is None:
+        node.again = TransitionEdge(index, PREEMPTED, (index,), None, (), interrupts=True)
+    return (node.again,)
 
 
 def matches(descriptors: str, event: str) -> bool:

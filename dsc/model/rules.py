@@ -95,6 +95,7 @@ class Rule(Frozen):
         when: condition over the event's attributes, the step's arguments and the knowledge base.
         of: steps to which an `on` rule applies; empty means all steps.
         do: response of the rule.
+        priority, preempt: as for a state, for the skills of the response.
         name: name of the rule in records and reports, see `label`.
     """
 
@@ -105,6 +106,8 @@ class Rule(Frozen):
     when: ConditionField | None = None
     of: Names = ()
     do: Response
+    priority: float | None = Field(default=None, strict=True)
+    preempt: bool = Field(default=False, strict=True)
 
     @model_validator(mode="after")
     def _answers_in_one_place(self) -> Rule:
@@ -176,6 +179,7 @@ class Handler(Frozen):
         interrupt: whether the active state is exited and afterwards entered again; if not, the handler runs in
             parallel.
         do: actions of the handler.
+        priority, preempt: as for a state, for the skills of the actions; by default, they precede those of the plot.
         name: name of the handler in records and reports, see `label`.
     """
 
@@ -185,6 +189,8 @@ class Handler(Frozen):
     when: ConditionField | None = None
     interrupt: bool = Field(default=False, strict=True)
     do: Reaction
+    priority: float | None = Field(default=None, strict=True)
+    preempt: bool = Field(default=False, strict=True)
 
     @property
     def label(self) -> str:

@@ -41,6 +41,11 @@ class State(TransitionSource):
         after: transitions that a timer triggers after the entry.
         every: transitions that a periodic timer triggers while the state is active (S3.2).
         always: transitions without trigger, taken as soon as their guard is true.
+        priority: rank of the state's skills, and of all skills inside, where they wait for a component (S1.21). The
+            larger number comes first; `None` means the rank of the state around, and 0 for the plot of a run.
+        preempt: whether these skills take a component from skills with a lower priority. The other state is then
+            interrupted: it executes `on_break`, is entered again, and waits.
+        handles: whether the state is the response of a handler, whose skills come before those of its plot.
     """
 
     entry: Actions = ()
@@ -51,6 +56,9 @@ class State(TransitionSource):
     after: TimedTransitions = ()
     every: CyclicTransitions = ()
     always: Transitions = ()
+    priority: float | None = Field(default=None, strict=True)
+    preempt: bool = Field(default=False, strict=True)
+    handles: bool = False
 
     def blocks(self) -> Iterator[tuple[str, Actions]]:
         """Yield each sequence of actions with its key, e.g. `entry`."""

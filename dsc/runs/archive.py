@@ -156,7 +156,7 @@ class RunArchive:
     def under_way(self) -> list[tuple[Start, float]]:
         """Return the skills of the unfinished run that have not ended, each with its start in seconds of run time."""
         rows = [SnapshotRow(*row) for _, row in sorted(self.latest_snapshot().pending.items())]
-        return [(Start(**row.what), row.at) for row in rows if row.kind == Start.__name__ and not row.cancelled]
+        return [(Start.from_json(row.what), row.at) for row in rows if row.kind == Start.__name__ and not row.cancelled]
 
     def serials_before(self, run: int) -> int:
         """Return the last serial number that the earlier runs have used, so that all action ids in a store differ."""

@@ -155,7 +155,7 @@ def awaited_of(kind: str, form: Mapping[str, Any], find: Callable[[str], Any]) -
     """Return the pending item of a form from `awaited_form`; `kind` is the name of the item's class."""
     match kind:
         case "Start":
-            return Start(**{**form, "arguments": full(form["arguments"], find)})
+            return Start.from_json({**form, "arguments": full(form["arguments"], find)})
         case "SendLater":
             return _later_of(form, find)
         case "SetParameter":

@@ -32,6 +32,8 @@ class Pending:
         reports: number of a skill's intermediate events so far; for a parameter or mode, 1 as soon as it is effective.
         cause: number of the trace record about a skill's start.
         cancelled: whether the last macrostep has cancelled the skill.
+        waits: whether the skill has to wait for the turn of its component.
+        turn: second of run time at which a skill that has waited got its turn; `None` without a turn or a wait.
     """
 
     place: int
@@ -41,6 +43,8 @@ class Pending:
     reports: int = 0
     cause: int = 0
     cancelled: bool = False
+    waits: bool = False
+    turn: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +101,17 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
     root = None if reactor["root"] is None else frame_form(reactor["root"], now.frames, find)
     rows = [(place, SnapshotRow(*row)) for place, row in sorted(now.pending.items())]
     pending = [
-        Pending(place, awaited_of(row.kind, row.what, find), row.step, row.at, row.reports, row.cause, row.cancelled)
+        Pending(
+            place,
+            awaited_of(row.kind, row.what, find),
+            row.step,
+            row.at,
+            row.reports,
+            row.cause,
+            row.cancelled,
+            row.waits,
+            row.turn,
+        )
         for place, row in rows
     ]
     state = {"root": root, "serials": last.serials, "finished": reactor["finished"]}

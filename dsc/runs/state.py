@@ -91,7 +91,9 @@ class RunState:
                 self._in_effect[_key(one.what)] = one.place
             form = awaited_form(one.what, self._short)
             kind = type(one.what).__name__
-            self._rows[one.place] = SnapshotRow(kind, one.step, one.at, form, one.reports, one.cause, one.cancelled)
+            self._rows[one.place] = SnapshotRow(
+                kind, one.step, one.at, form, one.reports, one.cause, one.cancelled, one.waits, one.turn
+            )
             if one.cancelled:
                 self._cancelled += self._places.pop(_key(one.what))
 
@@ -146,6 +148,11 @@ class RunState:
                 self._forget(_key(timer))
             case LateMessage() | SendLater():
                 self._forget(_key(message), 1)
+
+    def wait(self, start: Start, turn: float | None) -> None:
+        """Mark an action that waits for its component, or has waited and got its turn at second `turn`."""
+        for place in self._places.get(_key(start), ()):
+            self._put_row(place, self._rows[place]._replace(waits=turn is None, turn=turn))
 
     def dispatched(self, under_way: Collection[Told], refused: Collection[Told] = ()) -> None:
         """Register that earlier commands were received, except those in `under_way` and `refused`."""

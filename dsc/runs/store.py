@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any, Literal
 
 from dsc.dynamic.library import Library
-from dsc.engine.steps import Output
+from dsc.engine.steps import Output, Start
 from dsc.messages import LateMessage, Message, Told
 from dsc.runs.archive import RunArchive, archive, unfinished
 from dsc.runs.encoding import Shortener, message_form
@@ -246,6 +246,11 @@ class RunStore:
         self._state.put(late, self._number, due)
         if self._number:  # else the first macrostep writes the change
             self.writing.more(change=self._state.change())
+
+    def wait(self, start: Start, turn: float | None = None) -> None:
+        """Store that an action waits for its component, or has waited and got its turn at second `turn`."""
+        self._state.wait(start, turn)
+        self.writing.more(change=self._state.change())
 
     def step(
         self,

@@ -79,6 +79,8 @@ class SnapshotRow(NamedTuple):
     reports: int = 0
     cause: int = 0
     cancelled: bool = False
+    waits: bool = False
+    turn: float | None = None
 
 
 @dataclass(slots=True)

@@ -19,6 +19,7 @@ from dsc.components.component import Component
 from dsc.components.hooks import contained, give_up, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.robot import Wiring, require_instances
+from dsc.components.turns import Claim, Turns
 from dsc.engine import steps
 from dsc.errors import UncertainActionError
 from dsc.events import COMPONENT_FAILED, Event
@@ -28,7 +29,7 @@ from dsc.sequencer.clock import LoopClock, PastClock
 from dsc.sequencer.inbox import Timers
 from dsc.sequencer.message_checks import encoded, late, validated
 from dsc.sequencer.outbox import CLOSING, Outbox, failure
-from dsc.sequencer.running_skills import InterruptedSkill, PendingCleanups, RunningSkill
+from dsc.sequencer.running_skills import InterruptedSkill, PendingCleanups, RunningSkill, WaitObserver
 from dsc.skills import SkillSignature
 from dsc.supervision.activation import ComponentActivation
 from dsc.supervision.component_registry import ComponentRegistry
@@ -52,6 +53,7 @@ class Dispatcher:
         components: the owners of the skills.
         clock: run time.
         post: receives skills' answers and timers' messages, in the order of their arrival.
+        observer: names the states of skills, and records which skills wait.
         part_of: a prefix of the action ids that components receive.
 
     Attributes:
@@ -65,8 +67,10 @@ class Dispatcher:
         components: Iterable[Component],
         clock: LoopClock,
         post: Callable[[SkillMessage | TimerMessage | steps.SendLater | LateMessage | Event], None],
+        observer: WaitObserver,
         part_of: str = "",
     ) -> None:
+        self._observer = observer
         self._part_of = part_of
         self._components = {component.name: component for component in require_instances(components)}
         self.activation = ComponentActivation(ComponentRegistry(self._components), self._in_use)
@@ -77,6 +81,7 @@ class Dispatcher:
         self._post = post
         self._running: dict[str, RunningSkill] = {}
         self._cleanups = PendingCleanups(self.activation.changed)
+        self._asked: list[Turns] = []
         self._forget_tasks: set[asyncio.Task[None]] = set()
         self.outbox = Outbox()
         self.timers = Timers(clock, post)
@@ -122,6 +127,8 @@ class Dispatcher:
         self.outbox.begin_step()
         for output in outputs:
             self.dispatch(output)
+        if self._asked:
+            self.give_turns()
 
     def dispatch(self, output: steps.Output) -> None:
         """Execute one output of the machine.
@@ -191,7 +198,9 @@ class Dispatcher:
 
     def settle(self, start: steps.Start) -> None:
         """End a skill whose final answer was handled; until then, its component counts as in use."""
-        self._running.pop(start.action_id, None)
+        ended = self._running.pop(start.action_id, None)
+        if ended is not None and ended.claim is not None:
+            ended.claim.leave()
         if start.component in self.activation.concerned:
             self.activation.look()
         component = self._components.get(start.component)
@@ -221,7 +230,9 @@ class Dispatcher:
         stopped.stopped = True
         stopped.end_limit()
         stopped.task.cancel()
-        self._cleanups.add(start.component, stopped.task, stopped.given_up)
+        if stopped.claim is not None:
+            stopped.claim.end()
+        self._cleanups.add(stopped)
 
     def restore(self, component: str, effective: Sequence[steps.SetParameter | steps.SwitchMode]) -> None:
         """Restore a component's effective settings after a restart; raise `UnknownNameError` if it is not deployed."""
@@ -233,6 +244,31 @@ class Dispatcher:
     def resume(self, start: steps.Start, interrupted: InterruptedSkill) -> None:
         """Continue a skill that a restart interrupted; raise `UnknownNameError` if its component is missing."""
         self._start(start, interrupted)
+        if interrupted.began is not None and self._asked:
+            self.give_turns()
+
+    # -- turns: one skill at a time --------------------------------------------------------------------------
+
+    def has_turns(self, start: steps.Start) -> bool:
+        """Return whether the skill waits for its turn, since its component is not concurrent."""
+        component = self._components.get(start.component)
+        if component is None or component.concurrent:
+            return False
+        signature = component.skills().get(start.skill)
+        return signature is not None and signature.pattern == "skill"
+
+    def give_turns(self) -> None:
+        """Compare the claims of the skills that were started since the last call."""
+        asked, self._asked = self._asked, []
+        for turns in asked:
+            turns.give()
+
+    @property
+    def waits(self) -> Iterator[str]:
+        """Each skill that waits for its component, with the skill that the component executes, as text."""
+        for running in self._running.values():
+            if not running.begun:
+                yield f"{running.describe()} waits for {self._missing(running)}"
 
     async def abandon(self, start: steps.Start) -> None:
         """Request that a component stops a skill that was cancelled just before a restart.
@@ -279,10 +315,16 @@ class Dispatcher:
         component = self.component(start.component)
         signature = component.skills().get(start.skill, UNKNOWN_SKILL)
         within = start.within or (math.inf if signature.pattern == "event" else DEFAULT_WITHIN)
-        due = within + (self._clock.now() if interrupted is None else interrupted.began)
+        due = within + (self._clock.now() if interrupted is None else interrupted.asked)
         raises = component.device_errors
-        running = RunningSkill(start, signature, raises, within, due, self._clock, self._post, self._fault)
+        running = RunningSkill(
+            start, signature, raises, within, due, self._clock, self._post, self._fault, self._observer
+        )
         running.configuring = self.outbox.configuring
+        if not component.concurrent and signature.pattern == "skill":
+            running.claim, running.begun = Claim(component.turns, running, start.rank), False
+            component.turns.waiting.append(running.claim)
+            self._asked.append(component.turns)
         running.task = asyncio.get_running_loop().create_task(self._execute(component, running, interrupted))
         running.task.add_done_callback(running.ended)
         self._running[start.action_id] = running
@@ -295,7 +337,7 @@ class Dispatcher:
         try:
             outcome = await self._outcome(component, running, dependencies, interrupted)
         except BaseException as error:
-            failed = running.failed(error, dependencies.missing or self.outbox.unconfigured(running.configuring))
+            failed = running.failed(error, dependencies.missing or self._missing(running))
             if failed is None:
                 raise
             outcome = failed
@@ -319,17 +361,18 @@ class Dispatcher:
             else:
                 running.report(outcome)
 
-        clock: Clock = PastClock(self._clock, interrupted.began) if interrupted else self._clock
-        call = SkillCall(self._part_of + start.action_id, clock, report, running.due, self._fault)
-        if component.name in self._cleanups.pending and not component.concurrent and signature.pattern == "skill":
-            await self._cleanups.over(component.name)
+        began = None if interrupted is None else interrupted.began
+        clock: Clock = self._clock if began is None else PastClock(self._clock, began)
+        call = SkillCall(self._part_of + start.action_id, clock, report, running.due, self._fault, start.rank)
+        if not running.begun:
+            await running.turn()
         if running.configuring:
             await self.outbox.configured(running.configuring)
         if component.name in self.outbox.untaken:
             await self.outbox.taken(component)
         if dependencies.concerned or component.life.state is not Life.ALIVE:
             await dependencies.ready()
-        if interrupted is not None:
+        if interrupted is not None and began is not None:
             status = await component.status(call.action_id, start.skill, start.arguments)
             if isinstance(status, Ended):
                 return validated(status.outcome, start, signature)
@@ -341,6 +384,16 @@ class Dispatcher:
         outcome = validated(await dependencies.carrying(work), start, signature)
         # The observations are true, also if they arrive late.
         return late(start, running.within, observed=outcome.observed) if running.is_late else outcome
+
+    def _missing(self, running: RunningSkill) -> str:
+        """Return, as text, the component for whose turn or settings a skill waits; empty if it waits for none."""
+        if running.claim is not None and not running.begun:
+            holder = running.claim.turns.holder
+            doing = (
+                "" if holder is None or holder is running.claim else f", which executes {holder.claimant.describe()}"
+            )
+            return f"component '{running.start.component}'{doing}"
+        return self.outbox.unconfigured(running.configuring)
 
     def _failed(self, component: Component) -> None:
         """Post an event about a failed component, unless a running skill of the component reports the failure."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from dsc.components.hooks import contained, reason_of
 from dsc.engine.steps import SendLater, SetParameter, Start, StartTimer, SwitchMode
@@ -46,11 +46,13 @@ async def recover(kept: Kept, dispatcher: Dispatcher) -> None:
     for component, settings in effective.items():
         dispatcher.restore(component, settings)
     await dispatcher.outbox.all_taken()
-    for one in others:
-        _rearm(one, dispatcher)
+    begun = _begun(pending, dispatcher)
+    for one in sorted(others, key=lambda one: one.place not in begun):  # stable
+        _rearm(one, dispatcher, begun)
     await asyncio.sleep(0)  # until the restored items have begun
     for one in pending[len(older) :]:
-        _rearm(one, dispatcher)
+        _rearm(one, dispatcher, begun)
+    dispatcher.give_turns()
 
 
 def _divided(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | SwitchMode]], list[Pending]]:
@@ -65,10 +67,28 @@ def _divided(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | Sw
     return effective, others
 
 
-def _rearm(one: Pending, dispatcher: Dispatcher) -> None:
+def _begun(pending: Iterable[Pending], dispatcher: Dispatcher) -> set[int]:
+    """Return the places of the actions that their components may have received; the others have waited for a turn."""
+    begun: set[int] = set()
+    claims: dict[str, list[Pending]] = {}
+    for one in pending:
+        if isinstance(one.what, Start) and dispatcher.has_turns(one.what):
+            claims.setdefault(one.what.component, []).append(one)
+        elif isinstance(one.what, Start):
+            begun.add(one.place)
+    for of_component in claims.values():
+        with_turn = [one.place for one in of_component if one.turn is not None]
+        unmarked = [one.place for one in of_component if not one.waits]
+        # Of several new actions, none has begun: those that have to wait are marked before the first one begins.
+        begun.update(with_turn or (unmarked if len(unmarked) == 1 else ()))
+    return begun
+
+
+def _rearm(one: Pending, dispatcher: Dispatcher, begun: Collection[int]) -> None:
     match one.what:
         case Start():
-            dispatcher.resume(one.what, InterruptedSkill(one.at, one.reports))
+            began = (one.at if one.turn is None else one.turn) if one.place in begun else None
+            dispatcher.resume(one.what, InterruptedSkill(one.at, began, one.reports))
         case StartTimer():
             dispatcher.timers.schedule(TimerMessage(one.what), one.at)
         case SendLater() | LateMessage():

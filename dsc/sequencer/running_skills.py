@@ -8,13 +8,15 @@ import math
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 from dsc.blocking import DeadlineError
 from dsc.calls import Reports
 from dsc.components.hooks import GRACE, Classes, give_up, give_up_after, is_own, programming_error
+from dsc.components.turns import Claim
 from dsc.engine.steps import Start
-from dsc.errors import ProgrammingError
-from dsc.events import PROGRAMMING_ERROR, SKILL_ERROR
+from dsc.errors import PreemptedError, ProgrammingError
+from dsc.events import PREEMPTED, PROGRAMMING_ERROR, SKILL_ERROR
 from dsc.messages import SkillMessage
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock
@@ -32,12 +34,30 @@ class InterruptedSkill:
     """An action that was started before the restart.
 
     Attributes:
-        began: second of run time at which the action was started.
+        asked: second of run time at which the chart started the action.
+        began: second at which the action got the turn of its component; `None` if it was still waiting.
         reports: the number of the action's reports that were handled.
     """
 
-    began: float
+    asked: float
+    began: float | None
     reports: int
+
+
+class WaitObserver(Protocol):
+    """Observer of the skills that wait for their components."""
+
+    def asker(self, activation: int) -> str:
+        """Return the state of an activation as the end of a phrase, as ` of state 'look'`; empty if it was left."""
+        ...
+
+    def note_wait(self, start: Start, holder: str) -> None:
+        """Record that a skill waits for the end of the skill `holder`."""
+        ...
+
+    def note_turn(self, start: Start) -> bool:
+        """Record that a skill gets its turn after a wait, and return whether the skill may begin."""
+        ...
 
 
 class RunningSkill:
@@ -55,6 +75,7 @@ class RunningSkill:
         clock: run time.
         post: receives the messages of the skill.
         fault: receives a fault of the run.
+        observer: names the state of a skill, and records which skills wait.
 
     Attributes:
         task: the execution.
@@ -62,6 +83,8 @@ class RunningSkill:
         stopped: whether the chart has cancelled the skill.
         answered: whether the end was posted.
         configuring: deliveries of parameters and modes that end before the skill begins.
+        claim: the claim to the component; `None` if the component is concurrent.
+        begun: whether the skill may begin, since it has the turn of its component.
     """
 
     task: asyncio.Task[None]
@@ -76,6 +99,7 @@ class RunningSkill:
         clock: LoopClock,
         post: Callable[[SkillMessage], None],
         fault: Callable[[str], None],
+        observer: WaitObserver,
     ) -> None:
         self.start = start
         self.signature = signature
@@ -85,9 +109,13 @@ class RunningSkill:
         self.stopped = False
         self.answered = False
         self.configuring: Configuring = {}
+        self.claim: Claim | None = None
+        self.begun = True
+        self._turn: asyncio.Future[None] | None = None
         self._clock = clock
         self._post = post
         self._fault = fault
+        self._observer = observer
         self._raises = raises
         self._thread = threading.get_ident()
         self._expired = False
@@ -155,8 +183,46 @@ class RunningSkill:
         return late(self.start, self.within) if self.is_late and outcome.event == SKILL_ERROR else outcome
 
     def _outcome_of(self, error: BaseException) -> Outcome:
+        if type(error) is PreemptedError:
+            return self._preempted(error.by)
         bug = programming_error(error, f"{self.start.component}.{self.start.skill}", self._raises)
         return failed(self.start, described(error)) if bug is None else faulty(self.start, str(bug))
+
+    # -- the turn of the component -------------------------------------------------------------------------
+
+    def describe(self) -> str:
+        """Return the skill with its state, as text for people."""
+        return f"{self.start.component}.{self.start.skill}{self._observer.asker(self.start.activation)}"
+
+    def begin(self, *, waited: bool) -> None:
+        """Begin with the turn of the component."""
+        if waited and not self._observer.note_turn(self.start):
+            return
+        self.begun = True
+        if self._turn is not None and not self._turn.done():
+            self._turn.set_result(None)
+
+    def wait(self, holder: str) -> None:
+        """Note the skill whose end this skill waits for."""
+        self._observer.note_wait(self.start, holder)
+
+    def lose(self, taker: str) -> None:
+        """Post `preempted`, since a skill with a higher priority takes the component; the task is then cancelled."""
+        if self.answered:
+            return
+        if self.reports is not None:
+            self.reports.flush()
+        self._post(SkillMessage(self.start, self._preempted(taker), final=True, goes_on=True))
+        self.answered = True
+        self.end_limit()
+
+    def _preempted(self, taker: str) -> Outcome:
+        return Outcome(PREEMPTED, {"skill": f"{self.start.component}.{self.start.skill}", "by": taker})
+
+    async def turn(self) -> None:
+        """Wait until `begun`."""
+        self._turn = asyncio.get_running_loop().create_future()
+        await self._turn
 
     # -- time --------------------------------------------------------------------------------------------
 
@@ -219,32 +285,29 @@ class PendingCleanups:
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
-        self.pending: dict[str, dict[asyncio.Task[None], asyncio.Future[None]]] = {}
+        self.pending: dict[str, set[asyncio.Task[None]]] = {}
 
-    def add(self, component: str, task: asyncio.Task[None], say: Callable[[], None]) -> None:
-        """Add a cancelled task of a component; call `say` if the task is abandoned."""
-        over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        of_component = self.pending.setdefault(component, {})
-        of_component[task] = over
+    def add(self, skill: RunningSkill) -> None:
+        """Add the cancelled task of a skill; the skill then leaves its claim, and reports if the task is abandoned."""
+        component, task = skill.start.component, skill.task
+        of_component = self.pending.setdefault(component, set())
+        of_component.add(task)
 
         def end(_: asyncio.Task[None]) -> None:
-            if of_component.pop(task, None) is not None:
+            if task in of_component:
+                of_component.remove(task)
                 if not of_component:
                     del self.pending[component]
-                over.set_result(None)
+                if skill.claim is not None:
+                    skill.claim.leave()
                 self._say(component)
 
         def abandon() -> None:
             end(task)
-            say()
+            skill.given_up()
 
         task.add_done_callback(end)
         give_up_after(task, GRACE, abandon)
-
-    async def over(self, component: str) -> None:
-        """Wait until no cancelled task of the component is left."""
-        while ending := self.pending.get(component):
-            await asyncio.wait(ending.values())
 
     def tasks(self) -> Iterable[asyncio.Task[None]]:
         """Return the tasks that have not stopped."""

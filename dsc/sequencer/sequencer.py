@@ -13,7 +13,7 @@ from dsc.components.component import Component
 from dsc.components.hooks import programming_errors, unheard_errors
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
-from dsc.engine.steps import Output
+from dsc.engine.steps import Output, Start
 from dsc.errors import ProgrammingError
 from dsc.events import GAVE_UP, NO_PLAN, Event
 from dsc.messages import FromOutside, LateMessage, Message, SkillMessage
@@ -28,7 +28,7 @@ from dsc.sequencer.recovery import recover, require_components
 from dsc.sequencer.watchdog import Watchdog
 from dsc.trace import Trace
 from knowledge_base._notebook import table
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, StoreError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 
@@ -123,7 +123,7 @@ class Sequencer:
         if store is not None:
             self.trace.listen(store.hear)
         self._inbox = Inbox()
-        self.dispatcher = Dispatcher(components, clock, self._inbox.put, part_of)
+        self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of)
         self._open_ended = open_ended
         self._last_late = store.last_late if store is not None else 0
         self._before_events: list[Callable[[], Awaitable[None]]] = []
@@ -161,6 +161,7 @@ class Sequencer:
             "working": [f"{start.component}.{start.skill}" for start in self.dispatcher.started()],
             "in_use": sorted(self.dispatcher.in_use),
             "switched_on": sorted(self.dispatcher.activation.on),
+            "waits": list(self.dispatcher.waits),
             "waiting": len(self._inbox.waiting),
             "knowledge_version": self.knowledge.version,
         }
@@ -261,7 +262,7 @@ class Sequencer:
             while not machine.state.finished and reactor.problem is None:
                 if not inbox.waiting:
                     if self._is_deadlock():
-                        reactor.problem = "deadlock: no skill, timer or event is pending"
+                        reactor.problem = self._deadlock()
                         break
                     await inbox.arrival()
                 for wait in self._before_events:
@@ -408,6 +409,39 @@ class Sequencer:
             with self.store.writing:
                 self.store.late(late, due)
         self.dispatcher.timers.schedule(late, due)
+
+    # -- skills that wait for their components -----------------------------------------------------------------
+
+    def asker(self, activation: int) -> str:
+        """Return the state of an activation as the end of a phrase, as ` of state 'look'`; empty if it was left."""
+        found = self.machine.state.state_of(activation)
+        return "" if found is None else f" of state '{found[0]}'"
+
+    def note_wait(self, start: Start, holder: str) -> None:
+        """Record that a skill waits for the end of the skill `holder`."""
+        self._reactor.tracer.waits(start, holder)
+        self._keep_wait(start, None)
+
+    def note_turn(self, start: Start) -> bool:
+        """Record that a skill gets its turn after a wait, and return whether the skill may begin."""
+        self._reactor.tracer.turn(start)
+        return self._keep_wait(start, self.clock.now())
+
+    def _keep_wait(self, start: Start, turn: float | None) -> bool:
+        """Store that a skill waits or begins, so that a restart distinguishes the two; return whether it is stored."""
+        if self.store is None:
+            return True
+        if self.store.lost:
+            return False
+        try:
+            with self.store.writing:
+                self.store.wait(start, turn)
+        except StoreError:  # the next macrostep cannot be written either, and ends the run
+            return False
+        return True
+
+    def _deadlock(self) -> str:
+        return "; ".join(["deadlock: no skill, timer or event is pending", *self.dispatcher.waits])
 
     def _is_deadlock(self) -> bool:
         """Return whether no further message can arrive.

@@ -118,6 +118,17 @@ class StepTracer:
         skill, arguments = self.begun(start), dict(start.arguments)
         return self._trace.record("action", action="start", id=start.action_id, skill=skill, arguments=arguments)
 
+    def waits(self, start: steps.Start, holder: str) -> None:
+        """Record that a skill waits for its component, and the skill that the component executes, with its state."""
+        skill = f"{start.component}.{start.skill}"
+        self._trace.record("action", action="wait", id=start.action_id, skill=skill, **{"for": holder})
+
+    def turn(self, start: steps.Start) -> None:
+        """Record that a skill that has waited begins, unless it was cancelled."""
+        skill = self._at_work.get(start.activation, {}).get(start.action_id)
+        if skill is not None:
+            self._trace.record("action", action="begin", id=start.action_id, skill=skill)
+
     def cancelled(self, activation: int) -> Iterable[str]:
         """Record the cancellation of an activation's skills; return their action ids."""
         skills = self._at_work.pop(activation, {})

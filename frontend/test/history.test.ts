@@ -75,6 +75,13 @@ describe("a moment", () => {
     expect([2, 3, 4].map(working)).toEqual([["a1", "a2"], ["a2"], []]);
   });
 
+  it("has the skill for which another one waits, until its turn comes", () => {
+    const actions = [["start", "a1"], ["start", "a2"], ["wait", "a2"], ["begin", "a2"]];
+    const recs = actions.map(([action, id], i) => ({ seq: i + 1, t: 0, type: "action", cause: null, action, id, skill: id, ...(action === "wait" ? { for: "a1 of state 's'" } : {}) }) as Rec);
+    const awaited = (seq: number) => [...history(recs).at(seq).working.values()].map((one) => one.for);
+    expect([2, 3, 4].map(awaited)).toEqual([[undefined, undefined], [undefined, "a1 of state 's'"], [undefined, undefined]]);
+  });
+
   it("has the transitions taken last, the latest first", () => {
     expect(history(run).at(9).trail.map((one) => one.to)).toEqual(["clear/execute/step_2", "clear/execute/step_1", "clear/execute"]);
   });

@@ -66,6 +66,7 @@ class PlanningComponent(Component):
     """
 
     name = "planner"
+    concurrent = True
 
     def __init__(
         self,

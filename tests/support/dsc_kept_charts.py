@@ -92,6 +92,26 @@ CHARTS = {
           wrong: {final: true, entry: [{tell: (told)}]}
           e: {final: true}
     """,
+    "skills that wait for their turn": """
+        plot: p
+        states:
+          all:
+            regions:
+              one: {states: {a: {entry: {trigger: robot.work, with: {seconds: 3}}, on: {did: ae}}, ae: {final: true}}}
+              two: {states: {b: {entry: {trigger: robot.work, with: {seconds: 1}}, on: {did: be}}, be: {final: true}}}
+              three:
+                states:
+                  c: {after: {seconds: 1, to: d}}
+                  d: {priority: 2, entry: {trigger: robot.work, with: {seconds: 2}}, on: {did: ce}}
+                  ce: {final: true}
+              four:
+                states:
+                  f: {after: {seconds: 4, to: g}}
+                  g: {priority: 3, preempt: true, entry: {trigger: robot.work}, on: {did: fe}}
+                  fe: {final: true}
+            on: {done: e}
+          e: {final: true}
+    """,
     "a problem at the end": """
         plot: p
         states:

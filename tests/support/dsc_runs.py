@@ -61,8 +61,9 @@ class Arm(Component):
 
     name = "arm"
 
-    def __init__(self, name=None, slow_to_configure=0.0):
+    def __init__(self, name=None, slow_to_configure=0.0, *, concurrent=False):
         super().__init__(name)
+        self.concurrent = self.concurrent or concurrent
         self.log = []
         self.clock = None
         self.slow = slow_to_configure

@@ -102,11 +102,15 @@ const CHANGES: ReadonlyMap<string, Change> = new Map(Object.entries<Change>({
   "plan.skipped": stepsSkipped,
 }));
 
-/** A skill begins, or is cancelled since its state was left. */
+/** A skill is started, waits for its component, gets it, or is cancelled since its state was left. */
 function acted(moment: Moment, rec: ActionRec): void {
   if (rec.action === "start") moment.working.set(rec.seq, rec);
-  if (rec.action !== "cancel") return;
-  for (const [seq, one] of moment.working) if (one.id === rec.id) moment.working.delete(seq);
+  if (rec.action !== "wait" && rec.action !== "begin" && rec.action !== "cancel") return;
+  for (const [seq, one] of moment.working) {
+    if (one.id !== rec.id) continue;
+    if (rec.action === "cancel") moment.working.delete(seq);
+    else moment.working.set(seq, { ...one, for: rec.for });
+  }
 }
 
 function stepped(moment: Moment, rec: StepRec, plots: Plots): void {

@@ -118,6 +118,8 @@ export interface ActionRec extends Rec {
   readonly value?: Value;
   readonly component?: string;
   readonly mode?: string;
+  /** Of `wait`: the skill whose end it waits for. */
+  readonly for?: string;
   readonly arguments?: Named;
 }
 

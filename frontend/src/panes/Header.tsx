@@ -6,7 +6,8 @@ import { Help } from "./Help";
 export function Header() {
   const { header, live, connected, paused, moment, last, expected } = useShown();
   const facts = ["seed", "faults", "began"].filter((name) => header[name] !== undefined).map((name) => `${name} ${String(header[name])}`);
-  const working = [...moment.working.values()].map((one) => one.skill).filter((skill) => skill && !skill.startsWith("planner."));
+  const working = [...moment.working.values()].filter((one) => one.skill && !one.skill.startsWith("planner."))
+    .map((one) => (one.for ? `${one.skill} (waits for ${one.for})` : one.skill));
   return (
     <header>
       <strong>{String(header.run ?? "a run")}</strong>

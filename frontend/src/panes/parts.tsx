@@ -21,7 +21,8 @@ function inWords(rec: Rec): string {
     case "event": return `${(rec as EventRec).name} from ${(rec as EventRec).source}`;
     case "action": {
       const { action, skill, port, value, component, mode } = rec as ActionRec;
-      return action === "start" || action === "cancel" ? `${action} ${skill}` : action === "set" ? `set ${port} to ${String(value)}` : `switch ${component} to ${mode}`;
+      if (action === "wait") return `${skill} waits for ${(rec as ActionRec).for}`;
+      return action === "start" || action === "begin" || action === "cancel" ? `${action} ${skill}` : action === "set" ? `set ${port} to ${String(value)}` : `switch ${component} to ${mode}`;
     }
     case "step": {
       const taken = (rec as StepRec).microsteps.flatMap((micro) => micro.taken);

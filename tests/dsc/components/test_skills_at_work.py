@@ -126,7 +126,8 @@ def test_what_was_observed_is_known_even_if_the_state_was_left_meanwhile():
     assert ran.end.finished
     assert ran.kb.ask("(exists (?i - item) (seen ?i))")
 
-    late = Ran("""
+    late = Ran(
+        """
         plot: p
         states:
           o:
@@ -136,7 +137,9 @@ def test_what_was_observed_is_known_even_if_the_state_was_left_meanwhile():
             on: {out: b}
           b: {always: {to: e, when: (exists (?i - item) (seen ?i))}}
           e: {final: true}
-    """)
+    """,
+        arm=Arm(concurrent=True),
+    )
     assert late.end.finished
     assert late.kb.ask("(seen cup1)")
 

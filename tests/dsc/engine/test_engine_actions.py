@@ -9,6 +9,7 @@ from dsc.engine.machine import step
 from dsc.engine.steps import Cancel, SetParameter, Start, StartTimer, SwitchMode
 from dsc.errors import RunawayError
 from dsc.events import Event
+from dsc.rank import Rank
 from knowledge_base.facts import Delta, Fact, fact
 
 # -- actions -----------------------------------------------------------------------------------------------
@@ -35,7 +36,7 @@ def test_external_actions_become_output_in_order_with_arguments_worked_out():
     assert output == (
         SetParameter("arm", "approach", "cup1"),
         SwitchMode("base", "neutral"),
-        Start(f"a{serial}.2", serial, "arm", "pick", {"item": "cup1", "n": 3}, {"ok": "picked"}, 3.0),
+        Start(f"a{serial}.2", serial, "arm", "pick", {"item": "cup1", "n": 3}, {"ok": "picked"}, 3.0, Rank(depth=1)),
     )
     assert run.send("e").output == (Cancel(serial), SwitchMode("arm", "neutral"))
 

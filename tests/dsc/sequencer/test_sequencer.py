@@ -93,8 +93,10 @@ def test_a_component_is_configured_before_the_skill_that_follows_is_started():
     assert ran.at == pytest.approx(12)
 
 
-def test_two_skills_of_one_state_run_side_by_side():
-    ran = Ran("""
+@pytest.mark.parametrize(("concurrent", "at"), [(True, 3), (False, 5)])
+def test_two_skills_of_one_state_run_side_by_side_on_a_concurrent_component(concurrent, at):
+    ran = Ran(
+        """
         plot: p
         variables: {n: {type: number, initial: 0}}
         states:
@@ -102,8 +104,10 @@ def test_two_skills_of_one_state_run_side_by_side():
             entry: [{trigger: arm.grasp, with: {item: cup1}}, {trigger: arm.grasp, with: {item: cup2, seconds: 3}}]
             on: {grasped: [{to: e, when: (= ?n 1)}, {assign: {n: 1}}]}
           e: {final: true}
-    """)
-    assert ran.at == pytest.approx(3)
+    """,
+        arm=Arm(concurrent=concurrent),
+    )
+    assert ran.at == pytest.approx(at)
 
 
 def test_intermediate_reports_reach_the_chart_and_the_knowledge_base():

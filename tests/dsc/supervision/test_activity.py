@@ -347,6 +347,7 @@ def test_one_component_in_two_runs_is_off_when_neither_needs_it():
 
     async def main():
         camera, kb = Device("camera", log), KnowledgeBase(Schema())
+        camera.concurrent = True
         short = plot(
             "{plot: q, states: {a: {entry: {trigger: camera.look, with: {seconds: 2}}, on: {looked: e}}, e: {final: true}}}"
         )
