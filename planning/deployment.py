@@ -31,10 +31,11 @@ from planning.bundles import Bundle, components_of, domain_of, gathered, plots_o
 from planning.domain import PlanningDomain
 from planning.engines.planner import Planner
 from planning.executive import Executive, achieve_plot
+from planning.explanation import unmet
 from planning.problem.construction import check_goal
 from planning.problem.derived import derivation
 from planning.progress import Tally
-from planning.report import Judge, Report, failure_events, reason_of_end, summarise, unmet
+from planning.report import Judge, Report, failure_events, reason_of_end, summarise
 from planning.simulation import Left, Setup, Simulation
 
 

@@ -301,7 +301,7 @@ class Executive:
             shared=[component.name for component in components if component.concurrent],
             foresight=self._foresight,
         )  # fmt: skip
-        sequencer.listen(planning.note_choices)
+        sequencer.listen(planning.note)
         sequencer.dispatcher.deploy(planning)
         return sequencer, planning
 

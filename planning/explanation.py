@@ -11,8 +11,20 @@ from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import Add, AllOf, Effect, ForEach, When, effect_leaves
-from knowledge_base.language.syntax.expression import And, Expression, TypedVariable, substitute
+from knowledge_base.language.syntax.expression import (
+    And,
+    Atom,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    TypedVariable,
+    Variable,
+    substitute,
+)
 from knowledge_base.language.syntax.text import to_text
+from knowledge_base.view import View
 from planning.cancellable_work import WorkLimit
 from planning.domain import PlanningAction, PlanningDomain
 from planning.plan import PlanStep
@@ -26,6 +38,8 @@ from planning.quantities import Assignment, NumericBound, helps, worth
 from planning.strips import Problem
 
 _LONGEST_CHAIN = 6
+MOST_COUNTEREXAMPLES = 100
+"""Upper bound of the objects that are listed for one violated `forall` of a goal."""
 _TOGETHER = "each goal fact can be reached by itself, but not all of them together"
 _NUMBERS = "no goal fact is unreachable if numbers change without bound, but no plan reaches the goal"
 
@@ -348,3 +362,25 @@ def _mirror(one: int, fresh: int, together: list[int]) -> None:
         lowest = fresh & -fresh
         together[lowest.bit_length() - 1] |= 1 << one
         fresh ^= lowest
+
+
+def unmet(goal: Expression, knowledge: View) -> Iterator[str]:
+    """Yield each false part of a goal as text; for a `forall`, the part for each object that violates it."""
+    for part in goal.parts if isinstance(goal, And) else (goal,):
+        if knowledge.ask(part):
+            continue
+        if isinstance(part, And):
+            yield from unmet(part, knowledge)
+        elif isinstance(part, Forall):
+            yield from _counterexamples(part, knowledge)
+        else:
+            yield to_text(part)
+
+
+def _counterexamples(goal: Forall, knowledge: View) -> Iterator[str]:
+    kinds = [
+        Or(tuple(Atom(kind, (Variable(one.name),)) for kind in one.types or ("object",))) for one in goal.variables
+    ]
+    wanted = goal.body.conclusion if isinstance(goal.body, Imply) else goal.body
+    for found in knowledge.query(And((*kinds, Not(goal.body))), limit=MOST_COUNTEREXAMPLES):
+        yield to_text(substitute(wanted, found))

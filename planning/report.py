@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
@@ -10,25 +10,11 @@ from dsc.dynamic.library import Library
 from dsc.events import SKILL_FAILURES
 from dsc.sequencer.sequencer import RunEnd
 from knowledge_base._notebook import text
-from knowledge_base.language.syntax.expression import (
-    And,
-    Atom,
-    Expression,
-    Forall,
-    Imply,
-    Not,
-    Or,
-    Variable,
-    substitute,
-)
-from knowledge_base.language.syntax.text import to_text
-from knowledge_base.store import KnowledgeBase
 from planning.progress import Tally
 from planning.simulation import Fault, Left
 
 Judge = Literal["world", "knowledge", "outcome"]
 """The source of `goal_reached`: the true state of a simulated world, the knowledge base, or the outcome of the plot."""
-MOST_COUNTEREXAMPLES = 100
 """Maximum number of objects that are listed for one violated `forall` of a goal."""
 
 
@@ -183,25 +169,3 @@ def reason_of_end(end: RunEnd, gave_up: str = "") -> str:
     if end.problem is not None or not gave_up or gave_up in end.reason:
         return end.reason
     return f"{end.reason}: {gave_up}" if end.emitted else gave_up
-
-
-def unmet(goal: Expression, knowledge: KnowledgeBase) -> Iterator[str]:
-    """Yield each false part of a goal as text; for a `forall`, the part for each object that violates it."""
-    for part in goal.parts if isinstance(goal, And) else (goal,):
-        if knowledge.ask(part):
-            continue
-        if isinstance(part, And):
-            yield from unmet(part, knowledge)
-        elif isinstance(part, Forall):
-            yield from _counterexamples(part, knowledge)
-        else:
-            yield to_text(part)
-
-
-def _counterexamples(goal: Forall, knowledge: KnowledgeBase) -> Iterator[str]:
-    kinds = [
-        Or(tuple(Atom(kind, (Variable(one.name),)) for kind in one.types or ("object",))) for one in goal.variables
-    ]
-    wanted = goal.body.conclusion if isinstance(goal.body, Imply) else goal.body
-    for found in knowledge.query(And((*kinds, Not(goal.body))), limit=MOST_COUNTEREXAMPLES):
-        yield to_text(substitute(wanted, found))

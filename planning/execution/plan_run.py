@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Any
@@ -31,9 +31,11 @@ if TYPE_CHECKING:
 
 MOST_UNMONITORED = 64
 """The maximum number of unmonitored plans that are kept. The chart may abandon a plan without a message."""
-_PLAIN = ("name", "holder", "seconds", "replans", "replaces", "searching_since", "disturbed")
+_PLAIN = ("name", "holder", "seconds", "replans", "replaces", "searching_since", "disturbed", "monitored_for")
 
 
+MOST_ATTEMPTS = 64
+"""The maximum number of goals whose interrupted attempts are kept; the oldest are dropped."""
 MOST_RESUMED = 3
 """The maximum number of times that an attempt resumes at one step without a new plan."""
 
@@ -67,13 +69,18 @@ class Failure:
 class Attempt:
     """History of failures and answers for one goal, over all plans for that goal.
 
+    The history ends when the goal is reached or given up. An interruption, e.g. by a handler, does not end it.
+
     Attributes:
+        unmet: the number of false parts of the goal at the beginning.
         replans: the number of plans that replaced a failed plan.
         failures: the number of occurrences of each failure.
         resumed: the number of times that a plan resumed at each step.
-        disturbances: the number of plans that another author's changes ended since a step was last completed.
+        disturbances: the number of plans that an interruption, or changes by another author, ended since a step was
+            last completed.
     """
 
+    unmet: int = 0
     replans: int = 0
     disturbances: int = 0
     failures: Counter[Failure] = field(default_factory=Counter)
@@ -84,6 +91,7 @@ class Attempt:
         failures = [[one.step.to_json(), one.why, one.situation, often] for one, often in self.failures.items()]
         resumed = [[step.to_json(), often] for step, often in self.resumed.items()]
         return {
+            "unmet": self.unmet,
             "replans": self.replans,
             "disturbances": self.disturbances,
             "failures": failures,
@@ -97,7 +105,7 @@ class Attempt:
             Failure(PlanStep.from_json(step), why, where): often for step, why, where, often in form["failures"]
         }
         resumed = {PlanStep.from_json(step): often for step, often in form["resumed"]}
-        return cls(form["replans"], form["disturbances"], Counter(failures), Counter(resumed))
+        return cls(form["unmet"], form["replans"], form["disturbances"], Counter(failures), Counter(resumed))
 
     def failed(self, failure: Failure, *, stands: bool, others: bool) -> EscalationStep:
         """Count a failure, and return the next escalation step for it.
@@ -215,6 +223,7 @@ class PlanRun:
         superseded: whether no further step of the plan may begin while the running steps continue.
         plot_steps: the steps of the plot, which the numbers in `begun` and `withdrawn` count from 1.
         withdrawn: the numbers of the plot's steps that end while parallel steps continue.
+        monitored_for: the activation that monitors the plan; 0 before the first one.
     """
 
     name: str
@@ -237,7 +246,13 @@ class PlanRun:
     superseded: bool = False
     plot_steps: tuple[PlanStep, ...] = ()
     withdrawn: set[int] = field(default_factory=set)
+    monitored_for: int = 0
     _holds: dict[int, tuple[Callable[[Held], None], asyncio.Future[None]]] = field(default_factory=dict)
+
+    @property
+    def task(self) -> str:
+        """The goal with the plot that holds it; of equal goals, each plot has its own attempt."""
+        return task_of(self.goal, self.holder)
 
     def __post_init__(self) -> None:
         self.plot_steps = self.plot_steps or self.progress.steps
@@ -318,7 +333,6 @@ class PlanRun:
             **{name: getattr(self, name) for name in _PLAIN},
             "goal": to_text(self.goal),
             "progress": self.progress.to_json(),
-            "attempt": self.attempt.to_json(),
             "state": self.state.value,
             "successor": None if self.successor is None else self.successor.to_json(),
             "begun": sorted(self.begun),
@@ -328,13 +342,19 @@ class PlanRun:
         }
 
     @classmethod
-    def from_json(cls, form: Mapping[str, Any], now: Settled) -> PlanRun:
-        """Return the run that `to_json` wrote as `form`, with conditions expanded for the present world."""
+    def from_json(cls, form: Mapping[str, Any], now: Settled, attempts: Mapping[str, Attempt]) -> PlanRun:
+        """Return the run that `to_json` wrote as `form`.
+
+        Args:
+            form: the run as plain data.
+            now: the domain with conditions expanded for the present world.
+            attempts: the attempts by task.
+        """
         goal = parse_condition(form["goal"])
         run = cls(
             goal=goal,
             progress=PlanProgress.from_json(form["progress"], now.domain, now.condition(goal)),
-            attempt=Attempt.from_json(form["attempt"]),
+            attempt=attempts.get(task_of(goal, form["holder"])) or Attempt(),
             state=PlanState(form["state"]),
             successor=None if form["successor"] is None else Successor.from_json(form["successor"]),
             begun=set(form["begun"]),
@@ -353,7 +373,30 @@ class PlanRuns:
 
     def __init__(self) -> None:
         self._runs: dict[str, PlanRun] = {}
+        self._attempts: dict[str, Attempt] = {}
         self._named = 0
+
+    def interrupted(self, task: str) -> Attempt | None:
+        """Return the attempt at a task that has neither reached nor given up its goal."""
+        return self._attempts.get(task)
+
+    def attempt(self, task: str, unmet: int) -> Attempt:
+        """Begin and return a new attempt at a task, whose goal has `unmet` false parts."""
+        self._attempts.pop(task, None)
+        while len(self._attempts) >= MOST_ATTEMPTS:
+            del self._attempts[next(iter(self._attempts))]
+        attempt = self._attempts[task] = Attempt(unmet)
+        return attempt
+
+    def conclude_monitored(self, ended: Collection[int]) -> None:
+        """End the attempts at the tasks whose monitoring activations have ended."""
+        for run in self._runs.values():
+            if run.monitored_for in ended:
+                self.conclude(run.task)
+
+    def conclude(self, task: str) -> None:
+        """End the attempt at a task, since its goal is reached or given up."""
+        self._attempts.pop(task, None)
 
     def new_name(self) -> str:
         """Return a name that no earlier plan of the program run has."""
@@ -397,12 +440,19 @@ class PlanRuns:
 
     def remember(self) -> dict[str, Any]:
         """Return all plans as plain data."""
-        return {"plans": self._named, "runs": [one.to_json() for one in self._runs.values()]}
+        attempts = {task: attempt.to_json() for task, attempt in self._attempts.items()}
+        return {"plans": self._named, "attempts": attempts, "runs": [one.to_json() for one in self._runs.values()]}
 
     def recall(self, memory: Mapping[str, Any], now: Settled) -> None:
         """Restore the plans that `remember` returned, with conditions expanded for the present world."""
         self._named = memory["plans"]
-        self._runs = {form["name"]: PlanRun.from_json(form, now) for form in memory["runs"]}
+        self._attempts = {task: Attempt.from_json(form) for task, form in memory["attempts"].items()}
+        self._runs = {form["name"]: PlanRun.from_json(form, now, self._attempts) for form in memory["runs"]}
+
+
+def task_of(goal: Expression, holder: str) -> str:
+    """Return the goal, with the plot whose rules its plans inherit, as text."""
+    return f"{holder}: {to_text(goal)}"
 
 
 def _form(heard: News | StepEnded) -> dict[str, Any] | None:

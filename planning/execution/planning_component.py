@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from dsc.calls import Ended, SkillCall, Status
 from dsc.components.component import Component
+from dsc.engine.steps import Cancel, Start
+from dsc.events import LED_AWAY
 from dsc.outcomes import Outcome
 from dsc.sequencer.reactor import CHART
 from dsc.skills import skill
@@ -17,6 +19,7 @@ from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.syntax.text import parse_condition
 from planning.execution.monitoring import Monitoring
 from planning.execution.outcomes import (
+    GaveUp,
     GoalHolds,
     GoalOpen,
     Held,
@@ -28,9 +31,10 @@ from planning.execution.outcomes import (
 )  # fmt: skip
 from planning.execution.plan_progress import PlanProgress
 from planning.execution.plan_records import PlanRecords
-from planning.execution.plan_run import Attempt, PlanRun, PlanRuns
+from planning.execution.plan_run import Attempt, PlanRun, PlanRuns, task_of
 from planning.execution.repair import Choices, Escalation, Plotting
 from planning.execution.search import NotFound, Search
+from planning.explanation import unmet
 from planning.problem.derived import derivation
 
 if TYPE_CHECKING:
@@ -104,9 +108,17 @@ class PlanningComponent(Component):
         if self._cancelled:
             await asyncio.wait(self._cancelled)
 
-    def note_choices(self, step: Step) -> None:
-        """Store the plots chosen for planning actions; the sequencer calls this method after each macrostep."""
+    def note(self, step: Step) -> None:
+        """Store the plots chosen for planning actions; the sequencer calls this method after each macrostep.
+
+        A rule that leaves a plan for another state ends the attempt, since the plot bounds how often it does that.
+        """
         self._choices.note(step)
+        for one in step.output:
+            if isinstance(one, Start) and (one.component, one.skill) == (self.name, "monitor"):
+                self._runs.required(one.arguments["plan"]).monitored_for = one.activation
+        if any(micro.event is not None and micro.event.name.startswith(LED_AWAY) for micro in step.microsteps):
+            self._runs.conclude_monitored({one.activation for one in step.output if isinstance(one, Cancel)})
 
     def remember(self) -> Any:
         """Return plans, excluded steps, choices and outcomes that the sequencer has not received, as data."""
@@ -155,7 +167,7 @@ class PlanningComponent(Component):
         seconds: float,
         replans: int,
         after: str,
-    ) -> PlotFound | GoalHolds | NoPlan:
+    ) -> PlotFound | GoalHolds | NoPlan | GaveUp:
         """Find a plan for the goal and generate the plot of the plan.
 
         `after` is the name of the plan that the new one replaces; empty for the first plan. The attribute `kind` of
@@ -176,7 +188,7 @@ class PlanningComponent(Component):
             return GoalOpen(reason=str(error))
         if not why.truth:
             return GoalOpen(reason=str(why.deciding))
-        self._runs.over(plan)
+        self._conclude(plan)
         return GoalHolds()
 
     @skill(after_crash="repeat")
@@ -193,7 +205,7 @@ class PlanningComponent(Component):
         run = self._runs.required(plan)
         outcome = await Monitoring(run, self._escalation, self._clock, is_own, self._cancelled).outcome()
         if outcome.event == "goal_holds":
-            self._runs.over(plan)
+            self._conclude(plan)
         return outcome
 
     @skill(after_crash="repeat")
@@ -218,28 +230,51 @@ class PlanningComponent(Component):
 
     async def _planned(
         self, call: SkillCall, goal: str, holder: str, seconds: float, replans: int, before: PlanRun | None
-    ) -> PlotFound | GoalHolds | NoPlan:
+    ) -> PlotFound | GoalHolds | NoPlan | GaveUp:
         wanted, now = parse_condition(goal), self._derivation.at(self._knowledge)
+        task = task_of(wanted, holder)
         if holds(now.condition(wanted), self._knowledge):
+            self._runs.conclude(task)
             return GoalHolds()
+        left = sum(1 for _ in unmet(now.condition(wanted), self._knowledge))
+        attempt = self._interrupted(task, left) if before is None else before.attempt
+        if before is None and attempt is not None and attempt.disturbances >= replans:
+            self._runs.conclude(task)
+            return GaveUp(reason=f"interruptions ended {replans} plans before a step was completed")
         self._records.asked(goal, self._knowledge.version)
         try:
             earlier = None if before is None else before.progress
             found = await self._search.plan(wanted, seconds, earlier, call.clock.sleep)
             if isinstance(found, NotFound):
+                self._runs.conclude(task)
                 return self._none(found.kind, found.reason)
             now = self._derivation.at(self._knowledge)
             known = found.known_order(found.steps, self._knowledge.version)
             progress = PlanProgress(found.steps, now.domain, now.condition(wanted))
-            attempt = Attempt() if before is None else before.attempt
+            if attempt is None:
+                attempt = self._runs.attempt(task, left)
+            elif before is None:
+                attempt.disturbances += 1
             run = PlanRun(self._runs.new_name(), wanted, progress, attempt, holder, seconds, replans, found.better)
             order, form = self._escalation.plotting.plotted(run, found.answer.plan, known)
         except InputError as error:
+            self._runs.conclude(task)
             return self._none("failed", str(error))
         self._records.found(found.answer, run.name)
         if before is not None:
             self._records.replaced(before.name, run.name, found.kept)
         return self._escalation.bound(run, order, form)
+
+    def _interrupted(self, task: str, left: int) -> Attempt | None:
+        """Return the interrupted attempt at a task, unless the goal has gained a fact since its beginning."""
+        attempt = self._runs.interrupted(task)
+        return None if attempt is None or left < attempt.unmet else attempt
+
+    def _conclude(self, plan: str) -> None:
+        run = self._runs.get(plan)
+        if run is not None:
+            self._runs.conclude(run.task)
+        self._runs.over(plan)
 
     def _none(self, kind: str, reason: str) -> NoPlan:
         self._records.none(kind, reason)

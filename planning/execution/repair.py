@@ -207,6 +207,7 @@ class Escalation:
             run.renew(self.plotting.derivation.at(self._knowledge))
         reached = is_true(run.progress.goal, self._knowledge)
         if reached:
+            self.runs.conclude(run.task)
             self.runs.over(run.name)
         return reached
 
@@ -283,6 +284,7 @@ class Escalation:
         return name
 
     def _give_up(self, run: PlanRun, reason: str) -> GaveUp:
+        self.runs.conclude(run.task)
         self.runs.over(run.name)
         self.records.gave_up(run.name, reason)
         return GaveUp(reason=reason)

@@ -109,7 +109,7 @@ def test_a_withdrawn_step_ends_alone_also_after_a_restart():
     assert asyncio.run(hear(run, lambda: run.withdraw(2))) == ([], {2: Withdrawn()})
     world = KnowledgeBase(DOMAIN.schema)
     world.apply(Delta(nodes={**dict.fromkeys("abcd", "room"), "cup": "thing"}), "test")
-    again = PlanRun.from_json(json.loads(json.dumps(run.to_json())), derivation(DOMAIN).at(world))
+    again = PlanRun.from_json(json.loads(json.dumps(run.to_json())), derivation(DOMAIN).at(world), {})
     assert asyncio.run(hear(again, lambda: None)) == ([], {2: Withdrawn()})
 
 
@@ -121,7 +121,7 @@ def test_what_is_remembered_of_a_plan_is_plain_data_and_is_recalled(state):
     world = KnowledgeBase(DOMAIN.schema)
     world.apply(Delta(nodes=dict.fromkeys("abcd", "room")), "test")
     form = json.loads(json.dumps(run.to_json()))
-    again = PlanRun.from_json(form, derivation(DOMAIN).at(world))
+    again = PlanRun.from_json(form, derivation(DOMAIN).at(world), {})
     assert again.to_json() == form
     assert (again.state, again.successor, again.news) == (run.state, run.successor, run.news)
     assert again.superseded == (state is not PlanState.STOPPED)
