@@ -71,6 +71,7 @@ class SkillSignature:
         outcomes: events that the skill may end with or report, with their attributes and types.
         pattern: see `Pattern`.
         after_crash: see `AfterCrash`.
+        unlimited: whether the skill has no time limit, unless the trigger declares one.
         place: file and line of the body; empty if unknown.
     """
 
@@ -81,6 +82,7 @@ class SkillSignature:
     outcomes: Mapping[str, Mapping[str, str | None]]
     pattern: Pattern = "skill"
     after_crash: AfterCrash = "sense"
+    unlimited: bool = False
     place: str = ""
 
 
@@ -99,6 +101,7 @@ class Declared:
         own: number of leading parameters of the body that charts do not set.
         pattern: see `Pattern`.
         after_crash: see `AfterCrash`.
+        unlimited: as in `SkillSignature`.
     """
 
     types: Mapping[str, str | None]
@@ -107,6 +110,7 @@ class Declared:
     own: int = 2
     pattern: Pattern = "skill"
     after_crash: AfterCrash = "sense"
+    unlimited: bool = False
 
     def __call__(self, body: _Body) -> _Body:
         """Attach this declaration to `body`, and return `body`.
@@ -152,7 +156,7 @@ DECLARED = "__dsc_skill__"
 @overload
 def skill(body: _Coroutine, /) -> _Coroutine: ...
 @overload
-def skill(*, after_crash: AfterCrash = ...) -> Callable[[_Coroutine], _Coroutine]: ...
+def skill(*, after_crash: AfterCrash = ..., unlimited: bool = ...) -> Callable[[_Coroutine], _Coroutine]: ...
 @overload
 def skill(*, blocking: Literal["thread", "process"], after_crash: AfterCrash = ...) -> Callable[[_Plain], _Plain]: ...
 def skill(
@@ -161,6 +165,7 @@ def skill(
     *,
     blocking: Literal["thread", "process"] | None = None,
     after_crash: AfterCrash = "sense",
+    unlimited: bool = False,
 ) -> SkillBody:
     """Declare a component's method, or a function (see `dsc.components.robot`), as a skill.
 
@@ -173,6 +178,8 @@ def skill(
         blocking: whether the body is a plain function that blocks, and where it runs. In a thread, the body checks its
             `BlockingCall` periodically. A process is ended instead; its arguments, outcome and component are pickled.
         after_crash: the reaction if a run is resumed and the component cannot report the action's result.
+        unlimited: whether the skill has no time limit without `within`, e.g. as it watches something. A run in
+            simulated time ends with a deadlock if nothing else can happen.
 
     Raises:
         InputError: `blocking` has an invalid value.
@@ -193,7 +200,7 @@ def skill(
             outcomes |= _reported(body, own, names)
         with refused_at(body):
             types |= parameter_types(body, own, names)
-        return Declared(types, outcomes, _CARRIED_OUT[blocking], after_crash=after_crash)(body)
+        return Declared(types, outcomes, _CARRIED_OUT[blocking], after_crash=after_crash, unlimited=unlimited)(body)
 
     return declare if body is None else declare(body)
 
@@ -293,6 +300,7 @@ def signature_of(component: str, name: str, body: SkillBody, declared: Declared)
         outcomes=declared.outcomes,
         pattern=declared.pattern,
         after_crash=declared.after_crash,
+        unlimited=declared.unlimited,
         place=_place_of(body),
     )
 

@@ -103,13 +103,20 @@ class Deployment:
             self.simulation.close()
 
     def run(
-        self, *, simulated: bool = True, speed: float = math.inf, prepare: Callable[[Sequencer], None] | None = None
+        self,
+        *,
+        simulated: bool = True,
+        speed: float = math.inf,
+        until: float | None = None,
+        prepare: Callable[[Sequencer], None] | None = None,
     ) -> Report:
         """Run the task and return the report, also if the operator ends the run with Ctrl-C.
 
         Args:
             simulated: whether time jumps from event to event; a resumed run keeps its kind of time.
             speed: simulated seconds per real second, for people who watch.
+            until: second of run time at which the run ends at the latest, see `Executive.run`; a resumed run keeps its
+                limit.
             prepare: called with the sequencer before the run starts.
 
         Raises:
@@ -126,21 +133,26 @@ class Deployment:
                 prepare(sequencer)
 
         try:
-            end = self._run(ready, simulated=simulated, speed=speed)
+            end = self._run(ready, simulated=simulated, speed=speed, until=until)
         except KeyboardInterrupt:
             end = RunEnd(finished=False, problem="the operator ended the run")
         return self._report(end, time.perf_counter() - started)
 
-    def _run(self, prepare: Callable[[Sequencer], None], *, simulated: bool, speed: float) -> RunEnd:
+    def _run(
+        self, prepare: Callable[[Sequencer], None], *, simulated: bool, speed: float, until: float | None
+    ) -> RunEnd:
         if self.resumes:
             return self.executive.resume(speed=speed, prepare=prepare)
         header, task = {**self.header(), **self._kept}, self._task
         if task.plot is not None:
             return self.executive.run(
-                task.plot, task.arguments, simulated=simulated, speed=speed, prepare=prepare, header=header
-            )
+                task.plot, task.arguments, simulated=simulated, speed=speed, until=until, prepare=prepare,
+                header=header,
+            )  # fmt: skip
         assert task.goal is not None  # noqa: S101  `deploy` requires a plot or a goal
-        return self.executive.achieve(task.goal, simulated=simulated, speed=speed, prepare=prepare, header=header)
+        return self.executive.achieve(
+            task.goal, simulated=simulated, speed=speed, until=until, prepare=prepare, header=header
+        )
 
     def header(self) -> dict[str, Any]:
         """Return the inputs that determine a run, for the first line of the trace."""

@@ -31,6 +31,7 @@ from dsc.text.plot_files import parse_plot
 from dsc.trace import Listener, Trace
 from knowledge_base.errors import InputError, SchemaError, StoreError
 from knowledge_base.journal.file import Durability, located
+from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema_compatibility import require_extension
@@ -47,6 +48,11 @@ from planning.soundness import require_parts, require_sound
 Prepare = Callable[[Sequencer], None]
 """Callback that is called before a run starts, e.g. to post events or to keep a reference to the sequencer."""
 _BUDGET = Budget()
+LONGEST_RUN = 604_800.0
+"""Seconds of simulated time, one week, after which a run ends with a problem unless `until` is given.
+
+In real time, and for an open-ended run, there is no default limit.
+"""
 
 
 class Executive:
@@ -160,6 +166,7 @@ class Executive:
         simulated: bool = True,
         speed: float = math.inf,
         open_ended: bool = False,
+        until: float | None = None,
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
     ) -> RunEnd[Outputs]:
@@ -172,6 +179,8 @@ class Executive:
             speed: simulated seconds per real second, for people who watch a run in simulated time.
             open_ended: whether an idle run waits for events from outside, e.g. from an operator. Otherwise an idle run
                 ends and reports the deadlock.
+            until: second of run time at which a run that has not ended ends with a problem. The default is
+                `LONGEST_RUN` in simulated time unless the run is open-ended, and no limit otherwise.
             prepare: called before the run starts, see `Prepare`.
             header: plain data that the store keeps with the run.
 
@@ -179,7 +188,7 @@ class Executive:
             InputError: the plot is unknown, or a parameter is missing or unknown.
             StoreError: the store cannot be written, or contains an unfinished run.
         """
-        running = self.execute(plot, arguments, open_ended=open_ended, prepare=prepare, header=header)
+        running = self.execute(plot, arguments, open_ended=open_ended, until=until, prepare=prepare, header=header)
         return run_simulated(running, speed=speed) if simulated else run_real(running)
 
     async def execute(
@@ -188,6 +197,7 @@ class Executive:
         arguments: Mapping[str, Any] | None = None,
         *,
         open_ended: bool = False,
+        until: float | None = None,
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
     ) -> RunEnd[Outputs]:
@@ -196,8 +206,10 @@ class Executive:
         The loop determines whether time is real, or simulated by `run_simulated`. For the arguments see `run`.
         """
         clock = LoopClock()
-        store = self._run_store({**(header or {}), "simulated": clock.simulated, "open_ended": open_ended})
-        sequencer, planning = self._wired(clock, 0, store, open_ended=open_ended)
+        until = _limit(until, bounded=clock.simulated and not open_ended)
+        how = {"simulated": clock.simulated, "open_ended": open_ended, "until": until}
+        store = self._run_store({**(header or {}), **how})
+        sequencer, planning = self._wired(clock, 0, store, open_ended=open_ended, until=until)
         if prepare is not None:
             prepare(sequencer)
         return await _to_its_end(sequencer.run(plot, arguments), planning, clock)
@@ -240,6 +252,7 @@ class Executive:
         simulated: bool = True,
         speed: float = math.inf,
         open_ended: bool = False,
+        until: float | None = None,
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
     ) -> RunEnd:
@@ -255,6 +268,7 @@ class Executive:
             simulated: see `run`.
             speed: see `run`.
             open_ended: see `run`.
+            until: see `run`.
             prepare: see `run`.
             header: see `run`.
 
@@ -265,7 +279,14 @@ class Executive:
         budget = _budget(seconds, replans)
         arguments = {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
         return self.run(
-            ACHIEVE, arguments, simulated=simulated, speed=speed, open_ended=open_ended, prepare=prepare, header=header
+            ACHIEVE,
+            arguments,
+            simulated=simulated,
+            speed=speed,
+            open_ended=open_ended,
+            until=until,
+            prepare=prepare,
+            header=header,
         )
 
     def _taken_up(self) -> tuple[RunStore, Kept]:
@@ -279,22 +300,23 @@ class Executive:
             for listener in self._listeners:
                 listener(record)
         clock = LoopClock(kept.time)
-        open_ended = bool(kept.run.header["open_ended"])
-        sequencer, planning = self._wired(clock, kept.last_record, store, open_ended=open_ended)
+        open_ended, until = bool(kept.run.header["open_ended"]), kept.run.header["until"]
+        sequencer, planning = self._wired(clock, kept.last_record, store, open_ended=open_ended, until=until)
         if prepare is not None:
             prepare(sequencer)
         return await _to_its_end(sequencer.resume(kept), planning, clock)
 
     def _wired(
-        self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool
+        self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool, until: float | None
     ) -> tuple[Sequencer, PlanningComponent]:
         trace = Trace(clock.now, last)
         for listener in self._listeners:
             trace.listen(listener)
         components: list[Component] = list(self.components)
         sequencer = Sequencer(
-            self.library, self.knowledge, components, clock, trace, open_ended=open_ended, store=store
-        )
+            self.library, self.knowledge, components, clock, trace, open_ended=open_ended, store=store,
+            until=math.inf if until is None else until,
+        )  # fmt: skip
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self._planner_for(clock), clock, trace,
             working_for=sequencer.working_for, parallel=self._parallel,
@@ -349,6 +371,15 @@ def achieve_plot() -> ActionPlot:
     """Return the plot that plans for any goal; cached, because plots are immutable."""
     resource = files("planning") / "plots" / "achieve.yaml"
     return parse_plot(resource.read_text(encoding="utf-8"), str(resource))
+
+
+def _limit(until: float | None, *, bounded: bool) -> float | None:
+    """Return the second at which a run ends at the latest; `None` without a limit."""
+    if until is None:
+        return LONGEST_RUN if bounded else None
+    if isinstance(until, bool) or not isinstance(until, int | float) or not until > 0:
+        raise InputError(f"`until` is a positive number of seconds, not {shown(until)}")
+    return None if until == math.inf else until
 
 
 def _budget(seconds: float, replans: int) -> Budget:

@@ -77,6 +77,14 @@ class LoopClock:
         loop = asyncio.get_running_loop()
         await (loop.settled() if isinstance(loop, SimulatedEventLoop) else asyncio.sleep(0))
 
+    def idle(self, before: float) -> asyncio.Future[None]:
+        """Return a future that resolves when nothing can happen before second `before` of simulated run time.
+
+        Then no call is ready or scheduled for an earlier time, and time is not held. In real time it never resolves.
+        """
+        loop = asyncio.get_running_loop()
+        return loop.idle(before + self._start) if isinstance(loop, SimulatedEventLoop) else loop.create_future()
+
     def hold(self) -> AbstractContextManager[None]:
         """Return a context manager that stops simulated time; real time continues."""
         loop = asyncio.get_running_loop()
@@ -145,6 +153,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         self._cancelled = 0  # an upper bound of the cancelled calls in `_due`
         self._holds = 0
         self._settling: list[asyncio.Future[None]] = []
+        self._idle: list[tuple[float, asyncio.Future[None]]] = []
         super().__init__(_IdleSelector(self._go_on, self._until_jump, self._advance))
 
     def time(self) -> float:
@@ -188,6 +197,12 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         waits = self.create_future()
         self._settling.append(waits)
         await waits
+
+    def idle(self, before: float) -> asyncio.Future[None]:
+        """Return a future that resolves when no call is ready or scheduled before that time, and time is not held."""
+        waits = self.create_future()
+        self._idle.append((before, waits))
+        return waits
 
     @contextmanager
     def hold(self) -> Iterator[None]:
@@ -234,7 +249,21 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         for waits in settling:
             if not waits.done():
                 waits.set_result(None)
-        return bool(settling) or (not self._holds and self._jump())
+        if settling or self._holds:
+            return bool(settling)
+        return self._is_idle() or self._jump()
+
+    def _is_idle(self) -> bool:
+        """Resolve the futures of `idle` before whose time nothing is scheduled; return whether there are any."""
+        if not self._idle:
+            return False
+        self._drop_cancelled()
+        next_due = self._due[0].timer.when() if self._due else math.inf
+        idle = [waits for before, waits in self._idle if before <= next_due and not waits.done()]
+        self._idle = [one for one in self._idle if not one[1].done() and one[1] not in idle]
+        for waits in idle:
+            waits.set_result(None)
+        return bool(idle)
 
     def _drop_cancelled(self) -> None:
         while self._due and self._due[0].timer.cancelled():

@@ -118,6 +118,11 @@ class Dispatcher:
         """
         return self.timers.waiting or any(math.isfinite(one.due) for one in self._running.values())
 
+    @property
+    def watching(self) -> bool:
+        """Whether a skill without a time limit is running, which may answer at any time, or never."""
+        return any(one.signature.unlimited for one in self._running.values())
+
     def dispatch_all(self, outputs: Iterable[steps.Output]) -> None:
         """Execute the outputs of a macrostep.
 
@@ -314,7 +319,7 @@ class Dispatcher:
     def _start(self, start: steps.Start, interrupted: InterruptedSkill | None = None) -> None:
         component = self.component(start.component)
         signature = component.skills().get(start.skill, UNKNOWN_SKILL)
-        within = start.within or (math.inf if signature.pattern == "event" else DEFAULT_WITHIN)
+        within = start.within or (math.inf if signature.unlimited or signature.pattern == "event" else DEFAULT_WITHIN)
         due = within + (self._clock.now() if interrupted is None else interrupted.asked)
         raises = component.device_errors
         running = RunningSkill(

@@ -36,13 +36,17 @@ class Inbox:
     def put(self, message: Message) -> None:
         """Append a message; call it in the loop's own thread."""
         self.waiting.append(message)
-        if self._arrival is not None and not self._arrival.done():
-            self._arrival.set_result(None)
+        self.wake()
 
     def arrival(self) -> asyncio.Future[None]:
         """Return a future that resolves when the next message arrives."""
         self._arrival = asyncio.get_running_loop().create_future()
         return self._arrival
+
+    def wake(self) -> None:
+        """Let the reader look again, although no message has arrived."""
+        if self._arrival is not None and not self._arrival.done():
+            self._arrival.set_result(None)
 
     def rearrange(self, order: Callable[[Iterable[Message]], Iterable[Message]]) -> None:
         """Replace the waiting messages by the result of `order`."""

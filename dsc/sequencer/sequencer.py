@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
@@ -91,6 +92,7 @@ class Sequencer:
             such a run ends with a problem.
         store: keeps the run, so that the run can resume after a crash; the store must belong to `knowledge`.
         part_of: a prefix of the action ids that components receive: an id from the run of which this run is a part.
+        until: second of run time at which a run that has not ended ends with a problem; `math.inf` means never.
 
     Attributes:
         library: all plots that the run may use.
@@ -112,6 +114,7 @@ class Sequencer:
         open_ended: bool = False,
         store: RunStore | None = None,
         part_of: str = "",
+        until: float = math.inf,
     ) -> None:
         message_checks.require_parts(library, knowledge, clock, trace, store)
         self.library = library
@@ -125,6 +128,7 @@ class Sequencer:
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of)
         self._open_ended = open_ended
+        self._until = until
         self._last_late = store.last_late if store is not None else 0
         self._before_events: list[Callable[[], Awaitable[None]]] = []
 
@@ -257,6 +261,7 @@ class Sequencer:
         # The tracer subscribes before skills do, so that consequences of a change are recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
         livelock = LivelockGuard(self.clock) if self.clock.simulated else None
+        limit = self.clock.call_at(self._until, self._expire) if math.isfinite(self._until) else None
         try:
             await begin()
             while not machine.state.finished and reactor.problem is None:
@@ -264,7 +269,8 @@ class Sequencer:
                     if self._is_deadlock():
                         reactor.problem = self._deadlock()
                         break
-                    await inbox.arrival()
+                    await self._news()
+                    continue
                 for wait in self._before_events:
                     await wait()
                 message = inbox.waiting.popleft()
@@ -278,6 +284,8 @@ class Sequencer:
             self._keep_end()
             raise
         finally:
+            if limit is not None:
+                limit.cancel()
             try:
                 self._leave()
             finally:
@@ -294,6 +302,26 @@ class Sequencer:
         )  # fmt: skip
         self._keep_end()
         return end
+
+    async def _news(self) -> None:
+        """Wait for the next message, or for the end of the run.
+
+        A skill that only watches, such as the monitor of a plan, ends in a deadlock if nothing else can happen.
+        """
+        arrival = self._inbox.arrival()
+        if self._open_ended or self.dispatcher.waiting or not self.dispatcher.watching:
+            await arrival
+            return
+        idle = self.clock.idle(self._until)
+        await asyncio.wait([arrival, idle], return_when=asyncio.FIRST_COMPLETED)
+        idle.cancel()
+        if not arrival.done():
+            self._reactor.problem = self._deadlock()
+
+    def _expire(self) -> None:
+        reactor = self._reactor
+        reactor.problem = reactor.problem or f"the run has not ended within {self._until:,.10g} s of run time (until)"
+        self._inbox.wake()
 
     def _keep_end(self) -> None:
         if self.store is not None and self.store.begun and not self.store.lost:
@@ -448,6 +476,6 @@ class Sequencer:
 
         Periods that have all changed nothing will never change anything.
         """
-        if self._open_ended or self.dispatcher.waiting:
+        if self._open_ended or self.dispatcher.waiting or self.dispatcher.watching:
             return False
         return self.dispatcher.timers.periods <= self._reactor.in_vain

@@ -74,6 +74,10 @@ def run_command(
         float | None,
         typer.Option(metavar="X", help="Simulated seconds per real second, to watch a run.  [default: no limit]"),
     ] = None,
+    until: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="End at this second of run time.  [default: a week of simulated time]"),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the report as one JSON object.")] = False,
     trace: Annotated[
         Path | None, typer.Option(help="Write every record to this file (JSON lines); - is standard output.")
@@ -112,7 +116,7 @@ def run_command(
     if resume is not None:
         beginning = {
             "--goal": goal, "--plot": plot, "--with": with_, "--scenario": scenario, "--seed": seed,
-            "--faults": faults, "--store": store, "--profile": profile,
+            "--faults": faults, "--store": store, "--profile": profile, "--until": until,
         }  # fmt: skip
         given = [name for name, value in beginning.items() if value is not None] + ["--real-time"] * real_time
         if given:
@@ -122,7 +126,7 @@ def run_command(
         bundle = _bundle(target)
         deployed = _deployed(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
                              durability, target, planner)  # fmt: skip
-    follow = partial(_followed, deployed, simulated=not real_time, speed=inf if speed is None else speed,
+    follow = partial(_followed, deployed, simulated=not real_time, speed=inf if speed is None else speed, until=until,
                      quiet=json or quiet, trace=output)  # fmt: skip
     with deployed:
         if not view:
@@ -247,6 +251,7 @@ def _followed(
     *,
     simulated: bool,
     speed: float,
+    until: float | None,
     quiet: bool,
     trace: Output | None,
     prepare: Callable[[Sequencer], None] | None = None,
@@ -276,7 +281,7 @@ def _followed(
             deployed.executive.listen(PlainProgress(typer.echo))
         else:
             stack.enter_context(redirect_stdout(sys.stderr))
-        report = deployed.run(simulated=simulated, speed=speed, prepare=prepare)
+        report = deployed.run(simulated=simulated, speed=speed, until=until, prepare=prepare)
     if not quiet:
         typer.echo("")  # between the progress and the report
     return report

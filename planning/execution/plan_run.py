@@ -69,7 +69,7 @@ class Failure:
 class Attempt:
     """History of failures and answers for one goal, over all plans for that goal.
 
-    The history ends when the goal is reached or given up. An interruption, e.g. by a handler, does not end it.
+    The history ends when the goal is reached or abandoned. An interruption, e.g. by a handler, does not end it.
 
     Attributes:
         unmet: the number of false parts of the goal at the beginning.
@@ -377,7 +377,7 @@ class PlanRuns:
         self._named = 0
 
     def interrupted(self, task: str) -> Attempt | None:
-        """Return the attempt at a task that has neither reached nor given up its goal."""
+        """Return the attempt at a task that has neither reached nor abandoned its goal."""
         return self._attempts.get(task)
 
     def attempt(self, task: str, unmet: int) -> Attempt:
@@ -395,7 +395,7 @@ class PlanRuns:
                 self.conclude(run.task)
 
     def conclude(self, task: str) -> None:
-        """End the attempt at a task, since its goal is reached or given up."""
+        """End the attempt at a task, since its goal is reached or abandoned."""
         self._attempts.pop(task, None)
 
     def new_name(self) -> str:

@@ -191,7 +191,7 @@ class PlanningComponent(Component):
         self._conclude(plan)
         return GoalHolds()
 
-    @skill(after_crash="repeat")
+    @skill(after_crash="repeat", unlimited=True)
     async def monitor(self, call: SkillCall, plan: str) -> Monitored:
         """Monitor a plan until another plan replaces it, its goal holds, or it no longer leads to the goal.
 
@@ -208,7 +208,7 @@ class PlanningComponent(Component):
             self._conclude(plan)
         return outcome
 
-    @skill(after_crash="repeat")
+    @skill(after_crash="repeat", unlimited=True)
     async def hold(self, call: SkillCall[Held], plan: str, step: int) -> Withdrawn:
         """Report `held` when no further step of the plan may begin, since a successor follows the running steps.
 

@@ -30,8 +30,6 @@ from planning.ordering.partial_order import PartialOrder
 FINISHED = "finished"
 HELD = "held"
 """The variable of the plot that prevents further steps, since another plan replaces them."""
-MOST_WATCHED = 86400
-"""The time limit, in seconds, for the call of `planner.hold`, since every call needs a limit."""
 _HELD = Comparison("=", Variable(HELD), Constant(value=True))
 NOT_OBSERVED = "not observed: "
 """Beginning of the reason if the effects of a step do not hold in time."""
@@ -120,7 +118,7 @@ class Writer:
         state: dict[str, Any] = {"about": step.text, **step.content, "on": {"done": done}}
         if self._plan is not None:
             arguments = {"plan": self._plan, "step": number}
-            listen = {"trigger": "planner.hold", "with": arguments, "within": MOST_WATCHED}
+            listen = {"trigger": "planner.hold", "with": arguments}
             state["entry"] = [{"set": f"planner.{self._plan}", "to": number}, listen]
             state["on"]["held"] = {"assign": {HELD: True}}
             if lane.mark:
