@@ -267,6 +267,13 @@ class MachineState(NamedTuple):
         found = [] if self.root is None else _activated(self.root, "", serial)
         return next(iter(found), None)
 
+    def plot_of(self, path: str) -> ActionPlot | None:
+        """Return the plot of the state with this path; `None` if no such plot is running."""
+        frame = self.root
+        for host in path.split("/")[:-1]:
+            frame = None if frame is None else frame.children.get(host)
+        return None if frame is None else frame.compiled.plot
+
     def activations_inside(self, serial: int) -> frozenset[int]:
         """Return `serial` and the serial numbers of activations inside its state; empty if the state is not active."""
         for frame in self.root.frames() if self.root else ():

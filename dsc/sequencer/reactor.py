@@ -16,8 +16,8 @@ from dsc.engine.steps import NO_CHANGE, Cancel, Output, SendLater, SetParameter,
 from dsc.errors import RunawayError
 from dsc.events import EVERY, PROGRAMMING_ERROR, SKILL_FAILURES, Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
-from dsc.model.plot import ActionPlot
 from dsc.runs.kept import Kept
+from dsc.sequencer.phase_watch import PhaseWatch, described
 from dsc.sequencer.step_tracing import StepTracer
 from dsc.trace import Trace
 from knowledge_base.errors import InputError
@@ -52,7 +52,10 @@ class Reactor:
         listeners: functions that are called with each macrostep, before its actions are dispatched.
     """
 
-    def __init__(self, library: Library, knowledge: KnowledgeBase, trace: Trace) -> None:
+    def __init__(
+        self, library: Library, knowledge: KnowledgeBase, trace: Trace, phases: PhaseWatch | None = None
+    ) -> None:
+        self._phases = phases or PhaseWatch()
         self.library = library
         self.knowledge = knowledge
         self.machine = Machine(library)
@@ -99,8 +102,10 @@ class Reactor:
             InputError: the plot is unknown, or a parameter is missing or unknown.
         """
         self.machine.state = MachineState(serials=serials)
+        began = self._phases.timer()
         try:
             step = self.machine.start(plot, arguments, KnowledgeSituation(self.knowledge, self.library))
+            self._phases.look(step, began)
         except RunawayError as error:
             self.problem = str(error)
             return ()
@@ -114,8 +119,9 @@ class Reactor:
         """Execute the macrostep for a message, and return its outputs; an error sets `problem` instead."""
         try:
             event = self._received(message)
-            before = self.machine.state
+            before, began = self.machine.state, self._phases.timer()
             step = self.machine.send(event, KnowledgeSituation(self.knowledge, self.library))
+            self._phases.look(step, began)
             said = message.message if isinstance(message, LateMessage) else message
             if isinstance(said, ParameterMessage) and not said.of_plot:
                 step = step._replace(output=(SetParameter(said.owner, said.name, said.value), *step.output))
@@ -282,15 +288,7 @@ class Reactor:
         if caller is not None:
             skill = f"{message.start.component}.{message.start.skill}"
             whose = f": {event.attributes['reason']}" if event.name in SKILL_FAILURES else f" of {skill}"
-            self.problem = f"no transition handles '{event.name}'{whose}; the caller is {_described(*caller)}"
-
-
-def _described(path: str, plot: ActionPlot) -> str:
-    name = path.rsplit("/", 1)[-1]
-    form = next((form for one, _, form in plot.walk() if one == name), ())
-    place = plot.place(form)
-    where = f" ({place})" if place is not None and place.source else ""
-    return f"state '{path}' of plot '{plot.name}'{where}"
+            self.problem = f"no transition handles '{event.name}'{whose}; the caller is {described(*caller)}"
 
 
 def _is_vain(step: Step) -> bool:

@@ -24,6 +24,7 @@ from dsc.sequencer import message_checks
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.inbox import Inbox, LivelockGuard
+from dsc.sequencer.phase_watch import PhaseWatch
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.recovery import recover, require_components
 from dsc.sequencer.watchdog import Watchdog
@@ -93,6 +94,7 @@ class Sequencer:
         store: keeps the run, so that the run can resume after a crash; the store must belong to `knowledge`.
         part_of: a prefix of the action ids that components receive: an id from the run of which this run is a part.
         until: second of run time at which a run that has not ended ends with a problem; `math.inf` means never.
+        phases: reports coordination phases that take long.
 
     Attributes:
         library: all plots that the run may use.
@@ -115,12 +117,13 @@ class Sequencer:
         store: RunStore | None = None,
         part_of: str = "",
         until: float = math.inf,
+        phases: PhaseWatch | None = None,
     ) -> None:
         message_checks.require_parts(library, knowledge, clock, trace, store)
         self.library = library
         self.knowledge = knowledge
         self.trace = trace or Trace(clock.now)
-        self._reactor: Reactor = Reactor(library, knowledge, self.trace)
+        self._reactor: Reactor = Reactor(library, knowledge, self.trace, phases)
         self.clock = clock
         self.store = store
         if store is not None:
