@@ -319,7 +319,7 @@ class Executive:
         )  # fmt: skip
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self._planner_for(clock), clock, trace,
-            working_for=sequencer.working_for, parallel=self._parallel,
+            components=sequencer.dispatcher.components, working_for=sequencer.working_for, parallel=self._parallel,
             shared=[component.name for component in components if component.concurrent],
             foresight=self._foresight,
         )  # fmt: skip

@@ -131,7 +131,7 @@ class Monitoring:
             case Shorter(steps):
                 outcome = self._shorten(steps)
             case StepEnded():
-                run.attempt.disturbances = 0
+                run.attempt.completed()
                 outcome = self._replaced("another plan takes its place")
             case NotFound():
                 outcome = _invalid("", news.reason, "earlier")
@@ -185,7 +185,7 @@ class Monitoring:
         remaining = len(progress.remaining)
         progress.begin(number)
         if len(progress.remaining) < remaining:
-            self._run.attempt.disturbances = 0
+            self._run.attempt.completed()
         if self._monitor is not None:
             self._monitor.look(OWN_STEPS)
 

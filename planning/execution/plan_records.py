@@ -96,6 +96,10 @@ class PlanRecords:
         """Record that one of the running steps failed, and that a new plan is needed."""
         self._trace.record("plan.failed", plot=name, steps=[str(step) for step in steps], why=why)
 
+    def waits(self, name: str, component: str, seconds: float) -> None:
+        """Record that a failed plan waits for a component, for at most some seconds."""
+        self._trace.record("plan.waits", plan=name, component=component, seconds=seconds)
+
     def gave_up(self, name: str, reason: str) -> None:
         """Record that the robot abandons the goal of the plan."""
         self._trace.record("plan.gave_up", plot=name, reason=reason)

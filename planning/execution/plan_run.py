@@ -78,11 +78,13 @@ class Attempt:
         resumed: the number of times that a plan resumed at each step.
         disturbances: the number of plans that an interruption, or changes by another author, ended since a step was
             last completed.
+        outages: the number of skills that failed with `skill_error` since a step was last completed.
     """
 
     unmet: int = 0
     replans: int = 0
     disturbances: int = 0
+    outages: int = 0
     failures: Counter[Failure] = field(default_factory=Counter)
     resumed: Counter[PlanStep] = field(default_factory=Counter)
 
@@ -94,6 +96,7 @@ class Attempt:
             "unmet": self.unmet,
             "replans": self.replans,
             "disturbances": self.disturbances,
+            "outages": self.outages,
             "failures": failures,
             "resumed": resumed,
         }
@@ -105,15 +108,22 @@ class Attempt:
             Failure(PlanStep.from_json(step), why, where): often for step, why, where, often in form["failures"]
         }
         resumed = {PlanStep.from_json(step): often for step, often in form["resumed"]}
-        return cls(form["unmet"], form["replans"], form["disturbances"], Counter(failures), Counter(resumed))
+        return cls(
+            form["unmet"], form["replans"], form["disturbances"], form["outages"], Counter(failures), Counter(resumed)
+        )
 
-    def failed(self, failure: Failure, *, stands: bool, others: bool) -> EscalationStep:
+    def completed(self) -> None:
+        """Note that a step was completed."""
+        self.disturbances = self.outages = 0
+
+    def failed(self, failure: Failure, *, stands: bool, others: bool, outage: bool = False) -> EscalationStep:
         """Count a failure, and return the next escalation step for it.
 
         Args:
             failure: the failed step, the reason and the situation.
             stands: whether the plan, with the failed step, still leads to the goal.
             others: whether another candidate implements the failed step.
+            outage: whether the device has failed and not the step, so that further plans may succeed later.
         """
         self.failures[failure] += 1
         if stands and self.resumed[failure.step] < MOST_RESUMED:
@@ -125,7 +135,9 @@ class Attempt:
         else:
             answers = [EscalationStep.REPLAN, EscalationStep.EXCLUDE]
         tried = self.failures[failure] - 1
-        return answers[tried] if tried < len(answers) else EscalationStep.GIVE_UP
+        if tried < len(answers):
+            return answers[tried]
+        return EscalationStep.REPLAN if outage else EscalationStep.GIVE_UP
 
     def interrupted(self, step: PlanStep | None) -> EscalationStep:
         """Return the escalation step for a plan that its monitor stopped; the plan could resume at `step`, if any."""

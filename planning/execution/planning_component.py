@@ -18,6 +18,7 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.syntax.text import parse_condition
 from planning.execution.monitoring import Monitoring
+from planning.execution.outages import Outages
 from planning.execution.outcomes import (
     GaveUp,
     GoalHolds,
@@ -63,6 +64,7 @@ class PlanningComponent(Component):
         trace: receives the records `plan.*`.
         parallel: whether independent steps are executed in parallel.
         shared: names of components that can execute several skills concurrently.
+        components: the components of the run by name, for whose return a failed plan waits.
         working_for: returns, for the id of an action, the names of the components that execute skills for the state
             that started the action. Their observations count as effects of the running step, and are validated at the
             step's end.
@@ -80,6 +82,7 @@ class PlanningComponent(Component):
         planner: Planner,
         clock: LoopClock,
         trace: Trace,
+        components: Mapping[str, Component],
         working_for: Callable[[str], frozenset[str]],
         *,
         foresight: Foresight | None = None,
@@ -94,6 +97,7 @@ class PlanningComponent(Component):
         self._records = PlanRecords(trace)
         self._search = Search(domain, knowledge, planner, clock, self._records, foresight)
         self._runs = PlanRuns()
+        self._outages = Outages(components, self._records)
         plotting = Plotting(self._derivation, library, knowledge, parallel, {self.name, *shared})
         self._choices = Choices(self._derivation.domain, library)
         self._escalation = Escalation(plotting, self._runs, self._choices, self._search, self._records)
@@ -114,6 +118,7 @@ class PlanningComponent(Component):
         A rule that leaves a plan for another state ends the attempt, since the plot bounds how often it does that.
         """
         self._choices.note(step)
+        self._outages.note(step)
         for one in step.output:
             if isinstance(one, Start) and (one.component, one.skill) == (self.name, "monitor"):
                 self._runs.required(one.arguments["plan"]).monitored_for = one.activation
@@ -127,6 +132,7 @@ class PlanningComponent(Component):
             **self._runs.remember(),
             "excluded": self._search.remember(),
             "chosen": self._choices.remember(),
+            "errors": self._outages.remember(),
             "answers": {one: [answer.event, dict(answer.attributes)] for one, answer in self._answers.items()},
         }
 
@@ -135,6 +141,7 @@ class PlanningComponent(Component):
         self._runs.recall(memory, self._derivation.at(self._knowledge))
         self._search.recall(memory["excluded"])
         self._choices.recall(memory["chosen"])
+        self._outages.recall(memory["errors"])
         self._answers = {one: Outcome(event, attributes) for one, (event, attributes) in memory["answers"].items()}
 
     async def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
@@ -221,12 +228,15 @@ class PlanningComponent(Component):
         return await run.hold(step, call.report)
 
     @skill(after_crash="repeat")
-    async def repair(self, call: SkillCall, plan: str, why: str) -> Repaired:  # noqa: ARG002
+    async def repair(self, call: SkillCall, plan: str, why: str) -> Repaired:
         """Return the answer to the failure of a plan, see `planning.execution.plan_run.EscalationStep`.
 
-        `plan_found` contains a plan that needs no planner call; `replan` requests a planner call.
+        `plan_found` contains a plan that needs no planner call; `replan` requests a planner call. After a failure of a
+        device, the answer comes when the device is back, or after a pause.
         """
-        return self._escalation.answer(self._runs.required(plan), why)
+        run = self._runs.required(plan)
+        outage = await self._outages.over(run, why, call.clock)
+        return self._escalation.answer(run, why, outage=outage)
 
     async def _planned(
         self, call: SkillCall, goal: str, holder: str, seconds: float, replans: int, before: PlanRun | None

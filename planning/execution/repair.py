@@ -151,8 +151,8 @@ class Escalation:
     def _knowledge(self) -> KnowledgeBase:
         return self.plotting.knowledge
 
-    def answer(self, run: PlanRun, why: str) -> Repaired:
-        """Handle the failure of a plan.
+    def answer(self, run: PlanRun, why: str, *, outage: bool = False) -> Repaired:
+        """Handle the failure of a plan; `outage` tells whether a device has failed, and not the step.
 
         Returns:
             The outcome of the skill `repair`.
@@ -167,9 +167,9 @@ class Escalation:
         end = self._end(run)
         failed = None if run.state is PlanState.STOPPED else self._failed_step(progress)
         if end is not None and (run.successor is not None if failed is None else failed not in end):
-            attempt.disturbances = 0
+            attempt.completed()
             return self._continued(run, end, why)
-        step, choice = self._chosen(run, failed, end, why)
+        step, choice = self._chosen(run, failed, end, why, outage=outage)
         if step is EscalationStep.REPLAN and run.state is PlanState.MONITORED:
             self.records.failed(run.name, progress.steps_of(progress.running), why)
         if end is not None and step in (EscalationStep.RESUME, EscalationStep.OTHER_CANDIDATE):
@@ -219,7 +219,7 @@ class Escalation:
         return shortest_end(run.successor.steps, progress.domain, world, progress.goal)
 
     def _chosen(
-        self, run: PlanRun, failed: PlanStep | None, end: tuple[PlanStep, ...] | None, why: str
+        self, run: PlanRun, failed: PlanStep | None, end: tuple[PlanStep, ...] | None, why: str, *, outage: bool
     ) -> tuple[EscalationStep, str | None]:
         """Return the escalation step, and the plot that was chosen for the failed plan step."""
         attempt, progress = run.attempt, run.progress
@@ -228,7 +228,7 @@ class Escalation:
         choice = self.choices.of(failed)
         others = choice is not None and len(implementing(failed, self.plotting.library)) > 1
         failure = Failure(failed, why, situation(progress.domain, self._knowledge, progress.goal))
-        return attempt.failed(failure, stands=end is not None, others=others), choice
+        return attempt.failed(failure, stands=end is not None, others=others, outage=outage), choice
 
     def _failed_step(self, progress: PlanProgress) -> PlanStep | None:
         """Return the running step; `None` if its expected effects hold, or if several steps are running."""

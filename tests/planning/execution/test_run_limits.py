@@ -8,7 +8,8 @@ import math
 import pytest
 from dsc_crashes import copied
 
-from dsc import Component, Event, Outcome, SkillCall, parse_plot, run_simulated, skill
+from dsc import Component, Event, Outcome, Sequencer, SkillCall, parse_plot, run_simulated, skill
+from dsc.trace import Record
 from knowledge_base import Delta, InputError, fact
 from planning import Executive
 from planning.executive import LONGEST_RUN
@@ -85,7 +86,7 @@ def test_a_run_ends_at_its_limit_and_names_it():
 
 @pytest.mark.parametrize("until", [None, 5_000.0])
 def test_a_plot_that_goes_round_ends_too(until):
-    records = []
+    records: list[Record] = []
     with office(APPROVE, SIGN, ROUND) as robot:
         robot.listen(records.append)
         end = robot.run("round", until=until)
@@ -96,7 +97,7 @@ def test_a_plot_that_goes_round_ends_too(until):
 
 def test_an_open_ended_run_has_no_limit_of_its_own():
     async def main(robot, **how):
-        sequencers = []
+        sequencers: list[Sequencer] = []
         run = asyncio.ensure_future(robot.execute("round", open_ended=True, prepare=sequencers.append, **how))
         await asyncio.sleep(2 * LONGEST_RUN)
         ended = run.done()
@@ -130,7 +131,7 @@ def test_a_limit_is_a_positive_number(until):
 
 
 def test_a_plan_that_waits_for_what_cannot_come_ends_at_once():
-    records = []
+    records: list[Record] = []
     with office(HEARD, SIGN) as robot:
         robot.listen(records.append)
         end = robot.achieve("(signed)")
