@@ -176,11 +176,12 @@ class _Robot:
     def findings(self) -> list[Finding]:
         """Return the findings of the validator; other errors go to the list of `collecting`."""
         library = Library([*self._plots, achieve_plot()])
-        skills, declared = self._skills(), self._declared()
+        skills, declared, exclusive = self._skills(), self._declared(), self._exclusive()
         schema = None if self._domain is None else self._domain.schema
         found: list[Finding] = []
         for plot in self._plots:
-            found += validate_plot(plot, library, schema, skills, declared, thorough=True) or review_plot(plot, library)
+            mistakes = validate_plot(plot, library, schema, skills, declared, thorough=True)
+            found += mistakes or review_plot(plot, library, exclusive)
         found = without_consequences(found, self._broken_files())
         if self._domain is not None:
             found += without_consequences(check_implementations(library, self._domain), self._broken_files())
@@ -194,6 +195,16 @@ class _Robot:
             return None
         own = [skill for component in self._components for skill in component.skills().values()]
         return [*own, *signatures(PlanningComponent, PlanningComponent.name).values()]
+
+    def _exclusive(self) -> frozenset[str]:
+        """Return the skills of the components that execute one skill at a time, as `component.skill`."""
+        own = (
+            one
+            for component in self._components or ()
+            if not component.concurrent
+            for one in component.skills().values()
+        )
+        return frozenset(f"{one.component}.{one.name}" for one in own if one.pattern == "skill")
 
     def _declared(self) -> dict[str, Mapping[str, Parameter]] | None:
         if self._components is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, combinations, groupby, islice
 
 from dsc.dynamic.library import Library
@@ -16,6 +16,7 @@ from dsc.model.rules import CONTINUE, ENTER, Handler, Rule
 from dsc.model.states import CompositeState, DynamicState, State
 from dsc.validation.library import MAX_FINDINGS
 from dsc.validation.subject import Subject
+from dsc.validation.turns import waiting_parts
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.checking.contradiction import contradictory, implied, subjects
 from knowledge_base.language.evaluation.lookups import conjuncts
@@ -148,12 +149,19 @@ def _comparisons(parts: Iterable[Expression | Term]) -> Iterator[Comparison]:
             yield from _comparisons(parts_of(part))
 
 
-def review_plot(plot: ActionPlot, library: Library) -> list[Finding]:
-    """Return at most `MAX_FINDINGS` warnings about a plot for which `validate_plot` returns no finding."""
+def review_plot(plot: ActionPlot, library: Library, exclusive: Collection[str] = ()) -> list[Finding]:
+    """Return at most `MAX_FINDINGS` warnings about a plot for which `validate_plot` returns no finding.
+
+    Args:
+        plot: the plot.
+        library: the plots that it may use.
+        exclusive: the skills, as `component.skill`, of the components that execute one skill at a time.
+    """
     if plot.dialect != "dsc":
         return []
     subject = Subject(plot, library)
-    checks = (_rules(subject), _handlers(subject), _transitions(subject), _candidates(subject))
+    checks = (_rules(subject), _handlers(subject), _transitions(subject), _candidates(subject),
+              waiting_parts(subject, exclusive))  # fmt: skip
     return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
 
 

@@ -530,8 +530,8 @@ RULE_IN = {"Finding": 1, "finding": 1, "caught": 2, "_unbound": 3, "_untaken": 4
 def test_every_rule_of_the_validator_is_tested():
     sources = Path(__file__).parents[3] / "dsc" / "validation"
     trees = [
-        ast.parse(file.read_text()) for file in sources.glob("*.py") if file.name != "review.py"
-    ]  # see test_review
+        ast.parse(file.read_text()) for file in sources.glob("*.py") if file.name not in {"review.py", "turns.py"}
+    ]  # see test_review and test_turns_review
     calls = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)]
     made = [(getattr(call.func, "attr", getattr(call.func, "id", "")), call.args) for call in calls]
     rules = [arguments[RULE_IN[name]] for name, arguments in made if name in RULE_IN]

@@ -37,14 +37,15 @@ class Base(Component):
     def __init__(self, since, until, *, lost=True):
         super().__init__()
         self.since, self.until, self.lost = since, until, lost
-        self.clock = LoopClock
+        self.clock: LoopClock | None = None
         self.begun: list[float] = []
 
     def away(self):
+        assert self.clock is not None
         return self.since <= self.clock.now() < self.until
 
     async def start(self):
-        self.clock = LoopClock(0.0) if self.clock is LoopClock else self.clock
+        self.clock = self.clock or LoopClock()
         if self.lost and self.away():
             raise OSError("no answer")
 
