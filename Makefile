@@ -8,7 +8,7 @@ BENCH  := .venv-bench
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: mistakes lively help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
+.PHONY: mistakes lively soak-robots help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
@@ -70,6 +70,9 @@ sweep-files: $(VENV)/.test   ## every command with every kind of file that it is
 
 soak: $(VENV)/.run   ## simulated runs of the clean-up table with faults and crashes: does every promise hold? (RUNS=N FIRST=SEED FAULTS=P)
 	$(BIN)/python benchmarks/soak.py --runs $(or $(RUNS),1000) --first $(or $(FIRST),0) --faults $(or $(FAULTS),0.1)
+
+soak-robots: $(VENV)/.test   ## random small robots with faults, changes by others, priorities and kills: is every promise kept? (RUNS=N FIRST=SEED)
+	$(BIN)/python tests/support/random_robots.py --runs $(or $(RUNS),2000) --first $(or $(FIRST),0)
 
 lively: $(VENV)/.test   ## robots in a world that changes every half second: is each needed step carried out once? (HOURS=H SEED=N)
 	$(BIN)/python tests/support/lively_world.py --hours $(or $(HOURS),1) --seed $(or $(SEED),0)

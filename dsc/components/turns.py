@@ -86,7 +86,9 @@ class Turns:
         """Give the turn of a free component to the first claim by rank; otherwise let the first claim preempt."""
         if not self.waiting:
             return
-        first = max(self.waiting, key=lambda claim: claim.rank[:3])  # of equals the earliest
+        first = self.waiting[0]
+        if len(self.waiting) > 1:
+            first = max(self.waiting, key=lambda claim: claim.rank[:3])  # of equals the earliest
         if self.holder is None:
             self.waiting.remove(first)
             self.holder = first

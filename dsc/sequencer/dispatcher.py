@@ -205,7 +205,11 @@ class Dispatcher:
         """End a skill whose final answer was handled; until then, its component counts as in use."""
         ended = self._running.pop(start.action_id, None)
         if ended is not None and ended.claim is not None:
-            ended.claim.leave()
+            turns = ended.claim.turns
+            if turns.holder is ended.claim and not turns.waiting:  # the common case
+                turns.holder = None
+            else:
+                ended.claim.leave()
         if start.component in self.activation.concerned:
             self.activation.look()
         component = self._components.get(start.component)

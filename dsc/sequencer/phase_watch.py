@@ -23,25 +23,25 @@ class PhaseWatch:
     Args:
         limit: seconds after which a macrostep is reported, one time for each place.
         timer: returns the present second.
+
+    Attributes:
+        limit, timer: see above.
     """
 
     def __init__(self, limit: float = LONGEST_PHASE, timer: Callable[[], float] = time.perf_counter) -> None:
-        self._limit = limit
+        self.limit = limit
         self.timer = timer
         self._reported: set[str] = set()
 
-    def look(self, step: Step, since: float) -> None:
-        """Log a warning if a macrostep that began at second `since` has taken longer than the limit."""
-        seconds = self.timer() - since
-        if seconds <= self._limit:
-            return
+    def report(self, step: Step, seconds: float) -> None:
+        """Log a warning about a macrostep that has taken longer than the limit."""
         place = _place(step)
         if place in self._reported or len(self._reported) >= _MOST_REPORTED:
             return
         self._reported.add(place)
         _LOG.warning(
             "the coordination phase of %s took %.2g s, more than %g s; move long computations into a skill",
-            place, seconds, self._limit,
+            place, seconds, self.limit,
         )  # fmt: skip
 
 

@@ -105,7 +105,8 @@ class Reactor:
         began = self._phases.timer()
         try:
             step = self.machine.start(plot, arguments, KnowledgeSituation(self.knowledge, self.library))
-            self._phases.look(step, began)
+            if self._phases.timer() - began > self._phases.limit:
+                self._phases.report(step, self._phases.timer() - began)
         except RunawayError as error:
             self.problem = str(error)
             return ()
@@ -121,7 +122,8 @@ class Reactor:
             event = self._received(message)
             before, began = self.machine.state, self._phases.timer()
             step = self.machine.send(event, KnowledgeSituation(self.knowledge, self.library))
-            self._phases.look(step, began)
+            if self._phases.timer() - began > self._phases.limit:
+                self._phases.report(step, self._phases.timer() - began)
             said = message.message if isinstance(message, LateMessage) else message
             if isinstance(said, ParameterMessage) and not said.of_plot:
                 step = step._replace(output=(SetParameter(said.owner, said.name, said.value), *step.output))

@@ -72,7 +72,7 @@ class Attempt:
     The history ends when the goal is reached or abandoned. An interruption, e.g. by a handler, does not end it.
 
     Attributes:
-        unmet: the number of false parts of the goal at the beginning.
+        unmet: the number of false parts of the goal at the last interruption; `None` without one.
         replans: the number of plans that replaced a failed plan.
         failures: the number of occurrences of each failure.
         resumed: the number of times that a plan resumed at each step.
@@ -81,7 +81,7 @@ class Attempt:
         outages: the number of skills that failed with `skill_error` since a step was last completed.
     """
 
-    unmet: int = 0
+    unmet: int | None = None
     replans: int = 0
     disturbances: int = 0
     outages: int = 0
@@ -392,8 +392,8 @@ class PlanRuns:
         """Return the attempt at a task that has neither reached nor abandoned its goal."""
         return self._attempts.get(task)
 
-    def attempt(self, task: str, unmet: int) -> Attempt:
-        """Begin and return a new attempt at a task, whose goal has `unmet` false parts."""
+    def attempt(self, task: str, unmet: int | None) -> Attempt:
+        """Begin and return a new attempt at a task, whose goal has `unmet` false parts after an interruption."""
         self._attempts.pop(task, None)
         while len(self._attempts) >= MOST_ATTEMPTS:
             del self._attempts[next(iter(self._attempts))]

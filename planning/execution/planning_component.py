@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from dsc.engine.steps import Step
     from dsc.sequencer.clock import LoopClock
     from dsc.trace import Trace
+    from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
@@ -246,8 +247,11 @@ class PlanningComponent(Component):
         if holds(now.condition(wanted), self._knowledge):
             self._runs.conclude(task)
             return GoalHolds()
-        left = sum(1 for _ in unmet(now.condition(wanted), self._knowledge))
-        attempt = self._interrupted(task, left) if before is None else before.attempt
+        left: int | None = None
+        if before is not None:
+            attempt: Attempt | None = before.attempt
+        else:
+            attempt, left = self._interrupted(task, now.condition(wanted))
         if before is None and attempt is not None and attempt.disturbances >= replans:
             self._runs.conclude(task)
             return GaveUp(reason=f"interruptions ended {replans} plans before a step was completed")
@@ -264,6 +268,7 @@ class PlanningComponent(Component):
             if attempt is None:
                 attempt = self._runs.attempt(task, left)
             elif before is None:
+                attempt.unmet = left
                 attempt.disturbances += 1
             run = PlanRun(self._runs.new_name(), wanted, progress, attempt, holder, seconds, replans, found.better)
             order, form = self._escalation.plotting.plotted(run, found.answer.plan, known)
@@ -275,10 +280,16 @@ class PlanningComponent(Component):
             self._records.replaced(before.name, run.name, found.kept)
         return self._escalation.bound(run, order, form)
 
-    def _interrupted(self, task: str, left: int) -> Attempt | None:
-        """Return the interrupted attempt at a task, unless the goal has gained a fact since its beginning."""
+    def _interrupted(self, task: str, goal: Expression) -> tuple[Attempt | None, int | None]:
+        """Return the interrupted attempt at a task, unless the goal has gained a fact since the last interruption.
+
+        The second value is the number of false parts of the goal; `None` without an interruption.
+        """
         attempt = self._runs.interrupted(task)
-        return None if attempt is None or left < attempt.unmet else attempt
+        if attempt is None:
+            return None, None
+        left = sum(1 for _ in unmet(goal, self._knowledge))
+        return (None if attempt.unmet is not None and left < attempt.unmet else attempt), left
 
     def _conclude(self, plan: str) -> None:
         run = self._runs.get(plan)
