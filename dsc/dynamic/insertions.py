@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import partial
 
-from dsc.dynamic.responses import FreshNames, Onward, Responses, States
+from dsc.dynamic.responses import FreshNames, Onward, Responses, States, again
 from dsc.dynamic.steps import Plots, Step, about_step, concerns
 from dsc.events import DONE
 from dsc.model.actions import Assign
@@ -58,6 +58,9 @@ class Insertions:
                 result.update(self._after(name, state))
         for name in [name for name, rules in self._before.items() if rules and name in states]:
             self.entrances[name] = self._in_front_of(name, {}, result)
+            if again(name) in states:
+                self.entrances[again(name)] = self.entrances[name]
+                self._leading[again(name)] = name
         waiting = list(result)
         while waiting:
             name = waiting.pop()
@@ -89,7 +92,8 @@ class Insertions:
     def _in_front_of(self, name: str, passed: Mapping[str, Term], states: States) -> str:
         """Add the connectors before a step to `states`; return the name of the first connector."""
         more: States = {}
-        last = Transition(target=name, passed=dict(passed))
+        tested = again(name) in states and not passed
+        last = Transition(target=again(name) if tested else name, passed=dict(passed))
         first = self._chain(f"{name}_before", name, self._steps[name], self._before[name], ENTER, last, more)
         self._leading.update(dict.fromkeys(more, name))
         states.update(more)
@@ -98,7 +102,8 @@ class Insertions:
     def _redirection(self, source: str, more: States) -> Redirect:
         def redirect(way: Transition) -> Mapping[str, object]:
             target = way.target
-            if target not in self.entrances or self._leading.get(source) == target:
+            leads_to = self._leading.get(source)
+            if target not in self.entrances or (leads_to is not None and target in (leads_to, again(leads_to))):
                 return {}
             if not way.passed:
                 return {"target": self.entrances[target]}

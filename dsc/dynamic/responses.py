@@ -101,8 +101,10 @@ class Responses:
             return self._wired(rule, number, name, state, DONE)
         if then == GIVE_UP:
             return [because(about, one) for one in self._wired(rule, number, name, state, GAVE_UP)]
-        target = name if then in {RETRY, REPLAN, ENTER} else then
-        return [Transition(target=target, passed=rule.do.passed)]
+        if then in {RETRY, REPLAN, ENTER}:
+            tested = again(name) in self._beside[name] and not rule.do.passed
+            return [Transition(target=again(name) if tested else name, passed=rule.do.passed)]
+        return [Transition(target=then, passed=rule.do.passed)]
 
     def _leaving(self, rule: Rule, name: str, about: str) -> Transition:
         """Return a transition from a step to the final state with which a rule ends the generated plot."""
@@ -191,6 +193,11 @@ def limit_of(rule: Rule, *, generated: bool = False) -> int | None:
 def skipped(step: str) -> str:
     """Return the name of the state that continues a generated plot after a step without waiting for its effects."""
     return f"{step}_skipped"
+
+
+def again(step: str) -> str:
+    """Return the name of the state of a generated plot that tests the conditions of a step before its next entry."""
+    return f"{step}_again"
 
 
 def reason_of(event: str) -> str:

@@ -258,6 +258,10 @@ class Dispatcher:
 
     # -- turns: one skill at a time --------------------------------------------------------------------------
 
+    async def settled(self) -> None:
+        """Wait until nothing more happens at the present simulated time; in real time, for one loop iteration."""
+        await self._clock.settled()
+
     def has_turns(self, start: steps.Start) -> bool:
         """Return whether the skill waits for its turn, since its component is not concurrent."""
         component = self._components.get(start.component)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Collection, Iterable
 
 from dsc.components.hooks import contained, reason_of
@@ -46,10 +45,10 @@ async def recover(kept: Kept, dispatcher: Dispatcher) -> None:
     for component, settings in effective.items():
         dispatcher.restore(component, settings)
     await dispatcher.outbox.all_taken()
-    begun = _begun(pending, dispatcher)
+    begun = _begun(pending, kept.number, dispatcher)
     for one in sorted(others, key=lambda one: one.place not in begun):  # stable
         _rearm(one, dispatcher, begun)
-    await asyncio.sleep(0)  # until the restored items have begun
+    await dispatcher.settled()  # answers that were due before the last macrostep precede its answers
     for one in pending[len(older) :]:
         _rearm(one, dispatcher, begun)
     dispatcher.give_turns()
@@ -67,8 +66,11 @@ def _divided(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | Sw
     return effective, others
 
 
-def _begun(pending: Iterable[Pending], dispatcher: Dispatcher) -> set[int]:
-    """Return the places of the actions that their components may have received; the others have waited for a turn."""
+def _begun(pending: Iterable[Pending], number: int, dispatcher: Dispatcher) -> set[int]:
+    """Return the places of the actions that their components may have received; the others have waited for a turn.
+
+    `number` is the number of the last macrostep.
+    """
     begun: set[int] = set()
     claims: dict[str, list[Pending]] = {}
     for one in pending:
@@ -78,9 +80,11 @@ def _begun(pending: Iterable[Pending], dispatcher: Dispatcher) -> set[int]:
             begun.add(one.place)
     for of_component in claims.values():
         with_turn = [one.place for one in of_component if one.turn is not None]
-        unmarked = [one.place for one in of_component if not one.waits]
-        # Of several new actions, none has begun: those that have to wait are marked before the first one begins.
-        begun.update(with_turn or (unmarked if len(unmarked) == 1 else ()))
+        unmarked = [one for one in of_component if not one.waits]
+        older = [one.place for one in unmarked if one.step < number]
+        # Actions that have to wait are marked before the first one begins, and before the next macrostep.
+        candidates = older or [one.place for one in unmarked]
+        begun.update(with_turn or (candidates if len(candidates) == 1 else ()))
     return begun
 
 

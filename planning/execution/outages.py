@@ -65,13 +65,13 @@ class Outages:
             return False
         pause = min(FIRST_PAUSE * 2 ** min(run.attempt.outages, 10) / 2, LONGEST_PAUSE, run.seconds)
         again = run.attempt.outages > 0
-        run.attempt.outages += 1
         if _is_failed(component):
             self._records.waits(run.name, component.name, run.seconds)
             await _restart(component, run.seconds, clock)
         elif again:
             self._records.waits(run.name, component.name, pause)
             await clock.sleep(pause)
+        run.attempt.outages += 1  # last, as a crash repeats the wait
         return True
 
 

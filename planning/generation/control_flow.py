@@ -9,6 +9,7 @@ r"""Control flows of a generated plot: sequences of steps, some of which wait fo
   the previous `after` state tests the conditions of step n.
 - The variable `held` becomes true when the planning component announces that other steps replace the plan. No step
   begins after that. Parallel steps that the planning component does not withdraw continue to their ends.
+- The state `step_n_again` exists if rules may enter step n again. It tests the conditions of the step.
 - The state `step_n_skipped` exists if rules may skip step n. It replaces `after_n` and does not wait for effects.
 """
 
@@ -18,7 +19,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dsc.dynamic.responses import skipped
+from dsc.dynamic.responses import again, skipped
 from dsc.events import GAVE_UP
 from dsc.model.rules import REPLAN
 from knowledge_base.language.syntax.expression import And, Comparison, Constant, Expression, Not, Variable
@@ -59,6 +60,7 @@ class Writer:
         lanes: the chains of steps.
         plan: the name of the plan, with which states report the begin of steps; `None` without the planning component.
         left_out: the numbers of the steps that rules may skip.
+        retried: whether rules may enter steps again.
         leading: outcomes with which rules leave the plan for another state; for each, the names of the passed data.
     """
 
@@ -70,7 +72,10 @@ class Writer:
         plan: str | None,
         left_out: Collection[int],
         leading: Mapping[str, Iterable[str]],
+        *,
+        retried: bool,
     ) -> None:
+        self._retried = retried
         self._steps = dict(enumerate(steps, start=1))
         self._left_out = left_out
         self._ends: dict[str, Mapping[str, str]] = {end: {"reason": "?reason"} for end in (REPLAN, GAVE_UP)}
@@ -96,6 +101,8 @@ class Writer:
         states: dict[str, Any] = {"before" if first is None else f"before_{first}": self._before(first, lane)}
         for number, following in zip(lane.numbers, (*lane.numbers[1:], None), strict=False):
             states[f"step_{number}"] = self._step(number, lane)
+            if self._retried and self._steps[number].needed:
+                states[again(f"step_{number}")] = self._again(number, lane)
             states[f"after_{number}"] = self._after(number, following, lane)
             if number in self._left_out:
                 states[skipped(f"step_{number}")] = self._after(number, following, lane, left_out=True)
@@ -111,6 +118,12 @@ class Writer:
         waits = self._waits[number]
         told = {"about": "waits for " + ", ".join(self._steps[other].text for _, other in waits)} if waits else {}
         return {**told, "always": self._onward(number, lane, [_is_set(flag, other) for flag, other in waits])}
+
+    def _again(self, number: int, lane: ControlFlow) -> dict[str, Any]:
+        """Return the state through which rules enter a step again."""
+        step = self._steps[number]
+        enter = _guarded({"to": f"step_{number}"}, _joined(step.needed))
+        return {"always": [enter, self._replan(lane, f"not applicable: {step.text}")]}
 
     def _step(self, number: int, lane: ControlFlow) -> dict[str, Any]:
         step = self._steps[number]

@@ -16,7 +16,7 @@ from itertools import chain, pairwise
 from dsc.dynamic.library import Library
 from dsc.events import GAVE_UP, SKILL_FAILURES
 from dsc.model.plot import ActionPlot
-from dsc.model.rules import CONTINUE, REPLAN, Rule
+from dsc.model.rules import CONTINUE, ENTER, REPLAN, RETRY, Rule
 from planning.domain import PlanningDomain
 from planning.generation.carried_steps import CarriedStep, Carrier, Usage, sketched
 from planning.generation.control_flow import FINISHED, ControlFlow, Writer, passed
@@ -105,9 +105,10 @@ def plot_of(plan: Plan, layout: Layout, name: str, *, watched: bool) -> ActionPl
     """Return the plot of a layout; with `watched`, its states report the progress to the planning component."""
     steps, lanes, rules = layout.steps, layout.lanes, layout.rules
     left_out = [n for n, step in enumerate(plan.steps, start=1) if any(_leaves_out(rule, step) for rule in rules)]
-    continuations = chain.from_iterable(rule.continuations for rule in rules)
+    continuations = tuple(chain.from_iterable(rule.continuations for rule in rules))
+    retried = any(one.then in {RETRY, ENTER} for one in continuations)
     leading = {one.outcome: dict.fromkeys(one.do.passed, "symbol") for one in continuations if one.leads_away}
-    writer = Writer(steps, layout.order, lanes, name if watched else None, left_out, leading)
+    writer = Writer(steps, layout.order, lanes, name if watched else None, left_out, leading, retried=retried)
     ends = {FINISHED: {"final": True}}
     if len(lanes) == 1:
         states = {**writer.states(lanes[0]), **ends}

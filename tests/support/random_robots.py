@@ -109,7 +109,9 @@ class Device(Component):
             what = fact(choose(self.robot.seed, action_id, "which", UNARY), step.args[0])
             if what not in (*effect.added, *effect.removed):
                 there = what in self.knowledge.facts()
-                more = {"removed": (*effect.removed, what)} if there else {"added": (*effect.added, what)}
+                more: dict[str, Any] = (
+                    {"removed": (*effect.removed, what)} if there else {"added": (*effect.added, what)}
+                )
                 effect = replace(effect, **more)
         return "done", effect
 
@@ -290,7 +292,7 @@ class RandomRobot:
     # -- the run -------------------------------------------------------------------------------------------
 
     def _change(self) -> tuple[float, Any]:
-        at = self.draw.choice((self.draw.uniform(0, 60), float(self.draw.randint(0, 40)), self.draw.randint(0, 80) / 2))
+        at = self.draw.choice((self.draw.uniform(0, 60), float(self.draw.randint(1, 40)), self.draw.randint(1, 80) / 2))
         if self.events and self.draw.random() < 0.4:
             return at, Event("ping", {"x": self.draw.choice(self.things)})
         what = self.draw.choice(self._facts())

@@ -342,3 +342,28 @@ def test_a_rule_whose_state_is_not_beside_the_goal_is_refused():
     holder = HOLDER.replace("gave_up: {to: over", "gave_up: {to: around")
     with pytest.raises(PlotError, match="the rule's way from a plan at 'all' to 'inside' crosses a border"):
         away("rules: [{on: blurred, do: {then: inside}}]", holder=holder, beside=around)
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        "{on: blurred, do: {tell: (not (lit ?event.thing)), then: retry}}",
+        "{before: show, when: (dirty ?step.thing), do: {tell: [(not (lit ?step.thing)), (not (dirty ?step.thing))], then: enter}}",
+    ],
+    ids=["retry", "enter"],
+)
+def test_a_rule_that_breaks_the_condition_of_its_step_begins_the_step_only_when_it_holds_again(rule):
+    """The lamp that the rule puts out is lit once more before the thing is shown again."""
+    lit = []
+
+    def prepare(sequencer):
+        def look(record):
+            said = record.data
+            if record.type == "action" and (said["action"], said.get("skill")) == ("start", "studio.show"):
+                lit.append(sequencer.knowledge.ask(f"(lit {said['arguments']['thing']})"))
+
+        sequencer.trace.listen(look)
+
+    photographed(f"rules: [{rule}]", fact("dirty", "cup"), blurred=["cup"], prepare=prepare)
+    assert lit
+    assert all(lit)

@@ -66,7 +66,7 @@ def lanes(plot):
     if "work" not in plot.states:
         return [[int(name[5:]) for name in plot.states if name.startswith("step_")]]
     regions = plot.states["work"].regions.values()
-    return [[int(name[5:]) for name in region.states if name.startswith("step_")] for region in regions]
+    return [[int(name[5:]) for name in region.states if name.removeprefix("step_").isdigit()] for region in regions]
 
 
 def guard(plot, state):

@@ -104,7 +104,7 @@ rules:
     plot = made(holder.rules, library)
     assert [rule.on for rule in plot.rules] == ["slipped"]
     step = library.expanded(plot).state("step_2")
-    assert [t.target for t in step.on["slipped"]] == ["step_2", "replan"]
+    assert [t.target for t in step.on["slipped"]] == ["step_2_again", "replan"]
     assert [t.target for t in step.on["stuck"]] == ["replan"]
 
 
