@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from dsc.engine.frames import Frame
-from dsc.engine.machine_state import NOTHING, FrameState
+from dsc.engine.machine_state import NOTHING, Configuration, FrameState, configuration_of
 from dsc.engine.performing import Performer, fill_parameters
-from dsc.engine.reaction import CompiledReaction, Exit, ReactionPart, StateEntry, initial_reaction, leaving_reaction
+from dsc.engine.reaction import (
+    CompiledReaction,
+    Exit,
+    ReactionPart,
+    StateEntry,
+    continuing_reaction,
+    initial_reaction,
+    leaving_reaction,
+)
 from dsc.engine.situation import Chart, Decision
 from dsc.engine.steps import Cancel, DecisionMade, PlotBound
 from dsc.engine.tables import CompiledPlot
@@ -32,13 +40,14 @@ class Execution:
         outputs: values that the outermost plot returns at its end, by name; empty before the end.
     """
 
-    __slots__ = ("chart", "finished", "outputs", "performer")
+    __slots__ = ("_continuing", "chart", "finished", "outputs", "performer")
 
     def __init__(self, chart: Chart, performer: Performer) -> None:
         self.chart = chart
         self.performer = performer
         self.finished = False
         self.outputs: Mapping[str, Any] = NOTHING
+        self._continuing: dict[tuple[Frame, str], Frame] = {}  # plots that are being replaced, by frame and host
 
     def enter_plot(
         self, compiled: CompiledPlot, arguments: Mapping[str, Any], parent: Frame | None = None, host: str = ""
@@ -81,6 +90,9 @@ class Execution:
             reactions: the reaction of each plot concerned, with the plot's frame.
             parts: the parts of all reactions, in execution order.
         """
+        for frame, reaction in reactions:
+            if reaction.continues:
+                self._take_out(frame, reaction)
         if len(reactions) == 1:
             ((frame, reaction),) = reactions
             self._exit(frame, reaction.exits)
@@ -98,6 +110,15 @@ class Execution:
             target = part.edge.targets[0] if arguments and part.edge is not None else -1
             for entrance in part.entrances:
                 self._enter(frame, entrance, arguments if entrance.node.index == target else NOTHING)
+
+    def _take_out(self, frame: Frame, reaction: CompiledReaction) -> None:
+        """Take the plots that continue out of their hosts, so that the exits of the hosts do not exit them."""
+        for index in reaction.continues:
+            host = frame.compiled.nodes[index].name
+            inner = frame.child(host)
+            if inner is not None and not inner.compiled.scxml:
+                del frame.children[host]
+                self._continuing[frame, host] = inner
 
     def _act(self, frame: Frame, part: ReactionPart) -> Mapping[str, Any]:
         """Execute the internal actions of a transition; return the arguments for its target's plot, by name."""
@@ -178,6 +199,7 @@ class Execution:
 
     def _bind(self, frame: Frame, name: str, state: object, passed: Mapping[str, Any]) -> None:
         """Enter the plot of a submachine or dynamic state; fire an error event if no plot can be bound."""
+        before = self._continuing.pop((frame, name), None) if self._continuing else None
         try:
             if isinstance(state, SubmachineState):
                 if state.arguments:
@@ -187,11 +209,48 @@ class Execution:
                     compiled = self.chart.bind(frame.variables[state.use[1:]])
                 else:
                     compiled = self.chart.compiled(state.use)
-                self.enter_plot(compiled, passed, frame, name)
+                if before is None:
+                    self.enter_plot(compiled, passed, frame, name)
+                else:
+                    self._replace_plot(before, compiled, passed)
+                    before = None
             elif isinstance(state, DynamicState):
                 self._bind_decision(frame, name, self._decided(frame, name, state, passed))
         except InputError as error:
             self.performer.fail(frame, f"{frame.prefix}{name}", error)
+        if before is not None:
+            before.gone = True
+            self.leave_plot(before)
+
+    def _replace_plot(self, before: Frame, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> None:
+        """Enter a plot in place of another one; activated states that both have continue, and the others are exited.
+
+        Variables that both plots have keep their values.
+        """
+        performer, parent = self.performer, before.parent
+        assert parent is not None  # noqa: S101  # only the plot inside a state is replaced
+        variables = dict(fill_parameters(compiled.plot, arguments, performer.situation))
+        kept = [name for name in compiled.plot.variables if name in before.compiled.plot.variables]
+        variables.update({name: before.variables[name] for name in kept})
+        shared = _shared(before, compiled)
+        targets = _together(compiled, [compiled.index[name] for name in shared])
+        reaction = continuing_reaction(compiled, targets)
+        staying = {one.node.name for one in reaction.parts[0].entrances if one.node.name in shared}
+        exits = leaving_reaction(before.configuration).exits
+        before.gone = True
+        self._exit(before, [one for one in exits if one.node.name not in staying])
+        now = before.frozen()
+        performer.bound.append(PlotBound(parent.prefix + before.host, compiled.plot))
+        performer.serials += 1
+        activations = {name: serial for name, serial in now.activations.items() if name in staying}
+        children = {host: inner for host, inner in now.children.items() if host in staying}
+        events = tuple([one for one in now.kept if one[0] in staying])
+        configuration = _going_on(reaction.following, before, staying)
+        state = FrameState(performer.serials, compiled, configuration, variables, activations, children, events)
+        frame = Frame(state, parent, before.host)
+        for entrance in reaction.parts[0].entrances:
+            if entrance.node.name not in staying:
+                self._enter(frame, entrance, NOTHING)
 
     def _decided(self, frame: Frame, name: str, state: DynamicState, passed: Mapping[str, Any]) -> Decision:
         bindings = self.performer.bindings(frame)
@@ -231,3 +290,40 @@ class Execution:
             self.performer.internal.append(Event(DONE_STATE + node.name, outputs, frame=frame.serial))
         elif DONE in node.edges:
             self.performer.internal.append(Event(DONE, outputs, to=frame.activations[node.name], exact=True))
+
+
+def _shared(before: Frame, compiled: CompiledPlot) -> list[str]:
+    """Return the names of the active, activated states of a plot that another plot has as states of the same kind."""
+    found = []
+    for name in before.activations:
+        index = compiled.index.get(name)
+        if index is not None and compiled.nodes[index].addressed:
+            mine = before.compiled.nodes[before.compiled.index[name]]
+            if type(mine.state) is type(compiled.nodes[index].state):
+                found.append(name)
+    return found
+
+
+def _going_on(following: Configuration, before: Frame, staying: Collection[str]) -> Configuration:
+    """Return the configuration in which a staying state waits for its least time only if it has waited before."""
+    known, compiled = before.compiled, following.compiled
+    over = {compiled.index[name] for name in staying if known.index[name] not in before.configuration.waiting}
+    if not following.waiting & over:
+        return following
+    return configuration_of(compiled, following.active, following.waiting - over, following.history)
+
+
+def _together(compiled: CompiledPlot, indices: Iterable[int]) -> list[int]:
+    """Return the innermost of these nodes that can be active together; of two that exclude each other, the first."""
+    found: list[int] = []
+    for index in sorted(indices):
+        found = [one for one in found if not compiled.inside(index, one)]
+        if all(_are_parallel(compiled, one, index) for one in found):
+            found.append(index)
+    return found
+
+
+def _are_parallel(compiled: CompiledPlot, one: int, other: int) -> bool:
+    """Return whether the innermost node around two nodes has its children active together."""
+    around = compiled.nodes[other].around
+    return compiled.nodes[next(index for index in compiled.nodes[one].around if index in around)].orthogonal

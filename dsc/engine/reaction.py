@@ -7,7 +7,7 @@ microstep, computeExitSet, exitStates, enterStates.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -101,6 +101,7 @@ class CompiledReaction:
         parts: a part for each transition, in order of execution.
         exits: all exits, in order.
         following: the configuration after the microstep.
+        continues: indices of the nodes whose plots continue in the plots that replace them.
         keeps: names of states that keep the event until their least time has passed.
         taken, exited, entered: the reaction's report if the plot is the outermost one: transitions and state names.
         silent: whether the reaction only exits states, without any action.
@@ -117,6 +118,7 @@ class CompiledReaction:
     entered: tuple[str, ...] = ()
     silent: bool = False
     still: bool = False
+    continues: tuple[int, ...] = ()
     reports: dict[str, tuple[Taken, ...]] = field(default_factory=dict)
 
     def taken_in(self, compiled: CompiledPlot, prefix: str) -> tuple[Taken, ...]:
@@ -155,6 +157,11 @@ def initial_reaction(compiled: CompiledPlot) -> CompiledReaction:
     return found
 
 
+def continuing_reaction(compiled: CompiledPlot, targets: Collection[int]) -> CompiledReaction:
+    """Return the reaction that enters a plot in the nodes `targets`, and in the initial states of all other scopes."""
+    return _Work(configuration_of(compiled, ())).entering(targets)
+
+
 def leaving_reaction(configuration: Configuration) -> CompiledReaction:
     """Return the reaction that interrupts a plot: it exits all states with their actions for interruption."""
     found: CompiledReaction | None = configuration.reactions.get(None)
@@ -191,8 +198,8 @@ class _Work:
         ]
         return self._reaction(tuple(parts), exits, keeps, tuple([report(edge, self.compiled) for edge in edges]))
 
-    def entering(self) -> CompiledReaction:
-        entrances = self._entrances(0, (self.compiled.nodes[0].initial,))
+    def entering(self, targets: Collection[int] = ()) -> CompiledReaction:
+        entrances = self._entrances(0, tuple(targets) or (self.compiled.nodes[0].initial,))
         return self._reaction((ReactionPart(None, (), entrances, acts=False),))
 
     def leaving(self) -> CompiledReaction:
@@ -218,6 +225,7 @@ class _Work:
             entered=tuple([one.node.name for one in entrances if one.node.state is not None]),
             silent=silent and not parts,
             still=silent and stays and bool(parts) and all(part.quiet for part in parts),
+            continues=tuple([part.edge.source for part in parts if part.edge is not None and part.edge.keeps]),
         )  # fmt: skip
 
     def _exits(self, left: set[int], own: set[int]) -> tuple[Exit, ...]:

@@ -28,6 +28,7 @@ class TransitionEdge:
         place: keys of the transition in its source state, e.g. `("on", "grasped", 0)`.
         passed: arguments for the plot inside the target, by name.
         cleared: indices of the history nodes whose memory the transition clears.
+        keeps: whether the plot inside the source continues in the plot that replaces it.
         interrupts: whether the source is exited as by another state's transition, with `on_break`.
     """
 
@@ -41,6 +42,7 @@ class TransitionEdge:
     place: tuple[str | int, ...] = ()
     passed: Mapping[str, TermField] = field(default_factory=dict)
     cleared: tuple[int, ...] = ()
+    keeps: bool = False
     interrupts: bool = False
 
 
@@ -324,6 +326,7 @@ class _Layout:
             node.index, trigger, targets, transition.guard, transition.effect, transition.rule,
             transition.internal and isinstance(node.state, states.CompositeState), place, transition.passed,
             tuple(self._cleared(node, transition)) if transition.clear else (),
+            transition.keep and node.holds_plot and targets == (node.index,),
         )  # fmt: skip
 
     def _together(self, targets: Sequence[int]) -> bool:

@@ -51,6 +51,8 @@ class Transition(Frozen):
             These are Harel's clear-history(state) and clear-history(state*); only in dialect `scxml`.
         rule: label of the contingency rule whose expansion made the transition; `None` for any other transition.
         also: names of further targets, in other regions (only in dialect `scxml`).
+        keep: whether the plot inside the target continues, if the target is the source. Active states that the next
+            plot has too then stay active, with their skills and timers. So a plot can be replaced while it runs.
         internal: whether a composite source stays active if the target is inside the source (SCXML 3.5; only in
             dialect `scxml`).
     """
@@ -59,6 +61,7 @@ class Transition(Frozen):
     guard: ConditionField | None = Field(default=None, alias="when")
     passed: dict[str, TermField] = Field(default_factory=dict, alias="pass")
     clear: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
+    keep: bool = Field(default=False, strict=True)
     do: tuple[InternalAction, ...] = ()
     rule: str | None = None
     also: tuple[str, ...] = ()
