@@ -12,10 +12,10 @@ from dsc.sequencer.clock import PastClock
 from knowledge_base.errors import described
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
-from planning.execution.monitor import EARLIER, OWN_STEPS, Broken, GoalReached, Monitor, News, Shorter
+from planning.execution.monitor import OWN_STEPS, Broken, GoalReached, Monitor, News, Shorter
 from planning.execution.outcomes import GoalHolds, Monitored, PlanInvalid
 from planning.execution.plan_progress import cost_of, shortest_end
-from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, StepEnded, Successor
+from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, Successor
 from planning.execution.search import Found, NotFound
 from planning.plan import PlanFound
 
@@ -95,7 +95,7 @@ class Monitoring:
         if run.searching_since is not None:
             self._search_meanwhile(run.searching_since)
         while run.missed:
-            self._begun(run.missed.pop(0))
+            self._begun(run.number(run.missed.pop(0)))
 
     async def _next_news(self) -> Heard:
         """Wait for the next news and return it."""
@@ -130,9 +130,6 @@ class Monitoring:
                 outcome = GoalHolds()
             case Shorter(steps):
                 outcome = self._shorten(steps)
-            case StepEnded():
-                run.attempt.completed()
-                outcome = self._replaced("another plan takes its place")
             case NotFound():
                 outcome = _invalid("", news.reason, "earlier")
             case Broken() if self._may_continue(news):
@@ -178,9 +175,6 @@ class Monitoring:
         self._put(news)
 
     def _begun(self, number: int) -> None:
-        if self._run.successor is not None:
-            self._put(StepEnded())
-            return
         progress = self._run.progress
         remaining = len(progress.remaining)
         progress.begin(number)
@@ -228,28 +222,33 @@ class Monitoring:
         return (step, *end)
 
     def _shorten(self, steps: tuple[PlanStep, ...]) -> Monitored | None:
-        """Omit steps; the running step continues if the shorter plan begins with an equal step."""
+        """Omit steps; running steps with which the shorter plan begins continue."""
         run, why = self._run, "fewer steps lead to the goal"
         skipped = [step for step in run.progress.remaining_steps if step not in steps]
         self._records.skipped(run.name, skipped, why)
-        if not run.follow(run.shortened(steps)):
-            return self._replaced(why)
-        self._install().update()  # the monitor has just validated these steps
-        return None
+        run.successor = run.shortened(steps)
+        return self._replaced(why)
 
     def _follow(self, answer: PlanFound, successor: Successor) -> Monitored | None:
-        """Replace the plan by a new plan; running steps continue if the new plan begins with equal steps."""
+        """Replace the plan by a new plan; running steps with which the new plan begins continue."""
         run, name = self._run, self._escalation.runs.new_name()
         self._records.found(answer, name)
-        if not run.follow(replace(successor, name=name)):
-            return self._replaced("a new plan begins in another way")
-        self._look(EARLIER)
-        return None
+        run.successor = replace(successor, name=name)
+        return self._replaced("another plan takes its place")
 
-    def _replaced(self, why: str) -> Monitored:
-        """Return the outcome with the successor's plot; `plan_invalid` if the successor no longer leads to the goal."""
-        outcome = self._escalation.succeeded(self._run, why)
-        self._run.disturbed = outcome is None
+    def _replaced(self, why: str) -> Monitored | None:
+        """Return the outcome with the successor's plot.
+
+        If the successor no longer leads to the goal, running steps continue during another search; without a running
+        step, return `plan_invalid`.
+        """
+        run = self._run
+        outcome = self._escalation.succeeded(run, why)
+        if outcome is None and run.progress.running:
+            run.successor, run.state = None, PlanState.BROKEN
+            self._search_meanwhile(self._clock.now())
+            return None
+        run.disturbed = outcome is None
         return outcome or _invalid("", why, "earlier")
 
 

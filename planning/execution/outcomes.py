@@ -42,10 +42,6 @@ class PlanInvalid(Outcome):
     author: Symbol
 
 
-class Held(Outcome):
-    """No further step of the plan may begin."""
-
-
 class Withdrawn(Outcome):
     """The step ends, because another author's change broke its condition; parallel steps continue."""
 

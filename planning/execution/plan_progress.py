@@ -202,19 +202,6 @@ class PlanProgress:
         self.running = tuple(sorted(self._begun - self._done))
         self.remaining = self._after(self._done)
 
-    @classmethod
-    def continuing(
-        cls, running: Sequence[PlanStep], then: Sequence[PlanStep], domain: PlanningDomain, goal: Expression
-    ) -> PlanProgress:
-        """Return the progress of a plan whose first steps are running in parallel; the sequence `then` follows them."""
-        number = len(running)
-        following = range(number + 1, number + len(then) + 1)
-        before = {(first, second) for second in following[:1] for first in range(1, second)}
-        progress = cls((*running, *then), domain, goal, before.union(itertools.pairwise(following)))
-        for first in range(1, number + 1):
-            progress.begin(first)
-        return progress
-
     def _earlier(self, later: int) -> set[int]:
         if self._before is None:
             return set(range(1, later))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning.execution.monitor import Broken, GoalReached, News, Shorter, news_form, news_from
-from planning.execution.outcomes import Held, Withdrawn
+from planning.execution.outcomes import Withdrawn
 from planning.execution.plan_progress import PlanProgress
 from planning.execution.search import Found, NotFound
 from planning.plan import PlanStep
@@ -170,9 +170,7 @@ class PlanState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Successor:
-    """The steps that replace a plan, immediately or after its running step.
-
-    The running steps continue if the successor begins with equal steps.
+    """The steps that replace a plan; running steps with which they begin continue.
 
     Attributes:
         steps: the steps of the successor.
@@ -203,12 +201,7 @@ class Better:
     answer: PlanFound
 
 
-@dataclass(frozen=True, slots=True)
-class StepEnded:
-    """News that the running step, the last step before a successor, has ended."""
-
-
-Heard = News | Found | NotFound | Better | StepEnded
+Heard = News | Found | NotFound | Better
 """The news that `Monitoring` handles."""
 
 
@@ -226,15 +219,16 @@ class PlanRun:
         replaces: the name of the plan that this plan replaces when its monitoring begins.
         state: see `PlanState`.
         successor: the steps that replace this plan; `None` without a replacement.
-        begun: the numbers of the plot's steps that have begun.
+        begun: the labels of the steps that have begun.
         news: unhandled news, oldest first.
         searching_since: the run time, in seconds, at which a search for a successor began.
-        missed: the numbers of the steps that began after a restart of the program and before a restart of the monitor.
-        on_begin: receives the number of each step that begins; `None` while the plan is not monitored.
+        missed: the labels of the steps that began after a restart of the program and before a restart of the monitor.
+        on_begin: receives the number in `progress` of each step that begins; `None` while the plan is not monitored.
         disturbed: whether changes by another author, and no failure, ended the plan.
-        superseded: whether no further step of the plan may begin while the running steps continue.
-        plot_steps: the steps of the plot, which the numbers in `begun` and `withdrawn` count from 1.
-        withdrawn: the numbers of the plot's steps that end while parallel steps continue.
+        labels: for each step, its number in the plot; by default, the steps count from 1. A step of a replaced plan
+            keeps its number, and other steps have new ones, so that equal numbers of successive plots mean equal steps.
+        formerly: the names of the replaced plans whose running steps continue in this plan.
+        withdrawn: the labels of steps that end while parallel steps continue.
         monitored_for: the activation that monitors the plan; 0 before the first one.
     """
 
@@ -255,11 +249,11 @@ class PlanRun:
     missed: list[int] = field(default_factory=list)
     on_begin: Callable[[int], None] | None = None
     disturbed: bool = False
-    superseded: bool = False
-    plot_steps: tuple[PlanStep, ...] = ()
+    labels: tuple[int, ...] = ()
+    formerly: tuple[str, ...] = ()
     withdrawn: set[int] = field(default_factory=set)
     monitored_for: int = 0
-    _holds: dict[int, tuple[Callable[[Held], None], asyncio.Future[None]]] = field(default_factory=dict)
+    _holds: dict[int, asyncio.Future[None]] = field(default_factory=dict)
 
     @property
     def task(self) -> str:
@@ -267,69 +261,81 @@ class PlanRun:
         return task_of(self.goal, self.holder)
 
     def __post_init__(self) -> None:
-        self.plot_steps = self.plot_steps or self.progress.steps
+        self.labels = self.labels or tuple(range(1, len(self.progress.steps) + 1))
 
-    def begin(self, number: int) -> None:
-        """Record that a step of the plot begins; after a restart, a number may arrive twice."""
-        again = number in self.begun
-        self.begun.add(number)
-        if self.on_begin is not None:
-            self.on_begin(number)
-        elif self.state is PlanState.BOUND:
-            self.progress.begin(number)
-        elif not again:
-            self.missed.append(number)
+    def begin(self, label: int) -> None:
+        """Record that a step of the plot begins; after a restart, a label may arrive twice.
 
-    def follow(self, successor: Successor) -> bool:
-        """Set the successor; return whether it begins with running steps, so that these steps continue.
-
-        Other running steps end: the successor does not need them, or they are done.
+        A step of a replaced plan may begin just before the replacement. If this plan lacks the step, it has ended.
         """
-        self.successor = successor
-        progress = self.progress
-        others = {number: progress.steps[number - 1] for number in progress.running}
-        continuing = []
-        for step in successor.steps:
+        if label not in self.labels:
+            return
+        again = label in self.begun
+        self.begun.add(label)
+        if self.on_begin is not None:
+            self.on_begin(self.number(label))
+        elif self.state is PlanState.BOUND:
+            self.progress.begin(self.number(label))
+        elif not again:
+            self.missed.append(label)
+
+    def number(self, label: int) -> int:
+        """Return the number in `progress` of the step with this label."""
+        return self.labels.index(label) + 1
+
+    def continuing(self, steps: Iterable[PlanStep]) -> tuple[int, ...]:
+        """Return the numbers of the running steps with which `steps` begin, in the order of `steps`."""
+        others = {number: self.progress.steps[number - 1] for number in self.progress.running}
+        found = []
+        for step in steps:
             same = next((number for number, other in others.items() if other == step), None)
             if same is None:
                 break
-            continuing.append(others.pop(same))
-        if not continuing:
-            return False
-        for number in others:
-            self.withdraw(number)
-        then = successor.steps[len(continuing) :]
-        self.progress = PlanProgress.continuing(continuing, then, progress.domain, progress.goal)
-        self._supersede()
-        self.state = PlanState.MONITORED
-        return True
+            found.append(same)
+            del others[same]
+        return tuple(found)
 
-    async def hold(self, number: int, report: Callable[[Held], None]) -> Withdrawn:
-        """Report that no further step may begin, as soon as that is so; return when step `number` is withdrawn."""
-        withdrawn = asyncio.get_running_loop().create_future()
-        self._holds[number] = report, withdrawn
+    def labels_for(self, steps: Sequence[PlanStep]) -> tuple[int, ...]:
+        """Return the labels of the steps of a plan that replaces this one while it runs."""
+        progress = self.progress
+        known = [(progress.steps[number - 1], self.labels[number - 1]) for number in progress.remaining]
+        following, labels = max(self.labels, default=0) + 1, []
+        for step in steps:
+            same = next((one for one in known if one[0] == step), None)
+            if same is None:
+                labels.append(following)
+                following += 1
+            else:
+                labels.append(same[1])
+                known.remove(same)
+        return tuple(labels)
+
+    def take_over(self, replaced: PlanRun, running: int) -> None:
+        """Continue the first steps of this plan, which are running steps of the plan that it replaces."""
+        self.formerly = (*replaced.formerly, replaced.name)
+        self._holds = replaced._holds
+        for number in range(1, running + 1):
+            self.begun.add(self.labels[number - 1])
+            self.progress.begin(number)
+
+    async def hold(self, label: int) -> Withdrawn:
+        """Return when the step with this label is withdrawn."""
+        withdrawn = self._holds[label] = asyncio.get_running_loop().create_future()
         try:
-            if self.superseded:
-                report(Held())
-            if number not in self.withdrawn:
+            if label not in self.withdrawn:
                 await withdrawn
             return Withdrawn()
         finally:
-            del self._holds[number]
-
-    def _supersede(self) -> None:
-        self.superseded = True
-        for report, _ in self._holds.values():
-            report(Held())
+            if self._holds.get(label) is withdrawn:
+                del self._holds[label]
 
     def withdraw(self, number: int) -> None:
         """End the running step `number` of the progress, while parallel steps continue."""
-        step = self.progress.steps[number - 1]
+        label = self.labels[number - 1]
         self.progress.withdraw(number)
-        in_plot = max(one for one in self.begun if self.plot_steps[one - 1] == step)
-        self.withdrawn.add(in_plot)
-        if in_plot in self._holds:
-            self._holds[in_plot][1].set_result(None)
+        self.withdrawn.add(label)
+        if label in self._holds and not self._holds[label].done():
+            self._holds[label].set_result(None)
 
     def shortened(self, steps: tuple[PlanStep, ...]) -> Successor:
         """Return the successor with other steps; without a successor, return these steps of the plan as one."""
@@ -349,8 +355,9 @@ class PlanRun:
             "successor": None if self.successor is None else self.successor.to_json(),
             "begun": sorted(self.begun),
             "withdrawn": sorted(self.withdrawn),
-            "plot_steps": [step.to_json() for step in self.plot_steps],
-            "news": [_form(one) for one in self.news if isinstance(one, Broken | Shorter | GoalReached | StepEnded)],
+            "labels": list(self.labels),
+            "formerly": list(self.formerly),
+            "news": [news_form(one) for one in self.news if isinstance(one, Broken | Shorter | GoalReached)],
         }
 
     @classmethod
@@ -363,7 +370,7 @@ class PlanRun:
             attempts: the attempts by task.
         """
         goal = parse_condition(form["goal"])
-        run = cls(
+        return cls(
             goal=goal,
             progress=PlanProgress.from_json(form["progress"], now.domain, now.condition(goal)),
             attempt=attempts.get(task_of(goal, form["holder"])) or Attempt(),
@@ -371,13 +378,11 @@ class PlanRun:
             successor=None if form["successor"] is None else Successor.from_json(form["successor"]),
             begun=set(form["begun"]),
             withdrawn=set(form["withdrawn"]),
-            plot_steps=tuple(map(PlanStep.from_json, form["plot_steps"])),
-            news=deque(StepEnded() if one is None else news_from(one) for one in form["news"]),
+            labels=tuple(form["labels"]),
+            formerly=tuple(form["formerly"]),
+            news=deque(map(news_from, form["news"])),
             **{name: form[name] for name in _PLAIN},
         )
-        if run.successor is not None and run.state is not PlanState.STOPPED:
-            run.superseded = True
-        return run
 
 
 class PlanRuns:
@@ -418,6 +423,10 @@ class PlanRuns:
     def get(self, name: str) -> PlanRun | None:
         """Return the plan of that name, or `None`."""
         return self._runs.get(name)
+
+    def carrying(self, name: str) -> list[PlanRun]:
+        """Return the plans in which running steps of the plan of that name may continue, the latest last."""
+        return [one for one in self._runs.values() if one.name == name or name in one.formerly]
 
     def required(self, name: str) -> PlanRun:
         """Return the plan of that name; raise `UnknownNameError` if there is no such plan."""
@@ -465,7 +474,3 @@ class PlanRuns:
 def task_of(goal: Expression, holder: str) -> str:
     """Return the goal, with the plot whose rules its plans inherit, as text."""
     return f"{holder}: {to_text(goal)}"
-
-
-def _form(heard: News | StepEnded) -> dict[str, Any] | None:
-    return None if isinstance(heard, StepEnded) else news_form(heard)

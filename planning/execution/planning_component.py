@@ -23,7 +23,6 @@ from planning.execution.outcomes import (
     GaveUp,
     GoalHolds,
     GoalOpen,
-    Held,
     Monitored,
     NoPlan,
     PlotFound,
@@ -162,8 +161,7 @@ class PlanningComponent(Component):
     async def configure(self, parameter: str, value: Any) -> None:
         """Begin step number `value` of the plan `parameter`; the monitor then validates effects of earlier steps."""
         await super().configure(parameter, value)
-        run = self._runs.get(parameter)
-        if run is not None:
+        for run in self._runs.carrying(parameter):
             run.begin(int(value))
 
     @skill(after_crash="repeat")
@@ -217,16 +215,13 @@ class PlanningComponent(Component):
         return outcome
 
     @skill(after_crash="repeat", unlimited=True)
-    async def hold(self, call: SkillCall[Held], plan: str, step: int) -> Withdrawn:
-        """Report `held` when no further step of the plan may begin, since a successor follows the running steps.
-
-        `step` is a number in the plot of the plan; `withdrawn` ends this step, and parallel steps continue.
-        """
-        run = self._runs.get(plan)
-        if run is None:
+    async def hold(self, call: SkillCall, plan: str, step: int) -> Withdrawn:  # noqa: ARG002
+        """End when the step, given by its number in the plot, must end while parallel steps continue."""
+        carrying = self._runs.carrying(plan)
+        if not carrying:
             unending: asyncio.Future[Withdrawn] = asyncio.get_running_loop().create_future()
             return await unending
-        return await run.hold(step, call.report)
+        return await carrying[-1].hold(step)
 
     @skill(after_crash="repeat")
     async def repair(self, call: SkillCall, plan: str, why: str) -> Repaired:

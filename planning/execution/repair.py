@@ -101,7 +101,12 @@ class Plotting:
     shared: Collection[str]
 
     def plotted(
-        self, run: PlanRun, plan: Plan, known: PartialOrder | None = None, instead_of: str | None = None
+        self,
+        run: PlanRun,
+        plan: Plan,
+        known: PartialOrder | None = None,
+        instead_of: str | None = None,
+        running: int = 0,
     ) -> tuple[PartialOrder, dict[str, Any]]:
         """Return the partial order of a plan's steps and the plot of the plan as data; set the order of `run.progress`.
 
@@ -110,13 +115,16 @@ class Plotting:
             plan: the steps, possibly with a schedule.
             known: the partial order of the steps; this method computes the order if `known` is omitted.
             instead_of: the candidate that the first step must try last.
+            running: the number of first steps that are running already, in parallel.
         """
         order = self._order(plan, run.goal, known)
+        if running:
+            order = order.begun(running)
         rules = self.library.plot(run.holder).rules if run.holder in self.library else ()
         plan = Plan(plan.steps)
         layout = laid_out(plan, run.progress.domain, self.library, rules, order, self.shared)
         run.progress.take_order(layout.before)
-        plot = plot_of(plan, layout, run.name, watched=True)
+        plot = plot_of(plan, layout, run.name, watched=True, labels=run.labels, running=running)
         self.library.expect(plot)
         form = plot.to_form()
         if instead_of is not None:
@@ -193,7 +201,7 @@ class Escalation:
         if self._reached(run):
             return GoalHolds()
         end = self._end(run)
-        return None if end is None else self._continued(run, end, why)
+        return None if end is None else self._continued(run, end, why, keeping=True)
 
     def bound(self, run: PlanRun, order: PartialOrder, form: dict[str, Any]) -> PlotFound:
         """Add a plan run and record the order of its steps; return the outcome that contains its plot."""
@@ -258,15 +266,36 @@ class Escalation:
         return f"; let its skill observe the effect, or give plot '{name}'{where} `tell` or `effects: assumed`"
 
     def _continued(
-        self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None = None
+        self,
+        run: PlanRun,
+        steps: tuple[PlanStep, ...],
+        why: str,
+        instead_of: str | None = None,
+        *,
+        keeping: bool = False,
     ) -> PlotFound:
-        """Continue with `steps` without a planner call; the first step tries the candidate `instead_of` last."""
+        """Continue with `steps` without a planner call.
+
+        Args:
+            run: the plan that is replaced.
+            steps: the steps of the new plan.
+            why: the reason.
+            instead_of: the candidate that the first step tries last.
+            keeping: whether running steps with which the new plan begins continue.
+        """
         name = self._recorded(run, steps, why, instead_of)
         found = None if run.successor is None else run.successor.found
         known = None if found is None else found.known_order(steps, self._knowledge.version)
         progress = PlanProgress(steps, run.progress.domain, run.progress.goal)
-        again = PlanRun(name, run.goal, progress, run.attempt, run.holder, run.seconds, run.replans, replaces=run.name)
-        return self.bound(again, *self.plotting.plotted(again, Plan(steps), known, instead_of))
+        running = len(run.continuing(steps)) if keeping else 0
+        again = PlanRun(
+            name, run.goal, progress, run.attempt, run.holder, run.seconds, run.replans, replaces=run.name,
+            labels=run.labels_for(steps) if keeping else (),
+        )  # fmt: skip
+        order, form = self.plotting.plotted(again, Plan(steps), known, instead_of, running)
+        if keeping:
+            again.take_over(run, running)
+        return self.bound(again, order, form)
 
     def _recorded(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None) -> str:
         """Record why other steps continue a plan, and return the name of their plot."""

@@ -7,8 +7,9 @@ r"""Control flows of a generated plot: sequences of steps, some of which wait fo
 - `before_n` waits for steps of other flows, which set the variables `done_m` and `begun_m`, and then tests the
   conditions of step n. No step therefore begins with a false precondition. If step n need not wait for other flows,
   the previous `after` state tests the conditions of step n.
-- The variable `held` becomes true when the planning component announces that other steps replace the plan. No step
-  begins after that. Parallel steps that the planning component does not withdraw continue to their ends.
+- A step that is running in the plot that this plot replaces continues in its state, which both plots have. If the step
+  has ended in the meantime, `before_n` leads to `after_n`.
+- A step that the planning component withdraws ends its chain, and parallel chains continue.
 - The state `step_n_again` exists if rules may enter step n again. It tests the conditions of the step.
 - The state `step_n_skipped` exists if rules may skip step n. It replaces `after_n` and does not wait for effects.
 """
@@ -22,16 +23,13 @@ from typing import Any
 from dsc.dynamic.responses import again, skipped
 from dsc.events import GAVE_UP
 from dsc.model.rules import REPLAN
-from knowledge_base.language.syntax.expression import And, Comparison, Constant, Expression, Not, Variable
+from knowledge_base.language.syntax.expression import And, Comparison, Constant, Expression, Not, Or, Variable
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import to_text
 from planning.generation.carried_steps import CarriedStep
 from planning.ordering.partial_order import PartialOrder
 
 FINISHED = "finished"
-HELD = "held"
-"""The variable of the plot that prevents further steps, since another plan replaces them."""
-_HELD = Comparison("=", Variable(HELD), Constant(value=True))
 NOT_OBSERVED = "not observed: "
 """Beginning of the reason if the effects of a step do not hold in time."""
 _DONE, _BEGUN = "done", "begun"
@@ -55,18 +53,19 @@ class Writer:
     """Writer of the states of all chains of one plot.
 
     Args:
-        steps: all steps of the plan.
+        steps: all steps of the plan by their numbers.
         order: the partial order of the steps.
         lanes: the chains of steps.
         plan: the name of the plan, with which states report the begin of steps; `None` without the planning component.
         left_out: the numbers of the steps that rules may skip.
-        retried: whether rules may enter steps again.
         leading: outcomes with which rules leave the plan for another state; for each, the names of the passed data.
+        retried: whether rules may enter steps again.
+        running: the steps that are running in the plot that this plot replaces.
     """
 
     def __init__(
         self,
-        steps: Sequence[CarriedStep],
+        steps: Mapping[int, CarriedStep],
         order: PartialOrder,
         lanes: Sequence[ControlFlow],
         plan: str | None,
@@ -74,9 +73,11 @@ class Writer:
         leading: Mapping[str, Iterable[str]],
         *,
         retried: bool,
+        running: Collection[int] = (),
     ) -> None:
         self._retried = retried
-        self._steps = dict(enumerate(steps, start=1))
+        self._running = frozenset(running)
+        self._steps = steps
         self._left_out = left_out
         self._ends: dict[str, Mapping[str, str]] = {end: {"reason": "?reason"} for end in (REPLAN, GAVE_UP)}
         self._ends.update({end: {name: f"?{passed(name)}" for name in names} for end, names in leading.items()})
@@ -91,9 +92,8 @@ class Writer:
 
     @property
     def variables(self) -> Mapping[str, Any]:
-        """The variables by which chains wait for each other, and `held`."""
-        names = (*self._flags, *([] if self._plan is None else [HELD]))
-        return {flag: {"type": "boolean", "initial": False} for flag in names}
+        """The variables by which chains wait for each other."""
+        return {flag: {"type": "boolean", "initial": False} for flag in self._flags}
 
     def states(self, lane: ControlFlow) -> dict[str, Any]:
         """Return the states of one chain, without its state `finished`."""
@@ -117,7 +117,18 @@ class Writer:
             return {"always": self._onward(number, lane, ())}
         waits = self._waits[number]
         told = {"about": "waits for " + ", ".join(self._steps[other].text for _, other in waits)} if waits else {}
-        return {**told, "always": self._onward(number, lane, [_is_set(flag, other) for flag, other in waits])}
+        ended = []
+        if number in self._running and (seen := _seen(self._steps[number])) is not None:
+            ended = [_guarded({"to": f"after_{number}"}, seen)]
+        return {**told, "always": [*ended, *self._onward(number, lane, [self._is_over(*one) for one in waits])]}
+
+    def _is_over(self, kind: str, number: int) -> Expression:
+        """Return the condition under which a chain no longer waits for a step.
+
+        Effects of a step that was running before this plot also count, since it may have ended before its chain began.
+        """
+        seen = _seen(self._steps[number]) if number in self._running and kind == _DONE else None
+        return _is_set(kind, number) if seen is None else Or((_is_set(kind, number), seen))
 
     def _again(self, number: int, lane: ControlFlow) -> dict[str, Any]:
         """Return the state through which rules enter a step again."""
@@ -133,7 +144,6 @@ class Writer:
             arguments = {"plan": self._plan, "step": number}
             listen = {"trigger": "planner.hold", "with": arguments}
             state["entry"] = [{"set": f"planner.{self._plan}", "to": number}, listen]
-            state["on"]["held"] = {"assign": {HELD: True}}
             if lane.mark:
                 state["on"]["withdrawn"] = {"to": lane.finished}
         if step.over_all:
@@ -178,19 +188,7 @@ class Writer:
         begin = {"to": f"step_{number}", **({"assign": assigned} if assigned else {})}
         both = _joined((*first, *step.needed)) if after is None else _between(after, step)
         otherwise = [] if both == begun else [self._replan(lane, f"not applicable: {step.text}", begun)]
-        return [*self._held(lane, after), _guarded(begin, both), *otherwise]
-
-    def _held(self, lane: ControlFlow, after: CarriedStep | None) -> list[dict[str, Any]]:
-        """Return the transition that prevents the step if another plan replaces it.
-
-        Running steps of parallel chains continue, since a chain that ends at `finished` interrupts no other chain.
-        """
-        if self._plan is None:
-            return []
-        when = _HELD if after is None else _held_after(after)
-        if lane.mark:
-            return [_guarded({"to": lane.finished}, when)]
-        return [self._replan(lane, "another plan takes its place", when)]
+        return [_guarded(begin, both), *otherwise]
 
     def _replan(self, lane: ControlFlow, reason: str, when: Expression | None = None) -> dict[str, Any]:
         return _guarded({"to": REPLAN + lane.mark, "assign": {"reason": reason}}, when)
@@ -213,18 +211,11 @@ def _joined(conditions: Iterable[Expression]) -> Expression | None:
 
 # Equal pairs of steps must have identical conditions, because other caches use the identity of a condition as the key.
 _pairs: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
-_ends: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
 
 
 def _seen(step: CarriedStep) -> Expression | None:
     """Return the conjunction of the expected effects of a step; cached."""
     (found,) = _pairs.find(step, None) or _pairs.keep(step, None, (_joined(step.expected),))
-    return found
-
-
-def _held_after(step: CarriedStep) -> Expression | None:
-    """Return the condition under which no step may begin after this step; cached."""
-    (found,) = _ends.find(step, None) or _ends.keep(step, None, (_joined((_HELD, *step.expected)),))
     return found
 
 

@@ -10,7 +10,7 @@ plan's partial order, usually the steps of one robot. An outcome without an inhe
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 
 from dsc.dynamic.library import Library
@@ -48,6 +48,16 @@ class Layout:
     def before(self) -> frozenset[tuple[int, int]]:
         """Pairs of steps; the first step of a pair is done, or skipped, when the second begins."""
         return self.order.before.union(*(pairwise(lane.numbers) for lane in self.lanes))
+
+    def labelled(self, labels: Sequence[int]) -> Layout:
+        """Return the layout with labels instead of the numbers from 1, in its order and lanes."""
+
+        def pairs(numbers: Iterable[tuple[int, int]]) -> frozenset[tuple[int, int]]:
+            return frozenset((labels[first - 1], labels[second - 1]) for first, second in numbers)
+
+        order = replace(self.order, before=pairs(self.order.before), begin_before=pairs(self.order.begin_before))
+        lanes = [replace(one, numbers=tuple([labels[n - 1] for n in one.numbers])) for one in self.lanes]
+        return replace(self, order=order, lanes=lanes)
 
 
 def laid_out(
@@ -101,14 +111,32 @@ def plot_from_plan(
     return plot_of(plan, layout, name, watched=library is not None)
 
 
-def plot_of(plan: Plan, layout: Layout, name: str, *, watched: bool) -> ActionPlot:
-    """Return the plot of a layout; with `watched`, its states report the progress to the planning component."""
+def plot_of(
+    plan: Plan, layout: Layout, name: str, *, watched: bool, labels: Sequence[int] = (), running: int = 0
+) -> ActionPlot:
+    """Return the plot of a layout.
+
+    Args:
+        plan: the steps.
+        layout: their arrangement.
+        name: the name of the plot.
+        watched: whether states report the progress to the planning component.
+        labels: the number of each step in the names of states; by default, the steps count from 1.
+        running: the number of first steps that are running already, in a plot that this plot replaces.
+    """
+    labels = labels or range(1, len(plan.steps) + 1)
+    layout = layout.labelled(labels)
     steps, lanes, rules = layout.steps, layout.lanes, layout.rules
-    left_out = [n for n, step in enumerate(plan.steps, start=1) if any(_leaves_out(rule, step) for rule in rules)]
+    left_out = [
+        label for label, step in zip(labels, plan.steps, strict=True) if any(_leaves_out(rule, step) for rule in rules)
+    ]
     continuations = tuple(chain.from_iterable(rule.continuations for rule in rules))
     retried = any(one.then in {RETRY, ENTER} for one in continuations)
     leading = {one.outcome: dict.fromkeys(one.do.passed, "symbol") for one in continuations if one.leads_away}
-    writer = Writer(steps, layout.order, lanes, name if watched else None, left_out, leading, retried=retried)
+    writer = Writer(
+        dict(zip(labels, steps, strict=True)), layout.order, lanes, name if watched else None, left_out, leading,
+        retried=retried, running=labels[:running],
+    )  # fmt: skip
     ends = {FINISHED: {"final": True}}
     if len(lanes) == 1:
         states = {**writer.states(lanes[0]), **ends}

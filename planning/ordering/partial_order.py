@@ -77,6 +77,12 @@ class PartialOrder:
         """Return the order with additional pairs; the first step of each pair must also come first in the plan."""
         return replace(self, before=reduced({*self.before, *pairs}))
 
+    def begun(self, count: int) -> PartialOrder:
+        """Return the order in which the first `count` steps, which have begun already, wait for no other step."""
+        before = {(first, second) for second, earlier in self.earlier.items() if second > count for first in earlier}
+        begin = frozenset(pair for pair in self.begin_before if min(pair) > count)
+        return replace(self, before=reduced(before), begin_before=begin)
+
 
 def in_sequence(plan: Plan) -> PartialOrder:
     """Return the total order of the plan's steps."""

@@ -430,28 +430,30 @@ class Trial:
 
 
 def _cancelled_and_begun_again(records: list[Record]) -> list[str]:
-    """A step that a new plan begins with is not cancelled for that plan: it would begin again at the same moment."""
-    wrong, by_seq = [], {one.seq: one for one in records}
-    for number, one in enumerate(records):
-        if one.type != "action" or one.data["action"] != "cancel" or not one.data["skill"].endswith(".act"):
+    """Steps that were cancelled for a new plan and begin again at the same moment: they belong to the new plan."""
+    by_seq = {one.seq: one for one in records}
+    actions = [one for one in records if one.type == "action" and one.data.get("skill", "").endswith(".act")]
+    starts = {one.data["id"]: one for one in actions if one.data["action"] == "start"}
+    wrong = []
+    for one in actions:
+        cause: Record | None = one
+        while cause is not None and cause.type != "event":
+            cause = by_seq.get(cause.cause or 0)
+        if one.data["action"] != "cancel" or cause is None or cause.data["name"] != "plan_found":
             continue
-        cause = one
-        while cause.cause is not None and cause.type != "event":
-            cause = by_seq[cause.cause]
-        if cause.type != "event" or cause.data["source"] != "planner.monitor":
-            continue
-        start = next(
-            r for r in records if r.type == "action" and r.data["action"] == "start" and r.data["id"] == one.data["id"]
-        )
-        for later in records[number:]:
-            if later.t > one.t:
-                break
-            same = (
-                later.type == "action" and later.data["action"] == "start" and later.data["skill"] == one.data["skill"]
-            )
-            if same and later.data["arguments"] == start.data["arguments"]:
+        start = starts[one.data["id"]]
+        for later in starts.values():
+            same = later.data["arguments"] == start.data["arguments"] and later.seq > one.seq and later.t == one.t
+            if same and _region_of(later, by_seq) == _region_of(start, by_seq):
                 wrong.append(f"{start.data['arguments']} was cancelled at {one.t} and begun again")
     return wrong
+
+
+def _region_of(start: Record, by_seq: dict[int, Record]) -> str:
+    """The outermost state with the step that starts a skill."""
+    step = by_seq[start.cause or 0]
+    entered = [path for micro in step.data["microsteps"] for path in micro["entered"] if path.endswith("/go")]
+    return entered[-1].partition("/")[0] if entered else ""
 
 
 def _fact_of(text: str) -> Any:

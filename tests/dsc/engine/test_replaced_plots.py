@@ -83,8 +83,9 @@ def test_without_keep_the_plot_begins_anew():
 
 def test_two_states_that_exclude_each_other_do_not_both_continue():
     run = begun(lanes("a", "b"))
-    chain = {"plot": "inner", "states": {**moving("a", "b"), **moving("b")}}
-    del chain["states"]["a_over"]
+    states = {**moving("a", "b"), **moving("b")}
+    del states["a_over"]
+    chain = {"plot": "inner", "states": states}
     run.send("next", plot=chain)
     assert run.machine.state.configuration() == ("work", "work/a")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+from typing import Any
 
 import pytest
 from dsc_charts import EVERYTHING, PROPERTY, plot
@@ -102,7 +103,7 @@ def test_short_forms_mean_the_long_ones():
 
 def test_python_takes_both_spellings_and_they_are_the_same():
     yaml = {"to": "s", "when": "(p)", "emit": "e", "with": {"a": 1}}
-    python = {"target": "s", "guard": "(p)", "emit": "e", "arguments": {"a": 1}}
+    python: dict[str, Any] = {"target": "s", "guard": "(p)", "emit": "e", "arguments": {"a": 1}}
     assert Transition.model_validate(yaml) == Transition.model_validate(python)
     assert Transition(**python).model_dump(mode="json", by_alias=True, exclude_defaults=True) == yaml
     assert Trigger(trigger="a.b", names={"x": "y"}) == Trigger.model_validate({"trigger": "a.b", "as": {"x": "y"}})

@@ -11,9 +11,9 @@ from knowledge_base import Delta, KnowledgeBase, UnknownNameError, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanStep
 from planning.execution.monitor import Broken, GoalReached, Shorter
-from planning.execution.outcomes import Held, Withdrawn
+from planning.execution.outcomes import Withdrawn
 from planning.execution.plan_progress import PlanProgress
-from planning.execution.plan_run import Attempt, PlanRun, PlanRuns, PlanState, StepEnded, Successor
+from planning.execution.plan_run import Attempt, PlanRun, PlanRuns, PlanState, Successor
 from planning.problem.derived import derivation
 
 GOAL = parse_condition("(at c)")
@@ -49,19 +49,11 @@ def test_monitoring_ends_with_the_new_plan_and_nobody_asks_for_it_again():
     assert skills_started(run).count("planner.repair") == 0
 
 
-def test_a_successor_that_begins_with_the_running_step_takes_over_after_it():
+def test_running_steps_continue_with_which_a_successor_begins():
     run = plan_run(state=PlanState.BROKEN)
     run.progress.begin(1)
-    assert run.follow(Successor(STEPS[:1]))
-    assert (run.state, run.superseded) == (PlanState.MONITORED, True)
-    assert (run.progress.steps, run.progress.running) == (STEPS[:1], (1,))
-
-
-def test_a_successor_that_begins_in_another_way_does_not():
-    run = plan_run(state=PlanState.BROKEN)
-    run.progress.begin(1)
-    assert not run.follow(Successor(ROUND_ABOUT, "plan_2"))
-    assert (run.state, run.superseded, run.progress.steps) == (PlanState.BROKEN, False, STEPS)
+    assert run.continuing(STEPS[:1]) == (1,)
+    assert run.continuing(ROUND_ABOUT) == ()
 
 
 SIDE_BY_SIDE = PlanStep("take", ("cup", "a"))
@@ -77,54 +69,84 @@ def parallel_run():
     return run
 
 
-async def hear(run, act):
-    """Hold both steps, act, and return what the messages said, and the steps that were withdrawn."""
-    said: list[Held] = []
-    holds = {number: asyncio.ensure_future(run.hold(number, said.append)) for number in (1, 2)}
+async def ended(run, act):
+    """Hold both steps, act, and return the steps that were withdrawn."""
+    holds = {number: asyncio.ensure_future(run.hold(number)) for number in (1, 2)}
     await asyncio.sleep(0)
     act()
     await asyncio.sleep(0)
-    ended = {number: hold.result() for number, hold in holds.items() if hold.done()}
+    found = {number: hold.result() for number, hold in holds.items() if hold.done()}
     for hold in holds.values():
         hold.cancel()
-    return said, ended
+    return found
 
 
-def test_parallel_running_steps_continue_in_a_successor_that_begins_with_them_in_any_order():
+def successor(run, steps):
+    """The plan that replaces a plan, with the running steps that continue in it."""
+    running = len(run.continuing(steps))
+    progress = PlanProgress(steps, DOMAIN, GOAL)
+    progress.take_order(
+        frozenset((first, second) for second in range(running + 1, len(steps) + 1) for first in range(1, second))
+    )
+    again = PlanRun(
+        "plan_2", GOAL, progress, run.attempt, "errand", 5, 4, replaces="plan_1", labels=run.labels_for(steps)
+    )
+    again.take_over(run, running)
+    return again
+
+
+def test_parallel_running_steps_continue_in_any_order_with_their_numbers_in_the_plot():
     run = parallel_run()
-    said, ended = asyncio.run(hear(run, lambda: run.follow(Successor((STEPS[0], SIDE_BY_SIDE, *STEPS[1:]), "plan_2"))))
-    assert (said, ended) == ([Held(), Held()], {})
-    assert (run.progress.running, run.progress.remaining) == ((1, 2), (1, 2, 3))
+    again = successor(run, (STEPS[0], SIDE_BY_SIDE, *ROUND_ABOUT))
+    assert (again.progress.running, again.labels, again.begun) == ((1, 2), (2, 1, 4, 5), {1, 2})
 
 
 def test_of_parallel_running_steps_only_those_continue_with_which_the_successor_begins():
+    again = successor(parallel_run(), STEPS)
+    assert again.progress.steps_of(again.progress.running) == STEPS[:1]
+    assert again.labels == (2, 3)
+
+
+def test_a_step_that_continues_can_still_be_withdrawn():
     run = parallel_run()
-    said, ended = asyncio.run(hear(run, lambda: run.follow(Successor(STEPS, "plan_2"))))
-    assert (said, ended) == ([Held(), Held()], {1: Withdrawn()})
-    assert run.progress.steps_of(run.progress.running) == STEPS[:1]
+
+    def act():
+        successor(run, (STEPS[0], SIDE_BY_SIDE)).withdraw(1)
+
+    assert asyncio.run(ended(run, act)) == {2: Withdrawn()}
+
+
+def test_a_step_that_begins_just_before_the_replacement_belongs_to_both_plans():
+    run = parallel_run()
+    again = successor(run, (STEPS[0], *STEPS[1:]))
+    runs = kept(run, again)
+    for one in runs.carrying("plan_1"):
+        one.begin(3)
+    assert again.progress.steps_of(again.progress.running) == STEPS[1:]
+    again.begin(7)  # a step that the new plan lacks has ended
+    assert again.begun == {2, 3}
 
 
 def test_a_withdrawn_step_ends_alone_also_after_a_restart():
     run = parallel_run()
-    assert asyncio.run(hear(run, lambda: run.withdraw(2))) == ([], {2: Withdrawn()})
+    assert asyncio.run(ended(run, lambda: run.withdraw(2))) == {2: Withdrawn()}
     world = KnowledgeBase(DOMAIN.schema)
     world.apply(Delta(nodes={**dict.fromkeys("abcd", "room"), "cup": "thing"}), "test")
     again = PlanRun.from_json(json.loads(json.dumps(run.to_json())), derivation(DOMAIN).at(world), {})
-    assert asyncio.run(hear(again, lambda: None)) == ([], {2: Withdrawn()})
+    assert asyncio.run(ended(again, lambda: None)) == {2: Withdrawn()}
 
 
 @pytest.mark.parametrize("state", PlanState)
 def test_what_is_remembered_of_a_plan_is_plain_data_and_is_recalled(state):
     run = plan_run(replaces="plan_0", state=state, successor=Successor(ROUND_ABOUT, "plan_2", 1), searching_since=2.5)
     run.begun.add(1)
-    run.news.extend([Broken("no", "(at b)", 2, "somebody", 7), Shorter(STEPS[1:]), GoalReached("me"), StepEnded()])
+    run.news.extend([Broken("no", "(at b)", 2, "somebody", 7), Shorter(STEPS[1:]), GoalReached("me")])
     world = KnowledgeBase(DOMAIN.schema)
     world.apply(Delta(nodes=dict.fromkeys("abcd", "room")), "test")
     form = json.loads(json.dumps(run.to_json()))
     again = PlanRun.from_json(form, derivation(DOMAIN).at(world), {})
     assert again.to_json() == form
     assert (again.state, again.successor, again.news) == (run.state, run.successor, run.news)
-    assert again.superseded == (state is not PlanState.STOPPED)
 
 
 def test_a_step_that_begins_before_its_monitor_is_back_is_not_forgotten():

@@ -70,10 +70,8 @@ def lanes(plot):
 
 
 def guard(plot, state):
-    """When the step after a state begins; before that stands the way for a plan whose place others take."""
-    held, begins = plot.state(state).always[:2]
-    assert to_text(held.guard).startswith(("(and (= ?held true)", "(= ?held true)"))
-    return to_text(begins.guard)
+    """When the step after a state begins."""
+    return to_text(plot.state(state).always[0].guard)
 
 
 def test_chains_become_regions_named_after_who_works_there():
@@ -88,7 +86,7 @@ def test_a_step_waits_for_those_of_other_regions_and_says_so():
     assert plot.state("before_4").about == "waits for (plug-in)"
     (ended,) = plot.state("after_1").always
     assert {name: term.value for name, term in ended.assign.items()} == {"done_1": True}
-    assert set(plot.variables) == {"reason", "held", "done_1"}
+    assert set(plot.variables) == {"reason", "done_1"}
 
 
 def test_it_is_a_plot_like_any_other():
