@@ -205,11 +205,7 @@ class Dispatcher:
         """End a skill whose final answer was handled; until then, its component counts as in use."""
         ended = self._running.pop(start.action_id, None)
         if ended is not None and ended.claim is not None:
-            turns = ended.claim.turns
-            if turns.holder is ended.claim and not turns.waiting:  # the common case
-                turns.holder = None
-            else:
-                ended.claim.leave()
+            self._free(ended.claim)
         if start.component in self.activation.concerned:
             self.activation.look()
         component = self._components.get(start.component)
@@ -269,6 +265,16 @@ class Dispatcher:
             return False
         signature = component.skills().get(start.skill)
         return signature is not None and signature.pattern == "skill"
+
+    def _free(self, claim: Claim) -> None:
+        """Free the turn of a skill that has ended; skills of the present macrostep, dispatched next, may get it."""
+        turns = claim.turns
+        if turns.holder is not claim:
+            claim.leave()
+            return
+        turns.holder = None
+        if turns.waiting:
+            self._asked.append(turns)
 
     def give_turns(self) -> None:
         """Compare the claims of the skills that were started since the last call."""

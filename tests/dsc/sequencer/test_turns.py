@@ -293,3 +293,13 @@ def test_a_busy_sequencer_says_what_waits():
 
     ran(regions(region("a", 0), region("b", 1)), Arm(), meanwhile=look)
     assert said == ["arm.move of state 'b_s' waits for component 'arm', which executes arm.move of state 'a_s'"]
+
+
+def test_the_next_skill_of_the_macrostep_that_ends_one_is_compared_with_those_that_wait():
+    arm = Arm()
+    twice = (
+        "a: {states: {a1: {priority: 1, entry: {trigger: arm.move, with: {to: a1}}, on: {moved: a2}},"
+        " a2: {priority: 1, entry: {trigger: arm.move, with: {to: a2}}, on: {moved: ae}}, ae: {final: true}}}"
+    )
+    ran(regions(twice, region("b", 1)), arm)
+    assert order(arm) == ["a1", "a2", "b"]
