@@ -21,6 +21,7 @@ _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "plan.broken": lambda data: f"the plan no longer holds: {data['reason']}",
     "plan.failed": lambda data: f"failed: {' or '.join(data['steps'])}: {data['why']}",
     "plan.resumed": lambda data: f"the plan resumes at {data['step']}: {data['why']}",
+    "plan.overtaken": lambda data: f"the world has overtaken {data['searches']} searches: {data['why']}",
     "plan.waits": lambda data: f"the plan waits for component '{data['component']}', {data['seconds']:g} s at most",
     "plan.skipped": lambda data: f"skipped {', '.join(data['steps']) or 'no step'}: {data['why']}",
     "plan.excluded": lambda data: f"{data['step']} is excluded for {data['seconds']:g} s: {data['why']}",

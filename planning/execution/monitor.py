@@ -27,6 +27,8 @@ from planning.validation import validate
 
 OWN_STEPS, EARLIER = "the steps before", "earlier"
 """Authors of changes that no other author has made: completed steps, and changes before the monitoring."""
+OVERTAKING = "changes during the search"
+"""Author of changes that overtook the search for a plan that begins without its goal."""
 
 
 @dataclass(frozen=True, slots=True)

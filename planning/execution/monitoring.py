@@ -12,7 +12,7 @@ from dsc.sequencer.clock import PastClock
 from knowledge_base.errors import described
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
-from planning.execution.monitor import OWN_STEPS, Broken, GoalReached, Monitor, News, Shorter
+from planning.execution.monitor import OVERTAKING, OWN_STEPS, Broken, GoalReached, Monitor, News, Shorter
 from planning.execution.outcomes import GoalHolds, Monitored, PlanInvalid
 from planning.execution.plan_progress import cost_of, shortest_end
 from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, Successor
@@ -82,7 +82,10 @@ class Monitoring:
             self._unsubscribe = self._knowledge.subscribe(self._changed)
         if run.state is PlanState.BOUND:
             run.state = PlanState.MONITORED
-            self._install().look_first()  # the world may have changed since the search
+            if run.overtaken:
+                self._install().update()
+            else:
+                self._install().look_first()  # the world may have changed since the search
         else:
             self._resume()
         if run.improvements is not None:
@@ -175,13 +178,14 @@ class Monitoring:
         self._put(news)
 
     def _begun(self, number: int) -> None:
-        progress = self._run.progress
+        run, progress = self._run, self._run.progress
         remaining = len(progress.remaining)
         progress.begin(number)
         if len(progress.remaining) < remaining:
-            self._run.attempt.completed()
+            run.attempt.completed()
         if self._monitor is not None:
-            self._monitor.look(OWN_STEPS)
+            self._monitor.look(OVERTAKING if run.overtaken else OWN_STEPS)
+        run.overtaken = False
 
     def _may_continue(self, news: Broken) -> bool:
         """Return whether running steps that do not need the condition may continue during a search."""

@@ -59,6 +59,10 @@ class PlanRecords:
             links=[[provider, fact, user] for user, provider, fact in links],
         )
 
+    def overtaken(self, searches: int, why: str) -> None:
+        """Record that the world has overtaken several searches, so that a plan begins that does not reach the goal."""
+        self._trace.record("plan.overtaken", searches=searches, why=why)
+
     def none(self, kind: str, reason: str) -> None:
         """Record that a search ended without a plan."""
         self._trace.record("plan.none", kind=kind, reason=reason, **(_CUT_SHORT if kind == "timed_out" else {}))

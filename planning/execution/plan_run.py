@@ -31,7 +31,17 @@ if TYPE_CHECKING:
 
 MOST_UNMONITORED = 64
 """The maximum number of unmonitored plans that are kept. The chart may abandon a plan without a message."""
-_PLAIN = ("name", "holder", "seconds", "replans", "replaces", "searching_since", "disturbed", "monitored_for")
+_PLAIN = (
+    "name",
+    "holder",
+    "seconds",
+    "replans",
+    "replaces",
+    "searching_since",
+    "disturbed",
+    "monitored_for",
+    "overtaken",
+)
 
 
 MOST_ATTEMPTS = 64
@@ -229,6 +239,7 @@ class PlanRun:
             keeps its number, and other steps have new ones, so that equal numbers of successive plots mean equal steps.
         formerly: the names of the replaced plans whose running steps continue in this plan.
         withdrawn: the labels of steps that end while parallel steps continue.
+        overtaken: whether the plan begins although it does not lead to the goal; see `Found.overtaken`.
         monitored_for: the activation that monitors the plan; 0 before the first one.
     """
 
@@ -253,6 +264,7 @@ class PlanRun:
     formerly: tuple[str, ...] = ()
     withdrawn: set[int] = field(default_factory=set)
     monitored_for: int = 0
+    overtaken: bool = False
     _holds: dict[int, asyncio.Future[None]] = field(default_factory=dict)
 
     @property

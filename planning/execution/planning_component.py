@@ -270,6 +270,7 @@ class PlanningComponent(Component):
         except InputError as error:
             self._runs.conclude(task)
             return self._none("failed", str(error))
+        run.overtaken = found.overtaken
         self._records.found(found.answer, run.name)
         if before is not None:
             self._records.replaced(before.name, run.name, found.kept)

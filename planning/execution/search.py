@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+from collections import deque
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -19,7 +20,7 @@ from planning.execution.plan_progress import PlanProgress, cost_of, leads_to, lo
 from planning.execution.planner_call import Answer, Improvements, PlannerCalls
 from planning.explanation import why_unsolvable
 from planning.ordering.causal_tracing import deordered
-from planning.ordering.partial_order import PartialOrder
+from planning.ordering.partial_order import PartialOrder, in_sequence
 from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation
@@ -27,7 +28,7 @@ from planning.problem.relevance import why_no_engine
 from planning.validation import Validation, validate
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Collection, Iterable
+    from collections.abc import Awaitable, Callable, Collection, Iterable, Sequence
 
     from dsc.sequencer.clock import LoopClock
     from knowledge_base.language.evaluation.world_protocol import World
@@ -57,7 +58,10 @@ EXCLUDED_SECONDS = 120.0
 """Seconds of run time for which new plans omit a step that failed repeatedly."""
 _REMEDY = "a longer `budget: {seconds: ...}` or another engine may find one"
 MAX_ATTEMPTS = 3
-"""The number of searches for one plan, and of their time limits, after which a changing world ends the search."""
+"""The number of searches that the world overtakes, after which the last executable plan begins without the goal.
+
+Without an executable plan, the search ends after the same number of time limits.
+"""
 MAX_REJECTED = 5
 """The maximum number of plans that the simulation may reject."""
 _IN_CONCERT = "the only plan has concurrent steps that need each other, which no plot executes yet"
@@ -75,6 +79,8 @@ class Found:
         better: the better plans of the planner; the caller must close them.
         order: the partial order of the plan, computed by the validation; `None` for a plan with a schedule.
         version: the version of the knowledge base on which the plan was validated.
+        overtaken: whether the plan can be executed, but does not lead to the goal, since the world has changed during
+            the search. A new plan is then made while the first step runs.
     """
 
     answer: PlanFound
@@ -82,6 +88,7 @@ class Found:
     better: Improvements | None = None
     order: PartialOrder | None = None
     version: int = -1
+    overtaken: bool = False
 
     @property
     def steps(self) -> tuple[PlanStep, ...]:
@@ -200,7 +207,8 @@ class Search:
     ) -> Found | NotFound:
         """Return a plan that is valid in the world at the end of the search.
 
-        A search during which the world changed is repeated; then a local repair may keep steps of the plan found.
+        A search during which the world changed is repeated; then a local repair may keep steps of the plan found. After
+        `MAX_ATTEMPTS` such searches, a robot without running steps begins with the last plan that can be executed.
 
         Args:
             goal: the condition to reach.
@@ -214,6 +222,7 @@ class Search:
         """
         rejected: dict[PlanStep, str] = {}
         changed, begun = 0, self._clock.now()
+        overtaken: deque[Found] = deque(maxlen=MAX_ATTEMPTS)
         while True:
             version, snapshot = self._knowledge.version, self._knowledge.snapshot()
             found = await self._found_after(running, goal, seconds, before, rejected, snapshot)
@@ -235,11 +244,25 @@ class Search:
             if version == self._knowledge.version:
                 wrong = f"the plan found does not lead to the goal: {verdict.why} ({found.answer.engine})"
                 return NotFound("failed", wrong)
+            overtaken.append(found)
+            latest = self._executable(overtaken) if changed >= MAX_ATTEMPTS and not running else None
+            if latest is not None:
+                self._records.overtaken(changed, verdict.why)
+                return latest
             if changed >= MAX_ATTEMPTS and self._clock.now() - begun > MAX_ATTEMPTS * seconds:
                 return NotFound("failed", f"the world changes faster than plans are made: {verdict.why}")
             if not found.answer.plan.schedule:
                 now = derivation(self._domain).at(self._knowledge)
                 before = PlanProgress(found.steps[len(running) :], now.domain, now.condition(goal))
+
+    def _executable(self, plans: Sequence[Found]) -> Found | None:
+        """Return the last of the plans whose steps can still be executed."""
+        for found in reversed(plans):
+            plan = found.answer.plan
+            if plan.steps and not plan.schedule and _ahead(plan.steps, self._domain, self._knowledge) is not None:
+                order = in_sequence(plan)
+                return replace(found, order=order, version=self._knowledge.version, better=None, overtaken=True)
+        return None
 
     async def _found_after(
         self,
