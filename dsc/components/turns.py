@@ -44,14 +44,16 @@ class Claim:
         claimant: the skill.
         rank: the rank of the skill.
         waits: whether the claimant knows that it waits.
-        leaving: whether the claim soon leaves its turn.
+        lost: whether another claim preempts this one.
+        ended: whether the skill was cancelled, and only cleans up.
     """
 
     turns: Turns
     claimant: Claimant
     rank: Rank
     waits: bool = False
-    leaving: bool = False
+    lost: bool = False
+    ended: bool = False
 
     @property
     def has_turn(self) -> bool:
@@ -61,7 +63,7 @@ class Claim:
     def end(self) -> None:
         """Leave the wait; a claim that has the turn leaves when its skill has stopped."""
         if self.has_turn:
-            self.leaving = True
+            self.ended = True
         else:
             self.leave()
 
@@ -93,11 +95,11 @@ class Turns:
             self.waiting.remove(first)
             self.holder = first
             first.claimant.begin(waited=first.waits)
-        elif first.rank.takes_from(self.holder.rank) and not self.holder.leaving:
-            self.holder.leaving = True
+        elif first.rank.takes_from(self.holder.rank) and not (self.holder.lost or self.holder.ended):
+            self.holder.lost = True
             self.holder.claimant.lose(first.claimant.describe())
         for claim in self.waiting:
-            if not (claim.waits or self.holder.leaving):  # a skill that was cancelled soon ends
+            if not (claim.waits or self.holder.ended):  # a skill that was cancelled soon stops
                 claim.waits = True
                 claim.claimant.wait(self.holder.claimant.describe())
 
