@@ -53,6 +53,22 @@ describe("a moment", () => {
     expect(made.at(14).plans.map((plan) => [plan.name, plan.ended])).toEqual([["plan_1", 11], ["plan_2", null]]);
   });
 
+  it("knows a step that goes on in the plan that replaces its own", () => {
+    const execute = "clear/execute";
+    const form = { plot: "plan_9", generated: true, states: { step_1: { about: "(take cup)", dynamic: ["take"] }, step_7: { about: "(go b)", dynamic: ["go"] } } };
+    const kept = { event: "plan_found", taken: [], exited: [execute], entered: [execute], bound: [{ state: execute, plot: "plan_9", hash: "h9" }] };
+    const rest = [
+      { type: "plan.ordered", plot: "plan_9", steps: ["(take cup)", "(go b)"], links: [] },
+      { type: "plot", name: "plan_9", hash: "h9", plot: form },
+      { type: "step", microsteps: [kept] },
+    ].map((data, i) => ({ seq: 8 + i, t: 4, cause: null, ...data }) as unknown as Rec);
+    const made = history([...run.slice(0, 7), ...rest]);
+    expect(made.at(7).plans[0]!.steps[0]!.state).toBe("running");
+    const [old, next] = made.at(10).plans;
+    expect(old!.ended).not.toBeNull();
+    expect(next!.steps.map((step) => step.state)).toEqual(["running", "waiting"]);
+  });
+
   it("does not blame a rule after which the step was begun again for the end of the plan", () => {
     const execute = "clear/execute";
     const again = { event: "slipped", taken: [], exited: [`${execute}/step_1`], entered: [`${execute}/step_1`] };

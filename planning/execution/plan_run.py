@@ -41,6 +41,7 @@ _PLAIN = (
     "disturbed",
     "monitored_for",
     "overtaken",
+    "replaced",
 )
 
 
@@ -237,7 +238,8 @@ class PlanRun:
         disturbed: whether changes by another author, and no failure, ended the plan.
         labels: for each step, its number in the plot; by default, the steps count from 1. A step of a replaced plan
             keeps its number, and other steps have new ones, so that equal numbers of successive plots mean equal steps.
-        formerly: the names of the replaced plans whose running steps continue in this plan.
+        replaced: the name of the replaced plan whose running steps may continue in this plan; empty without one.
+        origins: the plans in whose plots running steps have begun, by label, if not in the plot of this plan.
         withdrawn: the labels of steps that end while parallel steps continue.
         overtaken: whether the plan begins although it does not lead to the goal; see `Found.overtaken`.
         monitored_for: the activation that monitors the plan; 0 before the first one.
@@ -261,7 +263,8 @@ class PlanRun:
     on_begin: Callable[[int], None] | None = None
     disturbed: bool = False
     labels: tuple[int, ...] = ()
-    formerly: tuple[str, ...] = ()
+    replaced: str = ""
+    origins: dict[int, str] = field(default_factory=dict)
     withdrawn: set[int] = field(default_factory=set)
     monitored_for: int = 0
     overtaken: bool = False
@@ -324,11 +327,16 @@ class PlanRun:
 
     def take_over(self, replaced: PlanRun, running: int) -> None:
         """Continue the first steps of this plan, which are running steps of the plan that it replaces."""
-        self.formerly = (*replaced.formerly, replaced.name)
+        self.replaced = replaced.name
         self._holds = replaced._holds
-        for number in range(1, running + 1):
-            self.begun.add(self.labels[number - 1])
+        for number, label in enumerate(self.labels[:running], start=1):
+            self.origins[label] = replaced.origins.get(label, replaced.name)
+            self.begun.add(label)
             self.progress.begin(number)
+
+    def carries(self, name: str) -> bool:
+        """Return whether running steps of the plan of that name may continue in this plan."""
+        return name in (self.name, self.replaced, *self.origins.values())
 
     async def hold(self, label: int) -> Withdrawn:
         """Return when the step with this label is withdrawn."""
@@ -368,7 +376,7 @@ class PlanRun:
             "begun": sorted(self.begun),
             "withdrawn": sorted(self.withdrawn),
             "labels": list(self.labels),
-            "formerly": list(self.formerly),
+            "origins": sorted(self.origins.items()),
             "news": [news_form(one) for one in self.news if isinstance(one, Broken | Shorter | GoalReached)],
         }
 
@@ -391,7 +399,7 @@ class PlanRun:
             begun=set(form["begun"]),
             withdrawn=set(form["withdrawn"]),
             labels=tuple(form["labels"]),
-            formerly=tuple(form["formerly"]),
+            origins=dict(form["origins"]),
             news=deque(map(news_from, form["news"])),
             **{name: form[name] for name in _PLAIN},
         )
@@ -438,7 +446,7 @@ class PlanRuns:
 
     def carrying(self, name: str) -> list[PlanRun]:
         """Return the plans in which running steps of the plan of that name may continue, the latest last."""
-        return [one for one in self._runs.values() if one.name == name or name in one.formerly]
+        return [one for one in self._runs.values() if one.carries(name)]
 
     def required(self, name: str) -> PlanRun:
         """Return the plan of that name; raise `UnknownNameError` if there is no such plan."""

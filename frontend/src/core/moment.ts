@@ -164,7 +164,12 @@ function planBound(moment: Moment, rec: Rec, at: string, name: string, form: Plo
   const number = announced(moment, rec, name, stepTexts(form));
   const plan = moment.plans[number]!;
   const texts = plan.steps.map((step) => step.text);
-  moment.plans[number] = { ...plan, at, names: stepsOf(form, texts) };
+  let bound: Plan = { ...plan, at, names: stepsOf(form, texts) };
+  for (const [state, step] of bound.names) {
+    const since = moment.active.get(`${at}/${state}`); // it runs since the plan before, and goes on in this one
+    if (since) bound = withStep(bound, step, { state: "running", tries: 1, since: since.t });
+  }
+  moment.plans[number] = bound;
   moment.running.set(at, number);
 }
 
