@@ -43,6 +43,14 @@ def test_a_run_reports_as_json(dsc):
     assert set(report["clean-up-table"]) == {"items", "left", "trips", "faults", "touched"}
 
 
+def test_a_run_ends_at_its_limit_and_the_report_names_it(dsc):
+    status, out, _ = dsc("run", "clean-up-table", "--until", 20, "--json")
+    report = json.loads(out)
+    assert (status, report["goal_reached"]) == (1, False)
+    assert report["problem"] == "the run has not ended within 20 s of run time (until)"
+    assert {left["reason"] for left in report["left"]} == {report["problem"]}
+
+
 def test_a_run_in_a_pipe_tells_its_progress_in_plain_lines(dsc):
     status, out, _ = dsc("run", "clean-up-table")
     assert status == 0
