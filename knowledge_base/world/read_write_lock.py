@@ -206,6 +206,8 @@ class ReadWriteLock:
                 taken = self._alone.take_if_free()
             if not taken:
                 self._alone.__enter__()
+                with self._lock:  # waits for the change of a thread that was alone just before
+                    pass
         except BaseException:
             if entered:
                 self._alone.let_go()

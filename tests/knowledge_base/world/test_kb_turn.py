@@ -30,6 +30,9 @@ class Crowd:
     def changes(self, name: str, inside: Callable[[], None] | None = None) -> None:
         self._comes(name, self.turn.changing, inside)
 
+    def is_alone(self, name: str) -> None:
+        self._comes(name, self.turn.alone, None)
+
     def _comes(
         self, name: str, enter: Callable[[], AbstractContextManager[None]], inside: Callable[[], None] | None
     ) -> None:
@@ -119,6 +122,18 @@ def test_alone_means_that_others_ask_and_do_not_change(crowd: Crowd) -> None:
         with crowd.turn.changing():
             crowd.order.append("own change")
     assert crowd.goes() == ["own change", "change"]
+
+
+def test_who_is_alone_next_waits_for_the_end_of_a_change_that_came_first(crowd: Crowd) -> None:
+    def change() -> None:
+        while crowd.turn.waiting[0] == 0 and "alone" not in crowd.order:
+            time.sleep(0)
+        crowd.order.append("end of change")
+
+    with crowd.turn.alone():
+        crowd.changes("change", change)
+        crowd.is_alone("alone")
+    assert crowd.goes() == ["change", "end of change", "alone"]
 
 
 def test_the_lock_and_the_turn_may_be_taken_again(crowd: Crowd) -> None:
