@@ -67,6 +67,8 @@ class SkillCall(Generic[Reported_contra]):
         deadline: second of run time at which the skill is cancelled.
         give_up: reports, as text, that a part of the skill continues and cannot be stopped.
         rank: the rank of the skill among those that wait for its component.
+        waits: reports, as text, the skill of another program for which the component lets this skill wait; empty when
+            the wait ends.
 
     After a crash, a resumed run may repeat a call with an equal id. The clock of the repeated call begins at the start
     of the action, and repeated reports are dropped. So a skill that acts only one time for each id executes the same
@@ -79,6 +81,7 @@ class SkillCall(Generic[Reported_contra]):
     deadline: float = math.inf
     give_up: Callable[[str], None] = lambda _: None
     rank: Rank = ORDINARY
+    waits: Callable[[str], None] = lambda _: None
 
     def observe(self, observed: Delta) -> None:
         """Report observed facts immediately, before the outcome and without an event for the chart."""

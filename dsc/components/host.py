@@ -156,6 +156,10 @@ _NO_REPORT = {"report": outcome_form(Outcome(OBSERVED))}
 """Replacement of an old report that the client has received."""
 
 
+_ENDS = {"ended", "failed", "bug", "preempted"}
+"""Keys of the messages with which an action ends."""
+
+
 @dataclass(slots=True)
 class _Action:
     """An action of a client, with the action's reports and end as messages."""
@@ -178,10 +182,11 @@ class _Action:
         """
         assert self.reports is not None  # noqa: S101
         for number in range(self.received, min(received, len(self.messages))):
-            if number >= MOST_KEPT:
+            if number >= MOST_KEPT and "report" in self.messages[number - MOST_KEPT]:
                 self.messages[number - MOST_KEPT] = _NO_REPORT
             self.received = number + 1
-            self.reports.taken()
+            if "report" in self.messages[number]:
+                self.reports.taken()
 
 
 class HostedActions:
@@ -231,7 +236,7 @@ class HostedActions:
                 seconds["deadline"] = self._clock.now() + said["seconds"]
             rank = _rank_of(said.get("rank"))
             call = SkillCall(said["id"], self._clock, lambda one: reports.put(_plain(one)), rank=rank, **seconds)
-            async with asyncio.timeout(said["seconds"]), self._turn(said["skill"], action.client, rank):
+            async with asyncio.timeout(said["seconds"]), self._turn(said, action, rank):
                 with contained(f"{self._component.name}.{said['skill']}", self._component.device_errors):
                     outcome = await self._component.execute(said["skill"], call, said["arguments"])
                     form = outcome_form(_plain(outcome))
@@ -245,13 +250,17 @@ class HostedActions:
         reports.flush()
         self._tell(said["id"], action, end)
 
-    def _turn(self, skill: str, client: str, rank: Rank) -> AbstractAsyncContextManager[None]:
+    def _turn(self, said: Mapping[str, Any], action: _Action, rank: Rank) -> AbstractAsyncContextManager[None]:
         """Return the turn of the component for a skill; a concurrent component needs none."""
-        component = self._component
+        component, skill = self._component, said["skill"]
         signature = component.skills().get(skill)
         if component.concurrent or signature is None or signature.pattern != "skill":
             return nullcontext()
-        return turn_of(component.turns, f"{component.name}.{skill} {client}", rank)
+
+        def waits(holder: str) -> None:
+            self._tell(said["id"], action, {"waits": holder})
+
+        return turn_of(component.turns, f"{component.name}.{skill} of another client", rank, waits)
 
     async def _how(self, _: str, said: dict[str, Any]) -> list[dict[str, Any]] | None:
         """Return the messages that the client has not received; `None` for an unknown action."""
@@ -259,7 +268,7 @@ class HostedActions:
         if action is None:
             return None
         action.take(said["heard"])
-        if action.over and not (action.messages and "report" not in action.messages[-1]):
+        if action.over and not (action.messages and _ENDS & action.messages[-1].keys()):
             self._tell(said["id"], action, {"failed": "its task was cancelled"})
         return action.messages[said["heard"] :]
 

@@ -198,6 +198,8 @@ class RemoteComponent(Component):
                 received += 1
                 if "report" in form:
                     call.report(outcome_of(form["report"]))
+                elif "waits" in form:
+                    call.waits(text_of(form["waits"], str))
                 elif "bug" in form:
                     raise ProgrammingError(text_of(form["bug"], str))
                 elif "preempted" in form:

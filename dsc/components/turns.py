@@ -6,7 +6,7 @@ The turns belong to the component and not to a run, so that several runs share t
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -115,9 +115,10 @@ class Turns:
 class _Awaited:
     """A claimant whose skill awaits its turn in the task that claims it."""
 
-    def __init__(self, skill: str, task: asyncio.Task[object] | None) -> None:
+    def __init__(self, skill: str, task: asyncio.Task[object] | None, waits: Callable[[str], None]) -> None:
         self._skill = skill
         self._task = task
+        self._waits = waits
         self.turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.taker = ""
 
@@ -125,13 +126,16 @@ class _Awaited:
         """Return the skill as text."""
         return self._skill
 
-    def begin(self, *, waited: bool) -> None:  # noqa: ARG002
+    def begin(self, *, waited: bool) -> None:
         """Resolve the awaited turn."""
+        if waited:
+            self._waits("")
         if not self.turn.done():
             self.turn.set_result(None)
 
     def wait(self, holder: str) -> None:
-        """Do nothing: no record is made here."""
+        """Report the holder."""
+        self._waits(holder)
 
     def lose(self, taker: str) -> None:
         """Cancel the task."""
@@ -141,19 +145,20 @@ class _Awaited:
 
 
 @asynccontextmanager
-async def turn_of(turns: Turns, skill: str, rank: Rank) -> AsyncIterator[None]:
+async def turn_of(turns: Turns, skill: str, rank: Rank, waits: Callable[[str], None]) -> AsyncIterator[None]:
     """Wait for the turn of a component, and hold it in the block.
 
     Args:
         turns: the turns of the component.
         skill: the skill, as text for people.
         rank: the rank of the skill.
+        waits: receives the skill that has the turn when the wait begins, and an empty text when it ends.
 
     Raises:
         PreemptedError: a skill with a higher priority has taken the turn; the block was cancelled.
     """
     task = asyncio.current_task()
-    claimant = _Awaited(skill, task)
+    claimant = _Awaited(skill, task, waits)
     claim = Claim(turns, claimant, rank)
     turns.waiting.append(claim)
     turns.give()

@@ -286,7 +286,7 @@ class Dispatcher:
     def waits(self) -> Iterator[str]:
         """Each skill that waits for its component, with the skill that the component executes, as text."""
         for running in self._running.values():
-            if not running.begun:
+            if running.holder is not None:
                 yield f"{running.describe()} waits for {self._missing(running)}"
 
     async def abandon(self, start: steps.Start) -> None:
@@ -382,7 +382,8 @@ class Dispatcher:
 
         began = None if interrupted is None else interrupted.began
         clock: Clock = self._clock if began is None else PastClock(self._clock, began)
-        call = SkillCall(self._part_of + start.action_id, clock, report, running.due, self._fault, start.rank)
+        action_id = self._part_of + start.action_id
+        call = SkillCall(action_id, clock, report, running.due, self._fault, start.rank, running.held)
         if not running.begun:
             await running.turn()
         if running.configuring:
@@ -406,11 +407,9 @@ class Dispatcher:
 
     def _missing(self, running: RunningSkill) -> str:
         """Return, as text, the component for whose turn or settings a skill waits; empty if it waits for none."""
-        if running.claim is not None and not running.begun:
-            holder = running.claim.turns.holder
-            doing = (
-                "" if holder is None or holder is running.claim else f", which executes {holder.claimant.describe()}"
-            )
+        holder = running.holder
+        if holder is not None:
+            doing = f", which executes {holder}" if holder else ""
             return f"component '{running.start.component}'{doing}"
         return self.outbox.unconfigured(running.configuring)
 

@@ -120,6 +120,7 @@ class RunningSkill:
         self._thread = threading.get_ident()
         self._expired = False
         self._waited = ""
+        self._holder: str | None = None
         self._timer: asyncio.TimerHandle | None = None
 
     # -- answers -----------------------------------------------------------------------------------------
@@ -205,6 +206,24 @@ class RunningSkill:
     def wait(self, holder: str) -> None:
         """Note the skill whose end this skill waits for."""
         self._observer.note_wait(self.start, holder)
+
+    def held(self, holder: str) -> None:
+        """Note the skill of another program that the component executes first; empty when this skill begins."""
+        if self.answered or self.stopped:
+            return
+        if holder:
+            self._observer.note_wait(self.start, holder)
+        else:
+            self._observer.note_turn(self.start)
+        self._holder = holder or None
+
+    @property
+    def holder(self) -> str | None:
+        """The skill whose end this skill waits for; empty if the component is free, and `None` without a wait."""
+        if self.begun or self.claim is None:
+            return self._holder
+        claim = self.claim.turns.holder
+        return "" if claim is None or claim is self.claim else claim.claimant.describe()
 
     def lose(self, taker: str) -> None:
         """Post `preempted`, since a skill with a higher priority takes the component; the task is then cancelled."""

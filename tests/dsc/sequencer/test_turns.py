@@ -274,6 +274,51 @@ def test_a_client_of_a_hosted_component_preempts_another():
     assert (arm.most, order(arm)) == (1, ["inner", "inner cancelled", "urgent", "inner"])
 
 
+def test_who_waits_for_a_skill_of_another_client_knows_the_holder():
+    records: list[Record] = []
+    said = []
+    waits = "{trigger: arm.move, with: {to: right}, within: 2}"
+    late = f"""
+        plot: late
+        emits: {{late: {{why: text}}}}
+        states:
+          w: {{entry: {waits}, on: {{timed_out: {{to: b, emit: late, with: {{why: ?event.reason}}}}}}}}
+          b: {{entry: {{trigger: arm.move, with: {{to: up}}}}, on: {{moved: e}}}}
+          e: {{final: true}}
+    """
+
+    async def main():
+        transport, clock = LocalTransport(), LoopClock()
+        host = Host(Arm(), transport, clock)
+        library = Library([plot(INNER), plot(late)])
+        one, other = [await RemoteComponent.connect("arm", transport) for _ in range(2)]
+        first = Sequencer(library, KnowledgeBase(Schema()), [one], clock)
+        trace = Trace(clock.now)
+        trace.listen(records.append)
+        second = Sequencer(library, KnowledgeBase(Schema()), [other], clock, trace=trace)
+        running = asyncio.ensure_future(first.run("inner"))
+        await asyncio.sleep(1)
+        waiting = asyncio.ensure_future(second.run("late"))
+        await asyncio.sleep(1)
+        said.extend(second.diagnose()["waits"])
+        await running
+        end = await waiting
+        await host.close()
+        return end
+
+    end = run_simulated(main())
+    holder = "component 'arm', which executes arm.move of another client"
+    assert said == [f"arm.move of state 'w' waits for {holder}"]
+    (why,) = end.emitted
+    assert why.attributes["why"] == f"arm.move: no outcome within 2 s, it waited for {holder}"
+    turns = [(one.t, one.data["action"], one.data.get("for")) for one in records if "action" in one.data]
+    assert [one for one in turns if one[1] in {"wait", "begin"}] == [
+        (1, "wait", "arm.move of another client"),
+        (3, "wait", "arm.move of another client"),
+        (5, "begin", None),
+    ]
+
+
 def test_the_trace_tells_what_waits_for_what():
     records: list[Record] = []
     executed(regions(region("a", 0), region("b", 1)), arm=Arm(), records=records)
