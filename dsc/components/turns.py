@@ -84,6 +84,10 @@ class Turns:
     holder: Claim | None = None
     waiting: list[Claim] = field(default_factory=list)
 
+    def __reduce__(self) -> tuple[type[Turns], tuple[()]]:
+        """Pickle without claims: the copy of the component in a skill's process executes nothing else."""
+        return Turns, ()
+
     def give(self) -> None:
         """Give the turn of a free component to the first claim by rank; otherwise let the first claim preempt."""
         if not self.waiting:

@@ -223,6 +223,16 @@ def test_a_blocking_skill_runs_in_a_process_and_reports():
     assert reports == [Outcome("begun", {"n": 3})]
 
 
+def test_a_skill_in_a_process_has_the_turn_of_its_component_while_another_waits():
+    who = "entry: {trigger: far.whoami, with: {n: 1}}"
+    regions = ", ".join(
+        f"r{n}: {{states: {{a{n}: {{{who}, on: {{pid: e{n}}}}}, e{n}: {{final: true}}}}}}" for n in (1, 2)
+    )
+    ran = Ran(f"{{plot: p, states: {{s: {{regions: {{{regions}}}, on: {{done: e}}}}, e: {{final: true}}}}}}", arm=Far())
+    assert ran.end.finished
+    assert [one["action"] for one in ran.of_type("action") if one["action"] in {"wait", "begin"}] == ["wait", "begin"]
+
+
 @pytest.mark.parametrize(
     ("name", "why"),
     [
