@@ -110,7 +110,9 @@ class Deployment:
         until: float | None = None,
         prepare: Callable[[Sequencer], None] | None = None,
     ) -> Report:
-        """Run the task and return the report, also if the operator ends the run with Ctrl-C.
+        """Run the task and return the report, also if Ctrl-C, SIGTERM or SIGHUP ends the run.
+
+        SIGTERM and SIGHUP suspend a run with a store: components are stopped as at an end, and the run can be resumed.
 
         Args:
             simulated: whether time jumps from event to event; a resumed run keeps its kind of time.
@@ -134,8 +136,8 @@ class Deployment:
 
         try:
             end = self._run(ready, simulated=simulated, speed=speed, until=until)
-        except KeyboardInterrupt:
-            end = RunEnd(finished=False, problem="the operator ended the run")
+        except KeyboardInterrupt as interrupt:
+            end = RunEnd(finished=False, problem=self._interrupted(*interrupt.args))
         return self._report(end, time.perf_counter() - started)
 
     def _run(
@@ -153,6 +155,12 @@ class Deployment:
         return self.executive.achieve(
             task.goal, simulated=simulated, speed=speed, until=until, prepare=prepare, header=header
         )
+
+    def _interrupted(self, name: str = "") -> str:
+        """Return how a run ended at the signal of that name, or at Ctrl-C."""
+        if not name:
+            return "the operator ended the run"
+        return f"{name} suspended the run, which can be resumed" if self.executive.store else f"{name} ended the run"
 
     def header(self) -> dict[str, Any]:
         """Return the inputs that determine a run, for the first line of the trace."""

@@ -108,7 +108,7 @@ class Executive:
             raise InputError("a store provides the knowledge: give a store or knowledge, not both")
         if knowledge is not None:
             require_extension(self.domain.schema, knowledge.schema)
-        self._store = None if store is None else located(store)
+        self.store = None if store is None else located(store)
         self.library = plots if isinstance(plots, Library) else Library(plots)
         if ACHIEVE not in self.library:
             self.library.add(achieve_plot())
@@ -129,7 +129,7 @@ class Executive:
             self.knowledge = knowledge
         else:  # last, since the caller must close an opened knowledge base
             kept = None if store is None else durability
-            self.knowledge = KnowledgeBase.open(self.domain.schema, self._store, kept)
+            self.knowledge = KnowledgeBase.open(self.domain.schema, self.store, kept)
 
     @classmethod
     def of_bundles(
@@ -328,13 +328,13 @@ class Executive:
         return sequencer, planning
 
     def _run_store(self, header: Mapping[str, Any]) -> RunStore | None:
-        if self._store is None:
+        if self.store is None:
             return None
-        return RunStore(self.knowledge, self._store, header, self.domain.statements())
+        return RunStore(self.knowledge, self.store, header, self.domain.statements())
 
     def close(self) -> None:
         """Close the store, and terminate the processes of the default planners."""
-        if self._store is not None:
+        if self.store is not None:
             self.knowledge.close()
         for planner in self._own_planners.values():
             planner.kill()

@@ -18,6 +18,7 @@ from contextvars import Context, ContextVar, copy_context
 from functools import partial
 from typing import Any, NamedTuple, TypeVar, TypeVarTuple, Unpack
 
+from dsc.sequencer.signals import run_until_signal
 from knowledge_base.errors import InputError
 
 _Result = TypeVar("_Result")
@@ -358,14 +359,20 @@ def run_simulated(main: Coroutine[Any, Any, _Result], at: float = 0.0, speed: fl
 
     Raises:
         InputError: the speed is not positive.
+        KeyboardInterrupt: Ctrl-C or a signal has cancelled the coroutine, see `run_until_signal`.
     """
     if not speed > 0:
         main.close()
         raise InputError(f"a speed is a positive number of simulated seconds per real second, not {speed:g}")
     with asyncio.Runner(loop_factory=lambda: SimulatedEventLoop(at, speed)) as runner:
-        return runner.run(main)
+        return run_until_signal(runner, main)
 
 
 def run_real(main: Coroutine[Any, Any, _Result]) -> _Result:
-    """Run a coroutine in real time, and return its result."""
-    return asyncio.run(main)
+    """Run a coroutine in real time, and return its result.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C or a signal has cancelled the coroutine, see `run_until_signal`.
+    """
+    with asyncio.Runner() as runner:
+        return run_until_signal(runner, main)

@@ -150,6 +150,13 @@ class Reactor:
             self.problem = self.problem or str(error)
             return ()
 
+    def suspend(self) -> tuple[Output, ...]:
+        """Exit the active states without a record or a change of knowledge, and return the outputs of exit actions."""
+        try:
+            return self.machine.leave(KnowledgeSituation(self.knowledge, self.library)).output
+        except InputError:  # a value of an exit action cannot be computed
+            return ()
+
     def _received(self, message: Message) -> Event | None:
         """Apply the observations of a message; return its event for the machine, or `None`."""
         if isinstance(message, LateMessage):

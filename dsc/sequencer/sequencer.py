@@ -27,6 +27,7 @@ from dsc.sequencer.inbox import Inbox, LivelockGuard
 from dsc.sequencer.phase_watch import PhaseWatch
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.recovery import recover, require_components
+from dsc.sequencer.signals import ending_signal
 from dsc.sequencer.watchdog import Watchdog
 from dsc.trace import Trace
 from knowledge_base._notebook import table
@@ -283,8 +284,11 @@ class Sequencer:
                 self._take(message)
         except asyncio.CancelledError:  # cancelled from outside; after a crash, this handler does not run
             reactor.problem = reactor.problem or "it was cancelled"
-            self._leave()
-            self._keep_end()
+            if self.store is not None and ending_signal():
+                self._suspend()
+            else:
+                self._leave()
+                self._keep_end()
             raise
         finally:
             if limit is not None:
@@ -413,6 +417,12 @@ class Sequencer:
                 output = self._reactor.leave()
                 self._keep_step(None, output)
         self._carry_out(output)
+
+    def _suspend(self) -> None:
+        """Send the actions of a leave, which stop the components, and store none of it; the run can be resumed."""
+        assert self.store is not None  # noqa: S101
+        if self.store.begun and not self.store.lost:
+            self._carry_out(self._reactor.suspend())
 
     def _keep_step(self, message: Message | None, output: Iterable[Output]) -> None:
         assert self.store is not None  # noqa: S101
