@@ -259,6 +259,8 @@ class Component(ComponentHooks, RestartHooks):
     def update(self, event: str, *values: Any) -> None:
         """Pass new values to the test of each activation of the event; later activations begin with these values.
 
+        Drivers may call it from any thread. The values of one thread arrive in their order.
+
         Raises:
             UnknownNameError: the component has no such event.
         """

@@ -37,6 +37,7 @@ from typing import Any, TypeVar
 from dsc.annotations import names_around, parameter_types
 from dsc.calls import SkillCall
 from dsc.components.hooks import contained
+from dsc.loop_calls import LoopCalls
 from dsc.outcomes import Outcome
 from dsc.skills import Declared, SkillBody, refused_at, require_function, returned
 from knowledge_base.errors import SchemaError
@@ -113,17 +114,21 @@ class EventActivations:
     def __init__(self) -> None:
         self._values: dict[str, tuple[Any, ...]] = {}
         self._tests: defaultdict[str, list[Test]] = defaultdict(list)
+        self._calls = LoopCalls()
 
     def __getstate__(self) -> dict[str, object]:
         """Return the state for pickling, without activations, which stay in this process."""
-        return {"_values": self._values, "_tests": defaultdict(list)}
+        return {"_values": self._values, "_tests": defaultdict(list), "_calls": LoopCalls()}
 
     def active(self, event: str) -> bool:
         """Return whether the event has an activation."""
         return bool(self._tests[event])
 
     def update(self, event: str, values: tuple[Any, ...]) -> None:
-        """Store the event's values, and call all its tests with them."""
+        """Store the event's values, and call all its tests with them, in the thread of their loop."""
+        self._calls.call(self._update, event, values)
+
+    def _update(self, event: str, values: tuple[Any, ...]) -> None:
         self._values[event] = values
         for test in tuple(self._tests[event]):
             test(*values)
@@ -131,6 +136,7 @@ class EventActivations:
     @contextmanager
     def tested(self, event: str, test: Test) -> Iterator[None]:
         """Call the test with the event's present values, if any, and inside the block with each update."""
+        self._calls.bind()
         self._tests[event].append(test)
         try:
             if event in self._values:

@@ -10,6 +10,7 @@ from typing import Any
 
 from dsc.components.endpoint import NoAnswerError, encoded
 from dsc.components.life_cycle import Life, LifeCycle
+from dsc.loop_calls import LoopCalls
 from dsc.model.ranges import Range
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
@@ -50,13 +51,14 @@ class Push:
         self._newest: bytes | None = None
         self._listeners: dict[Receiver, None] = {}
         self._timer: asyncio.TimerHandle | None = None
+        self._calls = LoopCalls()
 
     def __getstate__(self) -> dict[str, object]:
         """Return the state for pickling, without listeners, which stay in this process."""
         return {**self.__dict__, "_listeners": {}, "_timer": None}
 
     def put(self, **values: Any) -> None:
-        """Set new values; call it in the loop's own thread.
+        """Set new values, from any thread; listeners are called in their own loop's thread.
 
         Raises:
             InputError: a value is missing, has another type, or is not plain data.
@@ -70,14 +72,18 @@ class Push:
                 raise InputError(f"'{self._name}' needs its value '{name}'")
             if kind is not None:
                 Range(kind).check(f"{self._name}.{name}", values[name])
-        self._newest = encoded(values)
+        self._calls.call(self._take, encoded(values))
+
+    def _take(self, newest: bytes) -> None:
+        self._newest = newest
         if self.period is None:
             self._push()
         else:
             self._start_timer()
 
     def listen(self, listener: Receiver) -> None:
-        """Pass the newest values and all later ones to the listener."""
+        """Pass the newest values and all later ones to the listener, in the running loop's thread."""
+        self._calls.bind()
         self._listeners[listener] = None
         if self._newest is not None:
             listener(json.loads(self._newest))

@@ -18,6 +18,7 @@ from contextvars import Context, ContextVar, copy_context
 from functools import partial
 from typing import Any, NamedTuple, TypeVar, TypeVarTuple, Unpack
 
+from dsc.loop_calls import LoopCalls
 from dsc.sequencer.signals import run_until_signal
 from knowledge_base.errors import InputError
 
@@ -37,9 +38,14 @@ class LoopClock:
 
     Args:
         at: the clock's first time, in seconds; the clock of a resumed run continues from there.
+
+    Attributes:
+        calls: executes calls of other threads in the loop's thread.
     """
 
     def __init__(self, at: float = 0.0) -> None:
+        self.calls = LoopCalls()
+        self.calls.bind()
         self._time = asyncio.get_running_loop().time
         self._start = self._time() - at
 

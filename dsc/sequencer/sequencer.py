@@ -175,9 +175,10 @@ class Sequencer:
         }
 
     def post(self, event: Event, *, after: float = 0.0) -> None:
-        """Post an event from outside, e.g. an operator's `stop`; call it in the loop's own thread.
+        """Post an event from outside, e.g. an operator's `stop`, from any thread.
 
-        A store keeps a delayed event from this call on, and an immediate event from its macrostep on.
+        Messages of one thread arrive in the order of their calls. A store keeps a delayed event from this call on, or
+        from the loop's next iteration on if another thread calls. It keeps an immediate event from its macrostep on.
 
         Args:
             event: the event's name and attributes.
@@ -191,7 +192,7 @@ class Sequencer:
         self._hand_in(message_checks.checked_event(event, self.library, self.knowledge), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
-        """Post a change of knowledge from outside; call it in the loop's own thread.
+        """Post a change of knowledge from outside, from any thread.
 
         Args:
             delta: the change.
@@ -205,7 +206,7 @@ class Sequencer:
         self._hand_in(message_checks.checked_change(delta, author, self.knowledge), after)
 
     def set_parameter(self, owner: str, name: str, value: object, *, after: float = 0.0) -> None:
-        """Post an operator's setting of a parameter; call it in the loop's own thread.
+        """Post an operator's setting of a parameter, from any thread.
 
         A component receives the value before its next skill begins. A plot uses the value at later entries that set no
         other value. A store keeps both kinds of settings.
@@ -442,8 +443,11 @@ class Sequencer:
     def _hand_in(self, message: FromOutside, after: float) -> None:
         message_checks.require_seconds(after)
         if after <= 0:
-            self._inbox.put(message)
-            return
+            self.clock.calls.call(self._inbox.put, message)
+        else:
+            self.clock.calls.call(self._delay, message, after)
+
+    def _delay(self, message: FromOutside, after: float) -> None:
         self._last_late += 1
         late, due = LateMessage(message, self._last_late), self.clock.now() + after
         if self.store is not None and self.store.begun:
