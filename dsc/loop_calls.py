@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TypeVarTuple, Unpack
 
 _Args = TypeVarTuple("_Args")
-_BINDING = threading.Lock()
+_BINDING = threading.RLock()
 """Held while a loop is bound, so that no call without a loop is executed at the same time."""
 
 

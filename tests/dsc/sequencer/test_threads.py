@@ -12,6 +12,7 @@ from dsc_charts import plot
 from dsc import Component, Event, Library, LoopClock, Outcome, Sequencer, SkillCall, run_simulated, skill
 from dsc.components.ports import event
 from dsc.components.streams import Push, Stream
+from dsc.loop_calls import LoopCalls
 from dsc.sequencer.clock import run_real
 from knowledge_base import Delta, KnowledgeBase, Schema, fact
 
@@ -168,3 +169,12 @@ def test_values_before_and_after_a_run_are_kept():
         thread = threading.Thread(target=scanner.update, args=("battery", level))
         thread.start()
         thread.join()
+
+
+def test_a_call_without_a_loop_may_lead_to_another():
+    calls = LoopCalls()
+    done: list[int] = []
+    thread = threading.Thread(target=calls.call, args=(calls.call, done.append, 1), daemon=True)
+    thread.start()
+    thread.join(5)
+    assert done == [1]
