@@ -381,19 +381,19 @@ class PlanRun:
         }
 
     @classmethod
-    def from_json(cls, form: Mapping[str, Any], now: Settled, attempts: Mapping[str, Attempt]) -> PlanRun:
+    def from_json(cls, form: Mapping[str, Any], now: Settled, attempt: Attempt) -> PlanRun:
         """Return the run that `to_json` wrote as `form`.
 
         Args:
             form: the run as plain data.
             now: the domain with conditions expanded for the present world.
-            attempts: the attempts by task.
+            attempt: the attempt at the run's goal.
         """
         goal = parse_condition(form["goal"])
         return cls(
             goal=goal,
             progress=PlanProgress.from_json(form["progress"], now.domain, now.condition(goal)),
-            attempt=attempts.get(task_of(goal, form["holder"])) or Attempt(),
+            attempt=attempt,
             state=PlanState(form["state"]),
             successor=None if form["successor"] is None else Successor.from_json(form["successor"]),
             begun=set(form["begun"]),
@@ -480,15 +480,23 @@ class PlanRuns:
             self.over(replaced)
 
     def remember(self) -> dict[str, Any]:
-        """Return all plans as plain data."""
-        attempts = {task: attempt.to_json() for task, attempt in self._attempts.items()}
-        return {"plans": self._named, "attempts": attempts, "runs": [one.to_json() for one in self._runs.values()]}
+        """Return all plans as plain data, with their attempts: regions may attempt equal goals at the same time."""
+        runs = self._runs.values()
+        attempts = list({id(one): one for one in (*self._attempts.values(), *(run.attempt for run in runs))}.values())
+        numbers = {id(attempt): number for number, attempt in enumerate(attempts)}
+        return {
+            "plans": self._named,
+            "attempts": [attempt.to_json() for attempt in attempts],
+            "tasks": {task: numbers[id(attempt)] for task, attempt in self._attempts.items()},
+            "runs": [{**run.to_json(), "attempt": numbers[id(run.attempt)]} for run in runs],
+        }
 
     def recall(self, memory: Mapping[str, Any], now: Settled) -> None:
         """Restore the plans that `remember` returned, with conditions expanded for the present world."""
         self._named = memory["plans"]
-        self._attempts = {task: Attempt.from_json(form) for task, form in memory["attempts"].items()}
-        self._runs = {form["name"]: PlanRun.from_json(form, now, self._attempts) for form in memory["runs"]}
+        attempts = [Attempt.from_json(form) for form in memory["attempts"]]
+        self._attempts = {task: attempts[number] for task, number in memory["tasks"].items()}
+        self._runs = {form["name"]: PlanRun.from_json(form, now, attempts[form["attempt"]]) for form in memory["runs"]}
 
 
 def task_of(goal: Expression, holder: str) -> str:

@@ -132,8 +132,23 @@ def test_a_withdrawn_step_ends_alone_also_after_a_restart():
     assert asyncio.run(ended(run, lambda: run.withdraw(2))) == {2: Withdrawn()}
     world = KnowledgeBase(DOMAIN.schema)
     world.apply(Delta(nodes={**dict.fromkeys("abcd", "room"), "cup": "thing"}), "test")
-    again = PlanRun.from_json(json.loads(json.dumps(run.to_json())), derivation(DOMAIN).at(world), {})
+    again = PlanRun.from_json(json.loads(json.dumps(run.to_json())), derivation(DOMAIN).at(world), Attempt())
     assert asyncio.run(ended(again, lambda: None)) == {2: Withdrawn()}
+
+
+def test_two_attempts_at_equal_goals_are_different_after_a_restart():
+    runs = PlanRuns()
+    attempts = [runs.attempt("task", None), runs.attempt("task", None)]
+    for number, attempt in enumerate(attempts):
+        attempt.disturbances = number
+        progress = PlanProgress(STEPS, DOMAIN, GOAL)
+        runs.add(PlanRun(f"plan_{number}", GOAL, progress, attempt, "errand", 5, 4))
+    world = KnowledgeBase(DOMAIN.schema)
+    world.apply(Delta(nodes={**dict.fromkeys("abcd", "room"), "cup": "thing"}), "test")
+    again = PlanRuns()
+    again.recall(json.loads(json.dumps(runs.remember())), derivation(DOMAIN).at(world))
+    assert [again.required(f"plan_{number}").attempt for number in range(2)] == attempts
+    assert again.interrupted("task") is again.required("plan_1").attempt
 
 
 @pytest.mark.parametrize("state", PlanState)
@@ -144,7 +159,7 @@ def test_what_is_remembered_of_a_plan_is_plain_data_and_is_recalled(state):
     world = KnowledgeBase(DOMAIN.schema)
     world.apply(Delta(nodes=dict.fromkeys("abcd", "room")), "test")
     form = json.loads(json.dumps(run.to_json()))
-    again = PlanRun.from_json(form, derivation(DOMAIN).at(world), {})
+    again = PlanRun.from_json(form, derivation(DOMAIN).at(world), Attempt())
     assert again.to_json() == form
     assert (again.state, again.successor, again.news) == (run.state, run.successor, run.news)
 
