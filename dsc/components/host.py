@@ -93,6 +93,7 @@ class Host:
         life = self._component.life
         needs = list(self._needed())  # may change the life
         said = {"life": life.state, "reason": life.reason, "bug": life.bug is not None, "mode": life.mode}
+        said["program"] = self.endpoint.life
         self._condition.put({**said, "needs": needs})
         self._heart.stir()
 

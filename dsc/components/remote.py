@@ -49,6 +49,7 @@ class RemoteComponent(Component):
         self._condition = Subscription(endpoint, name, CONDITION, self._changed)
         self._heart = Heartbeat(endpoint, lambda: [name], _ignore, root=True)
         self._working: tuple[asyncio.Task[None], ...] = ()
+        self._program = ""  # the host's life
 
     def remember(self) -> str:
         """Return the name of this program's run, by which the host identifies its actions."""
@@ -146,13 +147,17 @@ class RemoteComponent(Component):
     def _changed(self, condition: Any) -> None:
         match condition:
             case {
-                "life": str(life), "reason": str(reason), "bug": bool(bug), "mode": str(mode), "needs": [*needs]
+                "life": str(life), "reason": str(reason), "bug": bool(bug), "mode": str(mode), "needs": [*needs],
+                "program": str(program),
             } if life in list(Life):  # fmt: skip
                 for need in needs:
                     require_text(need, "the name of a component that is needed")
             case _:
                 raise InputError(f"the condition of '{self.name}' cannot be read: {text_of(condition, repr)}")
+        restarted, self._program = self._program not in {"", program}, program
         if self._working and not self.life.starting:
+            if restarted and self.life.state is Life.ALIVE:
+                self.life.become(Life.FATAL_ERROR, f"the program of '{self.name}' was restarted")
             if self.life.state is Life.SHUTDOWN and life != Life.SHUTDOWN:
                 self.life.become(Life.INIT)
             self.life.become(Life(life), reason, ProgrammingError(reason) if bug else None)

@@ -74,7 +74,8 @@ class Dispatcher:
         self._part_of = part_of
         self._components = {component.name: component for component in require_instances(components)}
         self.activation = ComponentActivation(ComponentRegistry(self._components), self._in_use)
-        self._lives = ComponentLives(self._components.values(), self._failed)
+        self.outbox = Outbox()
+        self._lives = ComponentLives(self._components.values(), self._failed, self.outbox.repeat)
         self._wiring = Wiring(self._components)
         self._faults: list[str] = []
         self._clock = clock
@@ -83,7 +84,6 @@ class Dispatcher:
         self._cleanups = PendingCleanups(self.activation.changed)
         self._asked: list[Turns] = []
         self._forget_tasks: set[asyncio.Task[None]] = set()
-        self.outbox = Outbox()
         self.timers = Timers(clock, post)
 
     def deploy(self, component: Component) -> None:
@@ -388,10 +388,13 @@ class Dispatcher:
             await running.turn()
         if running.configuring:
             await self.outbox.configured(running.configuring)
+        self.outbox.remind(component)
         if component.name in self.outbox.untaken:
             await self.outbox.taken(component)
         if dependencies.concerned or component.life.state is not Life.ALIVE:
             await dependencies.ready()
+            if component.name in self.outbox.untaken:  # the component was started again, without its settings
+                await self.outbox.taken(component)
         if interrupted is not None and began is not None:
             status = await component.status(call.action_id, start.skill, start.arguments)
             if isinstance(status, Ended):

@@ -39,6 +39,9 @@ class Outbox:
         self.configuring: Configuring = {}
         self._under_way: dict[int, Told] = {}
         self._refused: deque[Told] = deque(maxlen=_MOST_REFUSED)
+        self._parameters: dict[str, dict[str, SetParameter]] = {}  # the effective ones, by component
+        self._modes: dict[str, SwitchMode] = {}
+        self._forgotten: set[str] = set()  # components that have started again without their settings
         self._last = 0
 
     @property
@@ -75,12 +78,44 @@ class Outbox:
             if isinstance(one, SwitchMode):
                 self._begin(component, "switch", (one,), partial(_restore_mode, component, one.mode))
 
+    def repeat(self, component: Component) -> None:
+        """Deliver the effective settings again, since the component has started again after a failure."""
+        name = component.name
+        if name not in self._parameters and name not in self._modes:
+            return
+        self._forgotten.add(name)
+
+        async def configure() -> None:
+            values = {one.parameter: one.value for one in self._parameters.get(name, {}).values()}
+            if values:
+                await component.configure_all(encoded(values))
+            if name in self._modes:
+                await component.change_mode(self._modes[name].mode)
+            self._forgotten.discard(name)
+
+        self._begin(component, "configure_all", (), configure)
+
+    def remind(self, component: Component) -> None:
+        """Deliver the effective settings again if the component has refused them after its last start."""
+        if component.name in self._forgotten and component.name not in self.untaken:
+            self.repeat(component)
+
+    def _note(self, told: Told) -> None:
+        """Store a setting that a component has received."""
+        match told:
+            case SetParameter(component=name):
+                self._parameters.setdefault(name, {})[told.parameter] = told
+            case SwitchMode(component=name, mode=Life.INIT | Life.SHUTDOWN):
+                self._modes.pop(name, None)
+            case SwitchMode(component=name):
+                self._modes[name] = told
+
     def _begin(
         self, component: Component, hook: str, told: Iterable[Told], take: Callable[[], Awaitable[None]]
     ) -> None:
         numbers = {self._last + n: one for n, one in enumerate(told, start=1)}
         self._under_way |= numbers
-        self._last = max(numbers)
+        self._last += len(numbers)
 
         before = self.untaken.get(component.name)
 
@@ -92,6 +127,8 @@ class Outbox:
                     await component.life.come_alive(component.start)
                 with contained(f"{component.name}.{hook}", component.device_errors):
                     await take()
+                for one in numbers.values():
+                    self._note(one)
             except Exception:
                 self._refused.extend(numbers.values())
                 raise

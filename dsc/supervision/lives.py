@@ -1,4 +1,4 @@
-"""The lives of a run's components: announces each failure, and stops the components at the end (S0 5.1)."""
+"""The lives of a run's components: announces each failure and restart, and stops the components at the end (S0 5.1)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,18 @@ class ComponentLives:
     Args:
         components: the components at the start of the run.
         failed: receives each component that enters FatalError.
+        restarted: receives each component that is alive again after a failure.
     """
 
-    def __init__(self, components: Iterable[Component], failed: Callable[[Component], None]) -> None:
+    def __init__(
+        self,
+        components: Iterable[Component],
+        failed: Callable[[Component], None],
+        restarted: Callable[[Component], None],
+    ) -> None:
         self._failed = failed
+        self._restarted = restarted
+        self._lost: set[Component] = set()
         self._last: dict[Component, Life] = {}
         self._listeners: dict[Component, Callable[[], None]] = {}
         for component in components:
@@ -31,6 +39,8 @@ class ComponentLives:
         if component in self._listeners:
             return
         component.life.runs += 1
+        if component.life.state is Life.FATAL_ERROR:
+            self._lost.add(component)
         self._last[component] = component.life.state
         self._listeners[component] = listener = partial(self._look, component)
         component.life.listen(listener)
@@ -38,7 +48,11 @@ class ComponentLives:
     def _look(self, component: Component) -> None:
         before, self._last[component] = self._last[component], component.life.state
         if component.life.state is Life.FATAL_ERROR is not before:
+            self._lost.add(component)
             self._failed(component)
+        elif component.life.state is Life.ALIVE and component in self._lost:
+            self._lost.discard(component)
+            self._restarted(component)
 
     async def close(self, *, stop: bool) -> list[str]:
         """Stop listening; if `stop`, also stop the components that no other run has, within `GRACE` seconds.
