@@ -35,11 +35,10 @@ _INDEX_HEADS = ((3007000).to_bytes(4, "little"), (3007000).to_bytes(4, "big"), b
 _MAGIC = b"SQLite format 3\0"
 _SHORTEST = 512
 """Length of the smallest database in bytes; SQLite treats a shorter file as empty."""
-_INDEX_PART = 32768
-"""The length of an index is a multiple of this number of bytes.
-
-While SQLite creates an index, its length is briefly 3 bytes.
-"""
+_INDEX_PART = 4096
+"""The length of an index is a multiple of this number of bytes, also while SQLite lengthens the index part by part."""
+_NEW_INDEX = 3
+"""The length of an index in bytes just after SQLite has created it."""
 _LOCK_MARK = re.compile(rb"dsc writer +(\d+)\n")
 """The content of a lock file, always with the same length; a lock file is never empty."""
 
@@ -150,7 +149,7 @@ def require_no_strangers(store: Path, *, there: bool) -> None:
     size = _size(index)  # the index is read first: SQLite creates the log before it, and deletes the log after it
     if there and _size(log) is not None:
         _require(log, store, _head(log, 12) in (*_LOG_HEADS, b"", None), "is not a log of SQLite")
-        _require(index, store, size is None or size % _INDEX_PART in (0, 3), "is not an index of SQLite")
+        _require(index, store, size in (None, _NEW_INDEX) or not size % _INDEX_PART, "is not an index of SQLite")
         return
     for path in (log, index):
         _require(path, store, there or _size(path) is None, "remains of another store, and may hold its last changes")

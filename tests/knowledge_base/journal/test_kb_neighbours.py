@@ -149,6 +149,26 @@ def test_an_empty_lock_is_somebody_elses(store, tmp_path) -> None:
     refused(tmp_path, lambda: OPENINGS["write"](store), name="'s.kb-lock'")
 
 
+@pytest.mark.parametrize("length", [0, 3, 4096, 7 * 4096, 32768, 9 * 4096])
+def test_an_index_that_another_process_creates_is_accepted(tmp_path, length) -> None:
+    with KnowledgeBase.open(SCHEMA, tmp_path / "s.kb") as kb:
+        kb.apply(CLEAN, "me")
+        shutil.copytree(tmp_path, tmp_path / "died", ignore=shutil.ignore_patterns("*-lock"))
+    os.truncate(tmp_path / "died" / "s.kb-shm", length)
+    with KnowledgeBase.open(None, tmp_path / "died" / "s.kb") as kb:
+        assert kb.holds("clean", ("c1",))
+
+
+@pytest.mark.parametrize("length", [5, 100, 4097])
+def test_a_file_with_another_length_is_no_index(tmp_path, length) -> None:
+    with KnowledgeBase.open(SCHEMA, tmp_path / "s.kb") as kb:
+        kb.apply(CLEAN, "me")
+        shutil.copytree(tmp_path, tmp_path / "died", ignore=shutil.ignore_patterns("*-lock"))
+    died = tmp_path / "died"
+    os.truncate(died / "s.kb-shm", length)
+    refused(died, lambda: OPENINGS["write"](died / "s.kb"), name="'s.kb-shm'")
+
+
 def test_an_index_without_a_log_is_judged_by_its_content(store, tmp_path) -> None:
     index = tmp_path / "s.kb-shm"
     index.write_bytes(b"my own" * 32768)
