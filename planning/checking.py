@@ -198,13 +198,12 @@ class _Robot:
 
     def _exclusive(self) -> frozenset[str]:
         """Return the skills of the components that execute one skill at a time, as `component.skill`."""
-        own = (
-            one
+        return frozenset(
+            f"{skill.component}.{skill.name}"
             for component in self._components or ()
-            if not component.concurrent
-            for one in component.skills().values()
+            for skill in component.skills().values()
+            if component.takes_turns(skill)
         )
-        return frozenset(f"{one.component}.{one.name}" for one in own if one.pattern == "skill")
 
     def _declared(self) -> dict[str, Mapping[str, Parameter]] | None:
         if self._components is None:

@@ -191,6 +191,10 @@ class Component(ComponentHooks, RestartHooks):
         """Return the signatures of all decorated methods, by skill name."""
         return dict(signatures(type(self), self.name))  # type: ignore[arg-type]  # mypy: classes are hashable
 
+    def takes_turns(self, skill: SkillSignature) -> bool:
+        """Return whether a skill waits until no other skill has the component; events and queries never wait."""
+        return not self.concurrent and skill.pattern == "skill"
+
     def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Awaitable[Outcome]:
         """Start the named skill and return its awaitable outcome; the dispatcher awaits and may cancel it.
 

@@ -255,7 +255,7 @@ class HostedActions:
         """Return the turn of the component for a skill; a concurrent component needs none."""
         component, skill = self._component, said["skill"]
         signature = component.skills().get(skill)
-        if component.concurrent or signature is None or signature.pattern != "skill":
+        if signature is None or not component.takes_turns(signature):
             return nullcontext()
 
         def waits(holder: str) -> None:

@@ -259,12 +259,10 @@ class Dispatcher:
         await self._clock.settled()
 
     def has_turns(self, start: steps.Start) -> bool:
-        """Return whether the skill waits for its turn, since its component is not concurrent."""
+        """Return whether the skill waits for its turn, see `Component.takes_turns`."""
         component = self._components.get(start.component)
-        if component is None or component.concurrent:
-            return False
-        signature = component.skills().get(start.skill)
-        return signature is not None and signature.pattern == "skill"
+        signature = None if component is None else component.skills().get(start.skill)
+        return component is not None and signature is not None and component.takes_turns(signature)
 
     def _free(self, claim: Claim) -> None:
         """Free the turn of a skill that has ended; skills of the present macrostep, dispatched next, may get it."""
@@ -340,7 +338,7 @@ class Dispatcher:
             start, signature, raises, within, due, self._clock, self._post, self._fault, self._observer
         )
         running.configuring = self.outbox.configuring
-        if not component.concurrent and signature.pattern == "skill":
+        if component.takes_turns(signature):
             running.claim, running.begun = Claim(component.turns, running, start.rank), False
             component.turns.waiting.append(running.claim)
             self._asked.append(component.turns)

@@ -143,9 +143,8 @@ class Outbox:
 
     async def configured(self, tasks: Configuring) -> None:
         """Wait until the components have received or refused the parameters and modes of a macrostep."""
-        await asyncio.wait(
-            tasks.values()
-        )  # also for tasks that are done, so that skills begin in the order of the chart
+        # Also for tasks that are done, so that skills begin in the order of the chart.
+        await asyncio.wait(tasks.values())
 
     def unconfigured(self, tasks: Configuring) -> str:
         """Return a component that has not received its parameters and modes, as text; empty if there is none."""
