@@ -146,6 +146,7 @@ pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg
 	$(BIN)/dsc plot show domains/clean_up_table/plots/search.yaml --svg docs/pictures/search.svg
 	$(BIN)/dsc plot show planning/plots/achieve.yaml --svg docs/pictures/achieve.svg
+	$(BIN)/dsc plot show docs/plots/life_cycle.yaml --svg docs/pictures/life_cycle.svg
 	$(BIN)/dsc kb draw examples/kitchen/problem.pddl --to docs/pictures/kitchen.svg
 
 NODE_MODULES := frontend/node_modules/.made

@@ -19,6 +19,7 @@ from dsc.errors import ProgrammingError
 from dsc.profiles import adapted, configure
 from dsc.runs.archive import RunRow, archive, has_run, unfinished
 from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.sequencer.signals import OnSignal
 from dsc.text.profiles import Profile
 from dsc.trace import Listener, Record
 from knowledge_base.errors import InputError, Place, StoreError, UnknownNameError
@@ -108,17 +109,18 @@ class Deployment:
         simulated: bool = True,
         speed: float = math.inf,
         until: float | None = None,
+        on_signal: OnSignal = "suspend",
         prepare: Callable[[Sequencer], None] | None = None,
     ) -> Report:
         """Run the task and return the report, also if Ctrl-C, SIGTERM or SIGHUP ends the run.
-
-        SIGTERM and SIGHUP suspend a run with a store: components are stopped as at an end, and the run can be resumed.
 
         Args:
             simulated: whether time jumps from event to event; a resumed run keeps its kind of time.
             speed: simulated seconds per real second, for people who watch.
             until: second of run time at which the run ends at the latest, see `Executive.run`; a resumed run keeps its
                 limit.
+            on_signal: with a store, `suspend` stops the components as at an end, and the run can be resumed; `end`
+                ends the run.
             prepare: called with the sequencer before the run starts.
 
         Raises:
@@ -129,6 +131,7 @@ class Deployment:
         started = time.perf_counter()
 
         def ready(sequencer: Sequencer) -> None:
+            sequencer.on_signal = on_signal
             if self.simulation is not None and self.simulation.scene() is not None:
                 sequencer.trace.listen(_SceneWriter(self.simulation, sequencer))
             if prepare is not None:
@@ -137,7 +140,8 @@ class Deployment:
         try:
             end = self._run(ready, simulated=simulated, speed=speed, until=until)
         except KeyboardInterrupt as interrupt:
-            end = RunEnd(finished=False, problem=self._interrupted(*interrupt.args))
+            suspended = self.executive.store is not None and on_signal == "suspend"
+            end = RunEnd(finished=False, problem=_interrupted(*interrupt.args, suspended=suspended))
         return self._report(end, time.perf_counter() - started)
 
     def _run(
@@ -155,12 +159,6 @@ class Deployment:
         return self.executive.achieve(
             task.goal, simulated=simulated, speed=speed, until=until, prepare=prepare, header=header
         )
-
-    def _interrupted(self, name: str = "") -> str:
-        """Return how a run ended at the signal of that name, or at Ctrl-C."""
-        if not name:
-            return "the operator ended the run"
-        return f"{name} suspended the run, which can be resumed" if self.executive.store else f"{name} ended the run"
 
     def header(self) -> dict[str, Any]:
         """Return the inputs that determine a run, for the first line of the trace."""
@@ -226,6 +224,12 @@ class Deployment:
         if derived.recursive:
             wanted = derived.at(knowledge).condition(wanted)
         return "knowledge", [Left(what, reason=why) for what in unmet(wanted, knowledge)]
+
+
+def _interrupted(name: str = "SIGINT", *, suspended: bool) -> str:
+    """Return how a run ended at the signal of that name."""
+    who = "the operator" if name == "SIGINT" else name
+    return f"{who} suspended the run, which can be resumed" if suspended else f"{who} ended the run"
 
 
 def deploy(

@@ -154,7 +154,12 @@ def test_every_limit_on_the_page_is_the_one_in_the_code():
 
 
 TABLE = ROOT / "domains" / "clean_up_table" / "plots"
-PICTURES = {"clean_up_table": TABLE, "search": TABLE, "achieve": ROOT / "planning" / "plots"}
+PICTURES = {
+    "clean_up_table": TABLE,
+    "search": TABLE,
+    "achieve": ROOT / "planning" / "plots",
+    "life_cycle": ROOT / "docs" / "plots",
+}
 
 
 @pytest.mark.parametrize("name", PICTURES)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import inspect
 from collections.abc import Awaitable, Mapping
+from dataclasses import asdict
 from inspect import get_annotations
 from pathlib import Path
 from typing import Any, ClassVar
@@ -33,9 +34,11 @@ class ComponentHooks:
         domain: the component's part of the planning domain: a PDDL file or PDDL text; `None` without such a part.
         concurrent: whether the component executes several skills concurrently. If not, it executes one skill at a
             time, and the other skills wait, see `dsc.components.turns`.
-        modes: the sub-states of Alive besides `neutral`; if empty, any mode is valid.
+        modes: the sub-states of Alive besides `neutral`; if empty, any mode is valid. A mapping limits the transitions:
+            it maps each mode to the modes that may follow. From and to `neutral`, each transition is permitted.
         device_errors: exceptions that report a failed device, e.g. `(OSError,)`: a skill that raises one ends with
             `skill_error`, and a hook leads to FatalError. Every other exception is a programming error.
+        period: seconds between two calls of `step`; `None` without such steps.
         needs: for each mode, a tuple of names of required components; the key `ALWAYS` applies in every mode.
         parameters: the present values. A component declares its parameters by a subclass: `parameters: BaseParameters`;
             without one, any name is valid.
@@ -45,25 +48,30 @@ class ComponentHooks:
     name: str = ""
     domain: ClassVar[Path | str | None] = None
     concurrent: bool = False
-    modes: ClassVar[tuple[str, ...]] = ()
+    modes: ClassVar[tuple[str, ...] | Mapping[str, tuple[str, ...]]] = ()
     device_errors: ClassVar[tuple[type[BaseException], ...]] = ()
     needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: float | None = None
 
     parameters: Parameters
     configuration: Configuration
     life: LifeCycle
 
     async def start(self) -> None:
-        """Change from Init to Alive. Override to open devices; an error leads to FatalError."""
+        """Enter Alive. Override to open devices; an error leads to FatalError."""
 
     async def stop(self) -> None:
-        """Change to Shutdown. Override to close devices."""
+        """Leave Alive. Override to close devices.
+
+        Each successful `start` has one `stop`: at the end of the run, at a shutdown, or before the next `start`. The
+        skills of the component have ended, and `activate(False)` and `leave_mode` were called before.
+        """
 
     async def activate(self, active: bool) -> None:  # noqa: FBT001
         """Become active for a state or an active component, or become inactive (S1.9, S4.1).
 
         Override to acquire resources if `active`, and to release them if not. The first call comes between `start` and
-        the first skill, and is repeated after a restart. A call with `False` only follows a call with `True`. An error
+        the first skill. Each successful call with `True` has one call with `False`, which comes before `stop`. An error
         leads to FatalError.
         """
 
@@ -82,6 +90,15 @@ class ComponentHooks:
     async def switch(self, mode: str) -> None:
         """Enter a mode (`neutral` when idle), for the *state* port; override to react."""
         self.life.mode = mode
+
+    async def leave_mode(self, mode: str) -> None:
+        """Leave a mode other than `neutral`, before another `switch` and before `stop`; override to react."""
+
+    async def step(self) -> None:
+        """Execute one periodic step: the component calls it every `period` seconds while it is active (S4.13).
+
+        Steps never overlap. An error leads to FatalError. `self.life.steps` counts late and missed steps.
+        """
 
 
 class RestartHooks:
@@ -153,7 +170,7 @@ class Component(ComponentHooks, RestartHooks):
         self.name = name or self.name or type(self).__name__.lower()
         self.configuration = Configuration(self.name, self.parameter_class)
         self.parameters = self.configuration.parameters
-        self.life = LifeCycle(self.name, self.device_errors)
+        self.life = LifeCycle(self)
         self.activations = EventActivations()
         self.turns = Turns()
         self.pushes: dict[str, Push] = {}
@@ -233,19 +250,26 @@ class Component(ComponentHooks, RestartHooks):
         """Execute a chart's `switch`: enter a mode, restart (mode `init`) or shut down (mode `shutdown`).
 
         Raises:
-            UnknownNameError: the component declares its modes, and `mode` is not among them.
+            UnknownNameError: the component declares its modes, and `mode` is not among them, or may not follow the
+                present mode.
         """
         if mode == Life.INIT:
-            self.life.become(Life.INIT)
-            await self.life.come_alive(self.start)
+            await self.life.restart()
         elif mode == Life.SHUTDOWN:
-            await self.stop()
-            self.life.become(Life.SHUTDOWN)
-        elif self.modes and mode not in (NEUTRAL, *self.modes):
+            await self.life.shut_down()
+        else:
+            self._require_mode(mode)
+            await self.life.enter(mode)
+
+    def _require_mode(self, mode: str) -> None:
+        """Raise `UnknownNameError` unless the component may enter the mode from its present one."""
+        if self.modes and mode not in (NEUTRAL, *self.modes):
             valid = (NEUTRAL, *self.modes)
             raise UnknownNameError(f"component '{self.name}' has no mode '{mode}'", found=mode, valid=valid)
-        else:
-            await self.switch(mode)
+        next_modes = self.modes.get(self.mode) if isinstance(self.modes, Mapping) else None
+        if next_modes is not None and mode not in (NEUTRAL, self.mode, *next_modes):
+            message = f"component '{self.name}' cannot change from mode '{self.mode}' to '{mode}'"
+            raise UnknownNameError(message, found=mode, valid=(NEUTRAL, *next_modes))
 
     async def receive(self, port: str, message: Mapping[str, Any]) -> None:
         """Pass a one-way message to the method `port`, which has the decorator `takes`; for the *send* port.
@@ -286,6 +310,7 @@ class Component(ComponentHooks, RestartHooks):
             "skills": sorted(self.skills()),
             "pushes": sorted(self.pushes),
             "streams": {name: stream.source for name, stream in self.streams.items()},
+            "steps": asdict(self.life.steps),
         }
 
 

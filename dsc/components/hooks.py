@@ -21,6 +21,7 @@ from contextvars import ContextVar
 from functools import partial
 from types import TracebackType
 from typing import Any
+from weakref import WeakSet
 
 from dsc.errors import ProgrammingError, SkillError
 from knowledge_base.errors import InputError, described
@@ -176,7 +177,7 @@ def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:
     """
     kind = type(error)  # `isinstance` would read the exception's `__class__`, which may fail
     if issubclass(kind, asyncio.CancelledError):
-        return task is not None and task.cancelling() == 0
+        return task is None or task.cancelling() == 0
     if issubclass(kind, GeneratorExit):  # other code closes a coroutine, never the task that runs it
         return task is running_task()
     return not (issubclass(kind, KeyboardInterrupt) and _from_keyboard(error))
@@ -193,17 +194,25 @@ def running_task() -> asyncio.Task[Any] | None:
 def _from_keyboard(error: BaseException) -> bool:
     """Return whether the error may be Ctrl-C.
 
-    With the signal handler of `asyncio.run`, the traceback identifies Ctrl-C. With another handler, Ctrl-C is assumed.
+    With the signal handler of `asyncio.run`, the traceback identifies Ctrl-C. With another handler, Ctrl-C is assumed,
+    unless the handler has the attribute `raises = False`.
     """
     if threading.current_thread() is not threading.main_thread():
         return False
     handler = signal.getsignal(signal.SIGINT)
-    if _ON_SIGINT is None or not isinstance(handler, partial) or getattr(handler.func, "__func__", None) != _ON_SIGINT:
-        return callable(handler)
+    if not is_handler_of_asyncio(handler):
+        return callable(handler) and bool(getattr(handler, "raises", True))
     innermost = error.__traceback__
     while innermost is not None and innermost.tb_next is not None:
         innermost = innermost.tb_next
     return innermost is not None and innermost.tb_frame.f_code is _ON_SIGINT.__code__
+
+
+def is_handler_of_asyncio(handler: object) -> bool:
+    """Return whether a signal handler is the one of `asyncio.run` for Ctrl-C."""
+    if _ON_SIGINT is None or not isinstance(handler, partial):
+        return False
+    return bool(getattr(handler.func, "__func__", None) == _ON_SIGINT)
 
 
 _ON_SIGINT: Any = getattr(Runner, "_on_sigint", None)  # the handler has no public name
@@ -234,3 +243,12 @@ def give_up(task: asyncio.Task[Any]) -> None:
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(task.get_coro()))
     task._log_destroy_pending = False  # type: ignore[attr-defined]  # noqa: SLF001  # the task is known to be pending
     asyncio.tasks._unregister_task(task)  # noqa: SLF001  # documented under "Extending"
+    _given_up.add(task)
+
+
+def can_end(task: asyncio.Task[Any]) -> bool:
+    """Return whether the end of a task can be awaited: it is neither done nor abandoned, and its loop is open."""
+    return not (task.done() or task in _given_up or task.get_loop().is_closed())
+
+
+_given_up: WeakSet[asyncio.Task[Any]] = WeakSet()

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Mapping
-from contextlib import AbstractAsyncContextManager, nullcontext
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -21,7 +21,7 @@ from dsc.components.hooks import GRACE, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import HostedStreams, Publisher
 from dsc.components.turns import turn_of
-from dsc.errors import PreemptedError, ProgrammingError
+from dsc.errors import PreemptedError, ProgrammingError, SkillError
 from dsc.outcomes import Outcome
 from dsc.rank import ORDINARY, Rank
 from knowledge_base.errors import InputError
@@ -85,7 +85,7 @@ class Host:
         await asyncio.wait(tasks)
         try:
             async with asyncio.timeout(GRACE):
-                await self._component.life.retire(self._component.stop)
+                await self._component.life.retire()
         except Exception as error:  # noqa: BLE001  # the host ends after any error
             _LOG.warning("component '%s' could not stop: %s", self._component.name, reason_of(error))
 
@@ -96,6 +96,8 @@ class Host:
         said["program"] = self.endpoint.life
         self._condition.put({**said, "needs": needs})
         self._heart.stir()
+        if life.state is not Life.ALIVE:
+            self._actions.cancel()
 
     def _needed(self) -> tuple[str, ...]:
         """Return the needs of the component; its error leads to FatalError, and counts as no needs."""
@@ -117,11 +119,7 @@ class Host:
         return {**said, "condition": self._condition.newest}
 
     async def _come_alive(self, _: str, __: Any) -> dict[str, Any]:
-        life = self._component.life
-        before = life.state
-        await life.come_alive(self._component.start)
-        if before is not Life.ALIVE and self._is_active.is_set():  # the component was restarted
-            await life.become_active(id(self), self._component.activate, active=True)
+        await self._component.life.come_alive()
         return self._condition.newest
 
     async def _be_active(self, sender: str, _: Any) -> dict[str, Any]:
@@ -131,10 +129,10 @@ class Host:
         return self._condition.newest
 
     async def _activated(self, active: bool) -> None:  # noqa: FBT001
-        component = self._component
+        life = self._component.life
         if active:
-            await component.life.come_alive(component.start)
-        await component.life.become_active(id(self), component.activate, active=active)
+            await life.come_alive()
+        await life.become_active(id(self), active=active)
         (self._is_active.set if active else self._is_active.clear)()
 
     async def _switch(self, _: str, said: dict[str, Any]) -> dict[str, Any]:
@@ -198,6 +196,7 @@ class HostedActions:
         self._endpoint = endpoint
         self._clock = clock
         self._actions: dict[tuple[str, str], _Action] = {}
+        self._at_work: set[asyncio.Task[Any]] = set()
         endpoint.answer("start", self._start)
         endpoint.answer("how", self._how)
         endpoint.answer("stop", self._stop)
@@ -205,6 +204,11 @@ class HostedActions:
     def tasks(self) -> list[asyncio.Task[None]]:
         """Return the tasks of all actions that were not forgotten."""
         return [action.task for action in self._actions.values() if action.task is not None]
+
+    def cancel(self) -> None:
+        """Cancel the skills that the component executes, since the component is no longer alive."""
+        for task in self._at_work:
+            _cancel(task)
 
     async def _start(self, sender: str, said: dict[str, Any]) -> None:
         action = self._actions.get(_key(said))
@@ -237,7 +241,7 @@ class HostedActions:
                 seconds["deadline"] = self._clock.now() + said["seconds"]
             rank = _rank_of(said.get("rank"))
             call = SkillCall(said["id"], self._clock, lambda one: reports.put(_plain(one)), rank=rank, **seconds)
-            async with asyncio.timeout(said["seconds"]), self._turn(said, action, rank):
+            async with asyncio.timeout(said["seconds"]), self._turn(said, action, rank), self._alive():
                 with contained(f"{self._component.name}.{said['skill']}", self._component.device_errors):
                     outcome = await self._component.execute(said["skill"], call, said["arguments"])
                     form = outcome_form(_plain(outcome))
@@ -250,6 +254,21 @@ class HostedActions:
             end = {"failed": reason_of(error)}
         reports.flush()
         self._tell(said["id"], action, end)
+
+    @asynccontextmanager
+    async def _alive(self) -> AsyncIterator[None]:
+        """Start the component if necessary, and cancel the block when the component is no longer alive."""
+        life, task = self._component.life, asyncio.current_task()
+        assert task is not None  # noqa: S101  # an action is a task
+        await life.come_alive()
+        if life.state is not Life.ALIVE:
+            raise SkillError(f"component '{self._component.name}' is in '{life.state}'")
+        with life.executing(task):
+            self._at_work.add(task)
+            try:
+                yield
+            finally:
+                self._at_work.discard(task)
 
     def _turn(self, said: Mapping[str, Any], action: _Action, rank: Rank) -> AbstractAsyncContextManager[None]:
         """Return the turn of the component for a skill; a concurrent component needs none."""
@@ -277,9 +296,15 @@ class HostedActions:
         """Cancel an action that is running, and forget it."""
         action = self._actions.get(_key(said))
         if action is not None and action.task is not None and not action.over:
-            action.task.cancel()
+            _cancel(action.task)
             await asyncio.wait([action.task])
         self._actions.pop(_key(said), None)
+
+
+def _cancel(task: asyncio.Task[Any]) -> None:
+    """Cancel a task once: another cancellation would interrupt the clean-up of its skill."""
+    if not task.cancelling():
+        task.cancel()
 
 
 def _plain(outcome: Outcome) -> Outcome:

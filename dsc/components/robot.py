@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from importlib import import_module
+from inspect import iscoroutinefunction, signature
 from pathlib import Path
 
 from dsc.components.component import ALWAYS, Component
@@ -133,6 +135,8 @@ def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
             hint = f"; an instance is made by {one.__name__}()" if isinstance(one, type) else ""
             raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
         require_whole(one)
+        _require_modes(one)
+        _require_period(one)
         if one.name in names:
             other = next(other for other in components if other.name == one.name)
             classes = " and ".join(f"{type(each).__name__} ({place_of(type(each))})" for each in (other, one))
@@ -162,6 +166,45 @@ def require_whole(component: Component) -> None:
         if not isinstance(getattr(component, name), wanted):
             message = f"'{name}' of {kind.__name__} hides an attribute of every component; choose another name"
             raise SchemaError(message, place=place_of(kind.__init__), found=name)
+
+
+def _require_modes(component: Component) -> None:
+    """Raise an error unless a component's `modes` are names, or map names to tuples of its names.
+
+    Raises:
+        InputError: the modes are something else, e.g. one name without the comma.
+        UnknownNameError: a mode may follow that the component does not have.
+    """
+    name, modes, place = component.name, component.modes, place_of(type(component))
+    several = modes.values() if isinstance(modes, Mapping) else (modes,)
+    for found in several:
+        if not isinstance(found, tuple | list) or not all(isinstance(one, str) for one in found):
+            message = f"the modes of component '{name}' are a tuple, as in {_EXAMPLE_OF_MODES}, not {shown(found)}"
+            raise InputError(message, place=place)
+    valid = (NEUTRAL, *modes)
+    for mode, following in modes.items() if isinstance(modes, Mapping) else ():
+        for one in following:
+            if one not in valid:
+                message = f"component '{name}' has no mode '{one}', which may follow its mode '{mode}'"
+                raise UnknownNameError(message, found=one, valid=valid, place=place)
+
+
+def _require_period(component: Component) -> None:
+    """Raise `InputError` unless a component has both a `step` and a positive `period`, or neither.
+
+    A method `step` that is no coroutine, or has arguments, is the builder's own.
+    """
+    name, period, place = component.name, component.period, place_of(type(component))
+    step = type(component).step
+    steps = step is not Component.step and iscoroutinefunction(step) and len(signature(step).parameters) == 1
+    if period is None and not steps:
+        return
+    if not steps:
+        raise InputError(f"component '{name}' has a `period`, and no hook `async def step(self)`", place=place)
+    number = isinstance(period, int | float) and not isinstance(period, bool)
+    if not (number and 0 < float(period or 0) < math.inf):
+        message = f"the `period` of component '{name}', which has a `step`, is a positive number of seconds"
+        raise InputError(f"{message}, not {shown(period)}", place=place)
 
 
 def _require_needs(component: Component) -> None:
@@ -204,6 +247,7 @@ def require_deployed(components: Collection[Component], besides: Iterable[str] =
                 raise UnknownNameError(message, found=needed, valid=deployed - {component.name}, place=place)
 
 
+_EXAMPLE_OF_MODES = "modes = ('scanning',) or modes = {'scanning': ('parked',), 'parked': ()}"
 _EXAMPLE = "needs = {'scanning': ('power',)}"
 
 

@@ -11,7 +11,7 @@ from dsc.engine.macrostep import Macrostep
 from dsc.engine.reaction import CompiledReaction
 from dsc.engine.reaction_choice import Choice, Question
 from dsc.engine.situation import Chart, Situation
-from dsc.engine.steps import NO_CHANGE, Microstep, Step
+from dsc.engine.steps import NO_CHANGE, Microstep, SendMessage, Step
 from dsc.events import Event
 from knowledge_base.errors import InputError
 
@@ -113,6 +113,12 @@ class Machine:
         done = step(self.chart, self.state, event, situation)
         self.state = done.state
         return done
+
+    def entry_messages(self, situation: Situation) -> tuple[SendMessage, ...]:
+        """Return the messages that the entry of the active states would send now, the outer states' first."""
+        if self.state.root is None:
+            return ()
+        return Macrostep(self.chart, situation, self.state).entry_messages()
 
     def leave(self, situation: Situation) -> Step:
         """Exit all active states before the plot has ended; their exit actions stop the skills (S0.15)."""

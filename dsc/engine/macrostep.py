@@ -14,11 +14,12 @@ from dsc.engine.performing import Performer
 from dsc.engine.reaction import CompiledReaction, ReactionPart, reaction_of, report
 from dsc.engine.reaction_choice import Question, choice_of, settled
 from dsc.engine.situation import Chart, Situation
-from dsc.engine.steps import Note, Step
+from dsc.engine.steps import Note, SendMessage, Step
 from dsc.engine.tables import TransitionEdge
 from dsc.engine.transition_selection import Addressed, Enabled, Trigger, select
 from dsc.errors import RunawayError
 from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event, goes_outwards
+from dsc.model.actions import Send
 from dsc.model.states import FinalState
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.expression import Expression
@@ -59,6 +60,14 @@ class Macrostep:
             self._next_period(event)
         self._rest()
         return self._step(event, handled=handled)
+
+    def entry_messages(self) -> tuple[SendMessage, ...]:
+        """Return the messages that the entry of the active states would send; those without a value are omitted."""
+        for frame in self._root.frames():
+            for index in frame.configuration.active:
+                node = frame.compiled.nodes[index]
+                self._performer.act(frame, node.name, [one for one in node.entry if isinstance(one, Send)])
+        return tuple(one for one in self._performer.output if isinstance(one, SendMessage))
 
     def leave(self) -> Step:
         """Exit all active states of all plots and return this last step."""

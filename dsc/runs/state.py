@@ -189,6 +189,13 @@ class RunState:
                     for key in [key for key in self._places if key[0] == "SendLater" and key[1].startswith(revoked)]:
                         self._forget(key)
 
+    def suspend(self, messages: Iterable[SendMessage], step: int, at: float) -> None:
+        """Add messages that a resume sends, except those that it sends anyway."""
+        pending = list(self._outbox.values())
+        for one in messages:
+            if one not in pending:
+                self.put(one, step, at)
+
     def put(self, what: Awaited, step: int, at: float, cause: int = 0) -> None:
         """Add a pending item."""
         place = self._last_place + 1

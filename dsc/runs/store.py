@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any, Literal
 
 from dsc.dynamic.library import Library
-from dsc.engine.steps import Output, Start
+from dsc.engine.steps import Output, SendMessage, Start
 from dsc.messages import LateMessage, Message, Told
 from dsc.runs.archive import RunArchive, archive, unfinished
 from dsc.runs.encoding import Shortener, message_form
@@ -288,6 +288,11 @@ class RunStore:
             _paths_text(state.configuration()), change, self._new_records(),
         )  # fmt: skip
         self.writing.before = version  # the next macrostep may be part of this transaction
+
+    def suspend(self, messages: Iterable[SendMessage], now: float) -> None:
+        """Store the messages that a resume has to send, at second `now` of run time."""
+        self._state.suspend(messages, self._number, now)
+        self.writing.more(change=self._state.change())
 
     def end(self, reactor: ReactorState) -> None:
         """Write the end of the run."""

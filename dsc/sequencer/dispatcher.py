@@ -168,6 +168,16 @@ class Dispatcher:
             raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
         return self._components[name]
 
+    def unfinished(self) -> Iterator[str]:
+        """Yield the skills that have not ended, and the components whose `stop` is due, as texts."""
+        for running in self._running.values():
+            yield f"skill {running.describe()} has not ended"
+        for name in self._cleanups.pending:
+            yield f"a cancelled skill of component '{name}' has not ended"
+        for component in self._components.values():
+            if component.life.started:
+                yield f"component '{component.name}' was not stopped"
+
     def skill_of(self, task: asyncio.Task[Any]) -> str | None:
         """Return the skill whose execution is this task, as `arm.grasp`; `None` for other tasks."""
         for running in tuple(self._running.values()):
@@ -326,7 +336,8 @@ class Dispatcher:
                 failure(task)  # marks the error as retrieved; the skill was cancelled
         await self.activation.close()
         self._wiring.close()
-        return [*self.outbox.failures(), *self._faults, *(await self._lives.close(stop=not self.is_part))]
+        unstopped = await self._lives.close(None if self.is_part else self.activation.needed)
+        return [*self.outbox.failures(), *self._faults, *unstopped]
 
     def _start(self, start: steps.Start, interrupted: InterruptedSkill | None = None) -> None:
         component = self.component(start.component)

@@ -64,7 +64,7 @@ class Outbox:
 
     def send(self, component: Component, told: Told) -> None:
         """Deliver an output to the component, after all earlier outputs."""
-        self._begin(component, _hook_of(told), (told,), lambda: _take(component, told))
+        self._begin(component, _hook_of(told), (told,), lambda: self._take(component, told))
         if not isinstance(told, SendMessage):
             self.configuring[component.name] = self.untaken[component.name]
 
@@ -80,34 +80,43 @@ class Outbox:
 
     def repeat(self, component: Component) -> None:
         """Deliver the effective settings again, since the component has started again after a failure."""
-        name = component.name
-        if name not in self._parameters and name not in self._modes:
-            return
-        self._forgotten.add(name)
-
-        async def configure() -> None:
-            values = {one.parameter: one.value for one in self._parameters.get(name, {}).values()}
-            if values:
-                await component.configure_all(encoded(values))
-            if name in self._modes:
-                await component.change_mode(self._modes[name].mode)
-            self._forgotten.discard(name)
-
-        self._begin(component, "configure_all", (), configure)
+        if component.name in self._parameters or component.name in self._modes:
+            self._forgotten.add(component.name)
+            self._begin(component, "configure_all", (), lambda: self._configure(component))
 
     def remind(self, component: Component) -> None:
         """Deliver the effective settings again if the component has refused them after its last start."""
         if component.name in self._forgotten and component.name not in self.untaken:
             self.repeat(component)
 
+    async def _take(self, component: Component, told: Told) -> None:
+        match told:
+            case SetParameter():
+                await component.configure(told.parameter, encoded(told.value))
+            case SwitchMode():
+                await component.change_mode(told.mode)
+                if told.mode == Life.INIT:
+                    self._forgotten.add(component.name)
+                    await self._configure(component)
+            case SendMessage():
+                await component.receive(told.port, encoded(told.arguments))
+
+    async def _configure(self, component: Component) -> None:
+        """Pass the effective parameters, as one set, and then the mode to a component that has started again."""
+        name = component.name
+        values = {one.parameter: one.value for one in self._parameters.get(name, {}).values()}
+        if values:
+            await component.configure_all(encoded(values))
+        if name in self._modes:
+            await component.change_mode(self._modes[name].mode)
+        self._forgotten.discard(name)
+
     def _note(self, told: Told) -> None:
         """Store a setting that a component has received."""
         match told:
             case SetParameter(component=name):
                 self._parameters.setdefault(name, {})[told.parameter] = told
-            case SwitchMode(component=name, mode=Life.INIT | Life.SHUTDOWN):
-                self._modes.pop(name, None)
-            case SwitchMode(component=name):
+            case SwitchMode(component=name, mode=mode) if mode not in {Life.INIT, Life.SHUTDOWN}:
                 self._modes[name] = told
 
     def _begin(
@@ -124,7 +133,7 @@ class Outbox:
                 await asyncio.wait([before])
             try:
                 if hook not in _LIFE_HOOKS and component.life.state is Life.INIT:
-                    await component.life.come_alive(component.start)
+                    await component.life.come_alive()
                 with contained(f"{component.name}.{hook}", component.device_errors):
                     await take()
                 for one in numbers.values():
@@ -189,19 +198,9 @@ def _hook_of(told: Told) -> str:
             return port
 
 
-async def _take(component: Component, told: Told) -> None:
-    match told:
-        case SetParameter():
-            await component.configure(told.parameter, encoded(told.value))
-        case SwitchMode():
-            await component.change_mode(told.mode)
-        case SendMessage():
-            await component.receive(told.port, encoded(told.arguments))
-
-
 async def _restore_mode(component: Component, mode: str) -> None:
     """Restore a component's mode; for `Init`, start the component instead."""
-    await (component.life.come_alive(component.start) if mode == Life.INIT else component.change_mode(mode))
+    await (component.life.come_alive() if mode == Life.INIT else component.change_mode(mode))
 
 
 def failure(task: asyncio.Task[None]) -> BaseException | None:

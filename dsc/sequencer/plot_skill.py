@@ -57,7 +57,7 @@ class PlotComponent(Component):
     async def stop(self) -> None:
         """Stop the components that the plots have started."""
         for component in reversed(self._components):
-            await component.life.retire(component.stop)
+            await component.life.retire()
 
     def skills(self) -> dict[str, SkillSignature]:
         """Return a signature for each plot, by name."""

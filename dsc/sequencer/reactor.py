@@ -12,7 +12,7 @@ from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.machine_state import MachineState
-from dsc.engine.steps import NO_CHANGE, Cancel, Output, SendLater, SetParameter, Start, StartTimer, Step
+from dsc.engine.steps import NO_CHANGE, Cancel, Output, SendLater, SendMessage, SetParameter, Start, StartTimer, Step
 from dsc.errors import RunawayError
 from dsc.events import EVERY, PROGRAMMING_ERROR, SKILL_FAILURES, Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
@@ -149,6 +149,10 @@ class Reactor:
         except InputError as error:
             self.problem = self.problem or str(error)
             return ()
+
+    def entry_messages(self) -> tuple[SendMessage, ...]:
+        """Return the messages that the entry of the active states would send now."""
+        return self.machine.entry_messages(KnowledgeSituation(self.knowledge, self.library))
 
     def suspend(self) -> tuple[Output, ...]:
         """Exit the active states without a record or a change of knowledge, and return the outputs of exit actions."""

@@ -27,7 +27,7 @@ from dsc.sequencer.inbox import Inbox, LivelockGuard
 from dsc.sequencer.phase_watch import PhaseWatch
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.recovery import recover, require_components
-from dsc.sequencer.signals import ending_signal
+from dsc.sequencer.signals import OnSignal, ending_signal, unfinished_at_second_signal
 from dsc.sequencer.watchdog import Watchdog
 from dsc.trace import Trace
 from knowledge_base._notebook import table
@@ -103,6 +103,7 @@ class Sequencer:
         clock: run time.
         trace: the trace of the run.
         store: the run store, or `None`.
+        on_signal: whether Ctrl-C, SIGTERM and SIGHUP suspend a run with a store, or end it.
         dispatcher: sends actions to components.
     """
 
@@ -127,6 +128,7 @@ class Sequencer:
         self._reactor: Reactor = Reactor(library, knowledge, self.trace, phases)
         self.clock = clock
         self.store = store
+        self.on_signal: OnSignal = "suspend"
         if store is not None:
             self.trace.listen(store.hear)
         self._inbox = Inbox()
@@ -258,7 +260,8 @@ class Sequencer:
     async def _watched(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
         is_part = self.dispatcher.is_part  # the sequencer around it has a watchdog
         watched = nullcontext() if is_part else Watchdog(self.dispatcher.skill_of)
-        with programming_errors() as bugs, unheard_errors(bugs), watched:
+        unfinished = unfinished_at_second_signal(self.dispatcher.unfinished)
+        with programming_errors() as bugs, unheard_errors(bugs), watched, unfinished:
             return await self._until_end(begin, bugs)
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]], bugs: Iterable[str]) -> RunEnd:
@@ -285,7 +288,7 @@ class Sequencer:
                 self._take(message)
         except asyncio.CancelledError:  # cancelled from outside; after a crash, this handler does not run
             reactor.problem = reactor.problem or "it was cancelled"
-            if self.store is not None and ending_signal():
+            if self.store is not None and ending_signal() and self.on_signal == "suspend":
                 self._suspend()
             else:
                 self._leave()
@@ -420,9 +423,14 @@ class Sequencer:
         self._carry_out(output)
 
     def _suspend(self) -> None:
-        """Send the actions of a leave, which stop the components, and store none of it; the run can be resumed."""
+        """Send the actions of a leave, which stop the components, without a change of the kept configuration.
+
+        A resume sends the messages of the entry again, as the exit may have revoked them.
+        """
         assert self.store is not None  # noqa: S101
         if self.store.begun and not self.store.lost:
+            with self.store.writing:
+                self.store.suspend(self._reactor.entry_messages(), self.clock.now())
             self._carry_out(self._reactor.suspend())
 
     def _keep_step(self, message: Message | None, output: Iterable[Output]) -> None:

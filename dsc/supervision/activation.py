@@ -66,7 +66,12 @@ class ComponentActivation(Announcer):
 
     def _join(self, component: Component) -> None:
         kind = type(component)
-        if component.needs or kind.needed is not Component.needed or kind.activate is not Component.activate:
+        if (
+            component.needs
+            or component.period is not None
+            or kind.needed is not Component.needed
+            or kind.activate is not Component.activate
+        ):
             self.concerned.add(component.name)
             component.life.listen(self.look)
         else:
@@ -87,7 +92,7 @@ class ComponentActivation(Announcer):
         """Store that a state has switched a component to a mode."""
         if mode in {NEUTRAL, Life.SHUTDOWN}:
             self._in_mode.pop(name, None)
-        elif mode != Life.INIT:
+        else:
             self._in_mode[name] = None
         self.changed(name)
 
@@ -237,7 +242,8 @@ class Supervisor:
     @property
     def on(self) -> bool:
         """Whether the component is alive and active."""
-        return self._on and self._component is not None and self._component.life.state is Life.ALIVE
+        life = None if self._component is None else self._component.life
+        return self._on and life is not None and life.state is Life.ALIVE and life.activated
 
     @property
     def bug(self) -> ProgrammingError | None:
@@ -273,10 +279,10 @@ class Supervisor:
 
     async def _once(self, component: Component) -> float:
         """Start and activate the component; return the seconds for which it was active."""
-        await component.life.come_alive(component.start)
+        await component.life.come_alive()
         if component.life.state is Life.ALIVE:
             self._activated = True
-            await component.life.become_active(id(self), component.activate, active=True)
+            await component.life.become_active(id(self), active=True)
         if component.life.state is not Life.ALIVE:
             self.failures += 1
             self._activation.announce()
@@ -300,7 +306,7 @@ class Supervisor:
             await asyncio.wait(self._before_end, timeout=GRACE)
         try:
             async with asyncio.timeout(GRACE):
-                await life.become_active(id(self), self._component.activate, active=False)
+                await life.become_active(id(self), active=False)
         except TimeoutError:
             if life.state is Life.ALIVE:
                 life.become(Life.FATAL_ERROR, f"it could not be switched off within {GRACE:g} s")

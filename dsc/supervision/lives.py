@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 
 from dsc.components.component import Component
 from dsc.components.hooks import GRACE, give_up, reason_of
 from dsc.components.life_cycle import Life
+from knowledge_base.errors import InputError
 
 
 class ComponentLives:
@@ -38,7 +40,7 @@ class ComponentLives:
         """Listen to a component from now on."""
         if component in self._listeners:
             return
-        component.life.runs += 1
+        component.life.begin_run()
         if component.life.state is Life.FATAL_ERROR:
             self._lost.add(component)
         self._last[component] = component.life.state
@@ -54,8 +56,11 @@ class ComponentLives:
             self._lost.discard(component)
             self._restarted(component)
 
-    async def close(self, *, stop: bool) -> list[str]:
-        """Stop listening; if `stop`, also stop the components that no other run has, within `GRACE` seconds.
+    async def close(self, needed: Callable[[Component], Iterable[str]] | None) -> list[str]:
+        """Stop listening; also stop the components that no other run has, each after those that need it.
+
+        Args:
+            needed: returns the names of the components that a component needs at present; `None` stops no component.
 
         Returns:
             The errors of all components that could not stop.
@@ -63,15 +68,50 @@ class ComponentLives:
         for component, listener in self._listeners.items():
             component.life.leave(listener)
             component.life.runs -= 1
-        alive = [one for one in self._listeners if one.life.state is Life.ALIVE and not one.life.runs]
-        if not (stop and alive):
+        due = [one for one in self._listeners if (one.life.started or one.life.activated) and not one.life.runs]
+        if needed is None or not due:
             return []
-        tasks = {asyncio.ensure_future(one.life.retire(one.stop)): one.name for one in reversed(alive)}
-        ended, others = await asyncio.wait(tasks, timeout=GRACE)
-        for task in others:
-            task.cancel()
-            give_up(task)
-        errors = {tasks[task]: task.exception() for task in ended}
-        late = [f"component '{tasks[task]}' did not stop within {GRACE:g} s" for task in others]
-        failed = [f"component '{name}' could not stop: {reason_of(why)}" for name, why in errors.items() if why]
-        return failed + late
+        needs = {one.name: _all_needs(one, needed) for one in due}
+        stopped: dict[str, asyncio.Task[str]] = {}
+        for component in _dependents_first(due, needs):
+            needing = [task for name, task in stopped.items() if component.name in needs[name]]
+            stopped[component.name] = asyncio.ensure_future(_stop(component, needing))
+        return [error for error in await asyncio.gather(*stopped.values()) if error]
+
+
+async def _stop(component: Component, after: Collection[asyncio.Task[str]]) -> str:
+    """Stop a component after other components have stopped; return its error, or an empty text."""
+    if after:
+        await asyncio.wait(after)
+    stopping = asyncio.ensure_future(component.life.retire())
+    await asyncio.wait([stopping], timeout=GRACE)
+    if not stopping.done():
+        stopping.cancel()
+        give_up(stopping)
+        return f"component '{component.name}' did not stop within {GRACE:g} s"
+    why = stopping.exception()
+    return "" if why is None else f"component '{component.name}' could not stop: {reason_of(why)}"
+
+
+def _dependents_first(components: Sequence[Component], needs: Mapping[str, set[str]]) -> list[Component]:
+    """Return the components in the order of their ends: each before those that it needs, the last deployed first."""
+    named = {one.name: one for one in components}
+    found: dict[str, None] = {}
+
+    def visit(component: Component, above: tuple[Component, ...]) -> None:
+        for name in sorted(needs[component.name] & named.keys()):
+            if named[name] not in above:  # components may need each other in different modes
+                visit(named[name], (*above, component))
+        found[component.name] = None
+
+    for component in components:
+        visit(component, ())
+    return [named[name] for name in reversed(found)]
+
+
+def _all_needs(component: Component, needed: Callable[[Component], Iterable[str]]) -> set[str]:
+    """Return the names of the components that a component needs at present, or in any mode."""
+    needs = {name for names in component.needs.values() for name in names}
+    with suppress(InputError):  # the hook `needed` of the component has failed
+        needs |= set(needed(component))
+    return needs

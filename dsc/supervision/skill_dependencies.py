@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable
-from contextlib import suppress
+from collections.abc import Awaitable, Iterable
+from contextlib import ExitStack, suppress
 from typing import TypeVar
 
 from dsc.components.component import Component
-from dsc.components.life_cycle import Life
+from dsc.components.life_cycle import Life, LifeCycle
 from dsc.supervision.activation import ComponentActivation
 from dsc.supervision.component_registry import NotAliveError
 from knowledge_base.errors import InputError
@@ -50,7 +50,7 @@ class SkillDependencies:
         if self.concerned:
             await self._supervised()
         elif self._component.life.state is not Life.ALIVE:
-            await self._component.life.come_alive(self._component.start)
+            await self._component.life.come_alive()
         if self._component.life.state is not Life.ALIVE:
             raise NotAliveError(self._activation.registry.state_of(self._component.name)) from self._component.life.bug
 
@@ -78,11 +78,12 @@ class SkillDependencies:
             NotAliveError: the component or a dependency is lost; the work was cancelled.
         """
         me = asyncio.current_task()
+        assert me is not None  # noqa: S101  # a coroutine runs in a task
         lost: list[NotAliveError] = []
 
         def look() -> None:
             name = self._lost()
-            if name is not None and not lost and me is not None:
+            if name is not None and not lost:
                 # The component may restart before the cancellation arrives.
                 said = self._activation.registry.state_of(name)
                 lost.append(NotAliveError(said if name == self._component.name else f"it needs {said}"))
@@ -96,15 +97,28 @@ class SkillDependencies:
         if self.concerned or self._component.life.state is not Life.ALIVE:
             look()
         try:
-            return await work
+            with ExitStack() as executing:
+                for life in self._lives():
+                    executing.enter_context(life.executing(me))
+                return await work
         except asyncio.CancelledError:
-            if not lost or me is None or me.uncancel() > 0:  # or the state was exited, too
+            if not lost or me.uncancel() > 0:  # or the state was exited, too
                 raise
             raise lost[0] from lost[0].__cause__
         finally:
             self._component.life.leave(look)
             if self.concerned:
                 self._activation.leave(look)
+
+    def _lives(self) -> Iterable[LifeCycle]:
+        """Return the life cycles of the component and of its dependencies."""
+        if not self.concerned:
+            return (self._component.life,)
+        with suppress(InputError):  # the next skill fails with the error
+            names = [one.name for one in self._activation.supervisors_of(self._component)]
+            known = [self._activation.registry.known(name) for name in (*names, self._component.name)]
+            return {one.life for one in known if one is not None}
+        return (self._component.life,)
 
     def _lost(self) -> str | None:
         if self._component.life.state is not Life.ALIVE:

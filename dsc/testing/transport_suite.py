@@ -354,7 +354,7 @@ class TransportSuite:
         transport, robot = self.transport(), SuiteRobot()
         host = Host(robot, transport, LoopClock())
         remote = await RemoteComponent.connect("robot", transport, PATIENCE)
-        await remote.life.come_alive(remote.start)
+        await remote.life.come_alive()
         try:
             yield robot, remote, host
         finally:
@@ -398,7 +398,7 @@ class TransportSuite:
         transport, robot = self.transport(), SuiteRobot()
         host = Host(robot, transport, LoopClock())
         remote = await RemoteComponent.connect("robot", transport, PATIENCE)
-        await remote.life.come_alive(remote.start)
+        await remote.life.come_alive()
         call = SkillCall("a4.0", LoopClock(), lambda _: None)
         task = asyncio.ensure_future(remote.execute("go", call, {"to": "kitchen", "steps": 1000}))
         await until(lambda: bool(robot.log))
@@ -407,7 +407,7 @@ class TransportSuite:
             await task
         assert remote.life.state == "fatal_error"
         again = Host(SuiteRobot(), transport, LoopClock())
-        await remote.life.come_alive(remote.start)
+        await remote.life.come_alive()
         assert remote.life.state == "alive"
         assert await remote.execute("doubled", SkillCall("a5.0", LoopClock(), lambda _: None), {"n": 4}) == Outcome(
             "answered", {"n": 8}
@@ -436,11 +436,11 @@ class TransportSuite:
             await remote.change_mode("scanning")
             assert remote.needed() == ("power", "light")
             # A client only watches the host of an active component.
-            await remote.life.become_active(1, remote.activate, active=True)
+            await remote.life.become_active(1, active=True)
             robot.mode = "resting"
             await until(lambda: remote.mode == "resting")
             assert remote.needed() == ()
-            await remote.life.become_active(1, remote.activate, active=False)
+            await remote.life.become_active(1, active=False)
 
     @in_loop
     async def test_what_a_component_needs_is_waited_for_and_missed(self) -> None:

@@ -7,7 +7,7 @@ from enum import StrEnum
 from functools import partial
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from planning.engines.planner import Planner
     from planning.report import Report
 
+
 GOAL_REACHED, SOMETHING_LEFT = 0, 1
 """Exit statuses of `dsc run`, besides those of every command."""
 
@@ -33,6 +34,13 @@ class Durability(StrEnum):
 
     process = "process"
     power = "power"
+
+
+class OnSignal(StrEnum):
+    """Reactions of a kept run to Ctrl-C, SIGTERM and SIGHUP."""
+
+    suspend = "suspend"
+    end = "end"
 
 
 def robots() -> Iterator[str]:
@@ -86,6 +94,9 @@ def run_command(
     durability: Annotated[
         Durability, typer.Option(help="With a store, the events that the run survives.")
     ] = Durability.process,
+    on_signal: Annotated[
+        OnSignal, typer.Option(help="With a store: Ctrl-C, SIGTERM and SIGHUP suspend the run, or end it.")
+    ] = OnSignal.suspend,
     resume: Annotated[Path | None, typer.Option(help="Resume the interrupted run in this store.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Show it in the browser while it runs.")] = False,
     port: Port = 0,
@@ -127,7 +138,7 @@ def run_command(
         deployed = _deployed(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
                              durability, target, planner)  # fmt: skip
     follow = partial(_followed, deployed, simulated=not real_time, speed=inf if speed is None else speed, until=until,
-                     quiet=json or quiet, trace=output)  # fmt: skip
+                     on_signal=on_signal.value, quiet=json or quiet, trace=output)  # fmt: skip
     with deployed:
         if not view:
             report = follow()
@@ -252,6 +263,7 @@ def _followed(
     simulated: bool,
     speed: float,
     until: float | None,
+    on_signal: Literal["suspend", "end"],
     quiet: bool,
     trace: Output | None,
     prepare: Callable[[Sequencer], None] | None = None,
@@ -281,7 +293,7 @@ def _followed(
             deployed.executive.listen(PlainProgress(typer.echo))
         else:
             stack.enter_context(redirect_stdout(sys.stderr))
-        report = deployed.run(simulated=simulated, speed=speed, until=until, prepare=prepare)
+        report = deployed.run(simulated=simulated, speed=speed, until=until, on_signal=on_signal, prepare=prepare)
     if not quiet:
         typer.echo("")  # between the progress and the report
     return report

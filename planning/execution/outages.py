@@ -86,5 +86,5 @@ async def _restart(component: Component, seconds: float, clock: Clock) -> None:
     while _is_failed(component) and clock.now() < end:
         await clock.sleep(min(pause, end - clock.now()))
         if _is_failed(component):
-            await component.life.come_alive(component.start)
+            await component.life.come_alive()
         pause = min(2 * pause, LONGEST_PAUSE)

@@ -286,7 +286,7 @@ class Flooding(Component):
         super().__init__()
         self.times = times
 
-    def step(self, n):
+    def step(self, n):  # type: ignore[override]
         return Outcome(
             "step", {"n": n}, Delta(nodes={f"cup{n}": "item"}, added=(fact("seen", f"cup{n}"),) if n % 10 else ())
         )

@@ -12,7 +12,7 @@ from dsc_charts import plot
 from dsc_runs import ran
 
 from dsc.components.component import ALWAYS, Component, ComponentHooks
-from dsc.components.life_cycle import Life, LifeCycle
+from dsc.components.life_cycle import Life
 from dsc.dynamic.library import Library
 from dsc.events import Event
 from dsc.outcomes import Outcome
@@ -33,7 +33,7 @@ def test_the_surface_for_builders_is_small_and_documented():
         line.split("|")[1] for line in table.partition("`self.parameters`")[0].splitlines() if line.startswith("| `")
     ]
     assert set(re.findall(r"`(\w+)`", " ".join(rows))) == surface
-    assert len(surface) <= 13
+    assert len(surface) <= 14
 
 
 class Arrived(Outcome): ...
@@ -127,7 +127,7 @@ def test_a_component_that_is_shut_down_does_nothing():
     base = Base()
     end, _ = drive("base", base, mode="shutdown")
     assert "'shutdown'" in why(end)
-    assert base.log == ["stop"]
+    assert base.log == []
 
 
 def test_a_mode_that_a_component_does_not_have_is_refused():
@@ -238,8 +238,8 @@ def test_what_crashes_is_started_anew_for_the_next_skill():
     text = DRIVE.replace("skill_error: {to: e, emit: broken, with: {why: ?event.reason}}", "skill_error: a")
     end, at = drive("laser", laser, base, mode="scanning", meanwhile=crash, text=text)
     assert end.finished
-    assert base.log[:-1] == pytest.approx([0, 2])
-    assert laser.log == ["start", "start", "stop"]
+    assert [one for one in base.log if one != "stop"] == pytest.approx([0, 2])
+    assert laser.log == ["start", "stop"] * 2
     assert at == pytest.approx(11)
 
 
@@ -261,8 +261,8 @@ def test_a_start_that_was_broken_off_is_begun_by_who_waits_for_it():
     base = Base(starting=3)
 
     async def main():
-        first = asyncio.ensure_future(base.life.come_alive(base.start))
-        second = asyncio.ensure_future(base.life.come_alive(base.start))
+        first = asyncio.ensure_future(base.life.come_alive())
+        second = asyncio.ensure_future(base.life.come_alive())
         await asyncio.sleep(1)
         first.cancel()
         await asyncio.wait_for(second, 10)
@@ -308,7 +308,7 @@ def test_components_that_need_each_other_are_refused():
 
 
 def test_a_life_has_its_order():
-    life = LifeCycle()
+    life = Component("base").life
     life.become(Life.SHUTDOWN)
     with pytest.raises(InputError, match="'shutdown' cannot become 'alive'"):
         life.become(Life.ALIVE)
@@ -323,7 +323,7 @@ def test_who_waits_for_the_same_start_waits_together():
     base = Base(starting=3)
 
     async def main():
-        await asyncio.gather(base.life.come_alive(base.start), base.life.come_alive(base.start))
+        await asyncio.gather(base.life.come_alive(), base.life.come_alive())
 
     run_simulated(main())
     assert base.log == ["start"]

@@ -154,7 +154,7 @@ def test_a_plot_hears_of_the_failure_of_a_component_that_nobody_uses():
         lamp.life.become(Life.FATAL_ERROR, "burnt out")
 
     end, at = ran(HEARS, lamp, meanwhile=crash)
-    assert at == pytest.approx(5)
+    assert at == pytest.approx(5 + 1)  # the failed lamp is closed, too
     assert end.emitted[0].attributes == {"component": "lamp", "reason": "burnt out"}
 
 
