@@ -60,6 +60,10 @@ class SkillError(Exception):
     """
 
 
+class NotAliveError(SkillError):
+    """A required component is not alive; the message has the reason."""
+
+
 class PreemptedError(SkillError):
     """A skill with a higher priority, which `by` names, has taken the component at its host."""
 

@@ -223,7 +223,7 @@ class Endpoint:
         said = _frame(frame)
         if said is None:
             self.dropped["no frame"] += 1
-        elif said["what"] in {"answer", "refusal"}:
+        elif said["what"] in {"answer", "refusal", "bug"}:
             if said["life"] == self.life:
                 self._answered(said)
         elif (peer := self._peer(sender, said["life"])) is None:

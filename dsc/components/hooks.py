@@ -246,6 +246,12 @@ def give_up(task: asyncio.Task[Any]) -> None:
     _given_up.add(task)
 
 
+def cancel_once(task: asyncio.Task[Any]) -> None:
+    """Cancel a task that was not cancelled before; a second cancellation would interrupt the clean-up of its skill."""
+    if not task.cancelling():
+        task.cancel()
+
+
 def can_end(task: asyncio.Task[Any]) -> bool:
     """Return whether the end of a task can be awaited: it is neither done nor abandoned, and its loop is open."""
     return not (task.done() or task in _given_up or task.get_loop().is_closed())

@@ -17,11 +17,11 @@ from dsc.calls import OBSERVED, Clock, Reports, SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, Transport, encoded
 from dsc.components.heartbeat import Heartbeat
-from dsc.components.hooks import GRACE, contained, reason_of
+from dsc.components.hooks import GRACE, cancel_once, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import HostedStreams, Publisher
 from dsc.components.turns import turn_of
-from dsc.errors import PreemptedError, ProgrammingError, SkillError
+from dsc.errors import PreemptedError, ProgrammingError
 from dsc.outcomes import Outcome
 from dsc.rank import ORDINARY, Rank
 from knowledge_base.errors import InputError
@@ -69,9 +69,10 @@ class Host:
         """Answer calls of that kind with the result of a hook."""
 
         async def answers(_: str, said: Any) -> Any:
-            awaited = call(said)
+            if hook != "diagnose":
+                await self._start()
             with contained(f"{self._component.name}.{hook}", self._component.device_errors):
-                return await awaited
+                return await call(said)
 
         self.endpoint.answer(kind, answers)
 
@@ -112,6 +113,11 @@ class Host:
                 component.life.fail(error)
             return ()
 
+    async def _start(self) -> None:
+        """Start the component if necessary; raise `NotAliveError` if it is not alive then."""
+        await self._component.life.come_alive()
+        self._component.life.require_alive()
+
     async def _hull(self, _: str, __: Any) -> dict[str, Any]:
         skills = [asdict(signature) for signature in self._component.skills().values()]
         pushes = {name: {"values": dict(port.values)} for name, port in self._component.pushes.items()}
@@ -136,6 +142,8 @@ class Host:
         (self._is_active.set if active else self._is_active.clear)()
 
     async def _switch(self, _: str, said: dict[str, Any]) -> dict[str, Any]:
+        if said["mode"] not in {Life.INIT, Life.SHUTDOWN}:
+            await self._start()
         with contained(f"{self._component.name}.switch", self._component.device_errors):
             await self._component.change_mode(said["mode"])
         return self._condition.newest
@@ -208,7 +216,7 @@ class HostedActions:
     def cancel(self) -> None:
         """Cancel the skills that the component executes, since the component is no longer alive."""
         for task in self._at_work:
-            _cancel(task)
+            cancel_once(task)
 
     async def _start(self, sender: str, said: dict[str, Any]) -> None:
         action = self._actions.get(_key(said))
@@ -258,12 +266,11 @@ class HostedActions:
     @asynccontextmanager
     async def _alive(self) -> AsyncIterator[None]:
         """Start the component if necessary, and cancel the block when the component is no longer alive."""
-        life, task = self._component.life, asyncio.current_task()
+        task = asyncio.current_task()
         assert task is not None  # noqa: S101  # an action is a task
-        await life.come_alive()
-        if life.state is not Life.ALIVE:
-            raise SkillError(f"component '{self._component.name}' is in '{life.state}'")
-        with life.executing(task):
+        await self._component.life.come_alive()
+        self._component.life.require_alive()
+        with self._component.life.executing(task):
             self._at_work.add(task)
             try:
                 yield
@@ -296,15 +303,9 @@ class HostedActions:
         """Cancel an action that is running, and forget it."""
         action = self._actions.get(_key(said))
         if action is not None and action.task is not None and not action.over:
-            _cancel(action.task)
+            cancel_once(action.task)
             await asyncio.wait([action.task])
         self._actions.pop(_key(said), None)
-
-
-def _cancel(task: asyncio.Task[Any]) -> None:
-    """Cancel a task once: another cancellation would interrupt the clean-up of its skill."""
-    if not task.cancelling():
-        task.cancel()
 
 
 def _plain(outcome: Outcome) -> Outcome:

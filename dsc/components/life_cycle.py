@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Protocol
 
 from dsc.components.hooks import GRACE, Classes, can_end, contained, reason_of
 from dsc.components.periodic_steps import StepCounts, step_periodically
-from dsc.errors import ProgrammingError
+from dsc.errors import NotAliveError, ProgrammingError
 from knowledge_base.errors import InputError
 
 _LOG = logging.getLogger(__package__)
@@ -157,6 +157,22 @@ class LifeCycle(Announcer):
     def active(self) -> bool:
         """Whether an activator needs the component."""
         return bool(self._activators)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether an exit hook is due, or another hook is being called."""
+        return self.started or self.activated or self._transition is not None
+
+    def describe(self) -> str:
+        """Return the component with its state, as text for a message."""
+        return f"component '{self._hooks.name}', which is in '{self.state}'" + (
+            f": {self.reason}" if self.reason else ""
+        )
+
+    def require_alive(self) -> None:
+        """Raise `NotAliveError` unless the component is alive."""
+        if self.state is not Life.ALIVE:
+            raise NotAliveError(self.describe()) from self.bug
 
     # -- transitions ---------------------------------------------------------------------------------------
 

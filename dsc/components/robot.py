@@ -175,36 +175,38 @@ def _require_modes(component: Component) -> None:
         InputError: the modes are something else, e.g. one name without the comma.
         UnknownNameError: a mode may follow that the component does not have.
     """
-    name, modes, place = component.name, component.modes, place_of(type(component))
+    name, modes = component.name, component.modes
     several = modes.values() if isinstance(modes, Mapping) else (modes,)
     for found in several:
         if not isinstance(found, tuple | list) or not all(isinstance(one, str) for one in found):
             message = f"the modes of component '{name}' are a tuple, as in {_EXAMPLE_OF_MODES}, not {shown(found)}"
-            raise InputError(message, place=place)
+            raise InputError(message, place=place_of(type(component)))
     valid = (NEUTRAL, *modes)
     for mode, following in modes.items() if isinstance(modes, Mapping) else ():
         for one in following:
             if one not in valid:
                 message = f"component '{name}' has no mode '{one}', which may follow its mode '{mode}'"
-                raise UnknownNameError(message, found=one, valid=valid, place=place)
+                raise UnknownNameError(message, found=one, valid=valid, place=place_of(type(component)))
 
 
 def _require_period(component: Component) -> None:
     """Raise `InputError` unless a component has both a `step` and a positive `period`, or neither.
 
-    A method `step` that is no coroutine, or has arguments, is the builder's own.
+    A method `step` that has arguments, or is not a coroutine, is the builder's own.
     """
-    name, period, place = component.name, component.period, place_of(type(component))
+    name, period = component.name, component.period
     step = type(component).step
     steps = step is not Component.step and iscoroutinefunction(step) and len(signature(step).parameters) == 1
     if period is None and not steps:
         return
     if not steps:
-        raise InputError(f"component '{name}' has a `period`, and no hook `async def step(self)`", place=place)
+        raise InputError(
+            f"component '{name}' has a `period`, and no hook `async def step(self)`", place=place_of(type(component))
+        )
     number = isinstance(period, int | float) and not isinstance(period, bool)
     if not (number and 0 < float(period or 0) < math.inf):
         message = f"the `period` of component '{name}', which has a `step`, is a positive number of seconds"
-        raise InputError(f"{message}, not {shown(period)}", place=place)
+        raise InputError(f"{message}, not {shown(period)}", place=place_of(type(component)))
 
 
 def _require_needs(component: Component) -> None:

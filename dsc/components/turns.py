@@ -11,6 +11,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from dsc.components.hooks import cancel_once
 from dsc.errors import PreemptedError
 from dsc.rank import Rank
 
@@ -145,7 +146,7 @@ class _Awaited:
         """Cancel the task."""
         self.taker = taker
         if self._task is not None:
-            self._task.cancel()
+            cancel_once(self._task)
 
 
 @asynccontextmanager

@@ -16,7 +16,7 @@ from typing import Any
 
 from dsc.calls import Clock, Ended, SkillCall, Status
 from dsc.components.component import Component
-from dsc.components.hooks import contained, give_up, reason_of
+from dsc.components.hooks import cancel_once, contained, give_up, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.robot import Wiring, require_instances
 from dsc.components.turns import Claim, Turns
@@ -244,7 +244,7 @@ class Dispatcher:
         stopped = self._running.pop(start.action_id)
         stopped.stopped = True
         stopped.end_limit()
-        stopped.task.cancel()
+        cancel_once(stopped.task)
         if stopped.claim is not None:
             stopped.claim.end()
         self._cleanups.add(stopped)
@@ -337,7 +337,10 @@ class Dispatcher:
         await self.activation.close()
         self._wiring.close()
         unstopped = await self._lives.close(None if self.is_part else self.activation.needed)
-        return [*self.outbox.failures(), *self._faults, *unstopped]
+        problems = [*self.outbox.failures(), *self._faults, *unstopped]
+        for problem in problems:
+            _LOG.warning("%s", problem)  # a cancelled run has no `RunEnd`
+        return problems
 
     def _start(self, start: steps.Start, interrupted: InterruptedSkill | None = None) -> None:
         component = self.component(start.component)

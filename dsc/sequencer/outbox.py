@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator
+from dataclasses import dataclass, field
 from functools import partial
 
 from dsc.components.component import Component
 from dsc.components.hooks import GRACE, contained, reason_of
-from dsc.components.life_cycle import Life
+from dsc.components.life_cycle import NEUTRAL, Life
 from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
+from dsc.errors import ProgrammingError
 from dsc.messages import Told
 from dsc.sequencer.message_checks import encoded
 
 CLOSING = GRACE
 """Seconds for components to receive their last outputs, and for cancelled skills to stop."""
+_LIVES = frozenset({Life.INIT, Life.SHUTDOWN})
+"""States of the life cycle that a `switch` can command."""
 _LIFE_HOOKS = frozenset({"start", "stop"})
 """Hooks that a component in Init may receive; it is started before all others."""
+_SETTINGS = frozenset({"configure", "switch"})
+"""Hooks that receive the settings of a component."""
 _MOST_REFUSED = 1000
 """Upper bound of the number of stored refusals; a run without a store never reads them."""
 
@@ -29,6 +35,9 @@ Configuring = dict[str, asyncio.Task[None]]
 class Outbox:
     """One-way outputs that components have not received yet, and outputs that they refused.
 
+    The settings of a component are its parameters and its mode. The outbox delivers them again before the next skill if
+    the component has started again, or could not take them.
+
     Attributes:
         untaken: by component, the task that delivers the latest output; removed when a skill has waited for the task.
         configuring: by component, the task that delivers the latest parameter or mode of the present macrostep.
@@ -39,9 +48,7 @@ class Outbox:
         self.configuring: Configuring = {}
         self._under_way: dict[int, Told] = {}
         self._refused: deque[Told] = deque(maxlen=_MOST_REFUSED)
-        self._parameters: dict[str, dict[str, SetParameter]] = {}  # the effective ones, by component
-        self._modes: dict[str, SwitchMode] = {}
-        self._forgotten: set[str] = set()  # components that have started again without their settings
+        self._settings: dict[str, _Settings] = {}
         self._last = 0
 
     @property
@@ -64,30 +71,39 @@ class Outbox:
 
     def send(self, component: Component, told: Told) -> None:
         """Deliver an output to the component, after all earlier outputs."""
-        self._begin(component, _hook_of(told), (told,), lambda: self._take(component, told))
+        self._begin(component, _hook_of(told), told, lambda: self._take(component, told))
         if not isinstance(told, SendMessage):
             self.configuring[component.name] = self.untaken[component.name]
 
-    def restore(self, component: Component, effective: Sequence[SetParameter | SwitchMode]) -> None:
-        """Deliver the settings that were effective before a restart: the parameters as one set, then the modes."""
-        parameters = [one for one in effective if isinstance(one, SetParameter)]
-        if parameters:
-            values = {one.parameter: one.value for one in parameters}
-            self._begin(component, "configure_all", parameters, lambda: component.configure_all(encoded(values)))
+    def restore(self, component: Component, effective: Iterable[SetParameter | SwitchMode]) -> None:
+        """Deliver the state of the life cycle and the settings that were effective before a restart of the program."""
+        settings = self._settings_of(component)
         for one in effective:
-            if isinstance(one, SwitchMode):
-                self._begin(component, "switch", (one,), partial(_restore_mode, component, one.mode))
+            if isinstance(one, SwitchMode) and one.mode in _LIVES:
+                self._begin(component, _hook_of(one), one, partial(_restore_life, component, one.mode))
+            else:
+                settings.note(one, self._number(one))
+        self.repeat(component)
 
     def repeat(self, component: Component) -> None:
-        """Deliver the effective settings again, since the component has started again after a failure."""
-        if component.name in self._parameters or component.name in self._modes:
-            self._forgotten.add(component.name)
-            self._begin(component, "configure_all", (), lambda: self._configure(component))
+        """Deliver the settings again, since the component has started again."""
+        settings = self._settings_of(component)
+        if settings:
+            settings.missing = True
+            self._begin(component, "configure_all", None, lambda: self._configure(component))
 
     def remind(self, component: Component) -> None:
-        """Deliver the effective settings again if the component has refused them after its last start."""
-        if component.name in self._forgotten and component.name not in self.untaken:
+        """Deliver the settings again if the component has not taken them since its last start."""
+        if component.name not in self.untaken and self._settings_of(component).missing:
             self.repeat(component)
+
+    def _settings_of(self, component: Component) -> _Settings:
+        return self._settings.setdefault(component.name, _Settings())
+
+    def _number(self, told: Told) -> int:
+        self._last += 1
+        self._under_way[self._last] = told
+        return self._last
 
     async def _take(self, component: Component, told: Told) -> None:
         match told:
@@ -95,55 +111,48 @@ class Outbox:
                 await component.configure(told.parameter, encoded(told.value))
             case SwitchMode():
                 await component.change_mode(told.mode)
-                if told.mode == Life.INIT:
-                    self._forgotten.add(component.name)
+                if told.mode == Life.INIT and component.life.state is Life.ALIVE:
+                    self._settings_of(component).missing = True
                     await self._configure(component)
             case SendMessage():
                 await component.receive(told.port, encoded(told.arguments))
 
     async def _configure(self, component: Component) -> None:
-        """Pass the effective parameters, as one set, and then the mode to a component that has started again."""
-        name = component.name
-        values = {one.parameter: one.value for one in self._parameters.get(name, {}).values()}
-        if values:
+        """Pass all settings to a component: the parameters as one set, then the mode."""
+        settings = self._settings_of(component)
+        if settings.parameters:
+            values = {name: one.value for name, one in settings.parameters.items()}
             await component.configure_all(encoded(values))
-        if name in self._modes:
-            await component.change_mode(self._modes[name].mode)
-        self._forgotten.discard(name)
+        if settings.mode is not None:
+            await component.change_mode(settings.mode.mode)
+        for number in settings.taken():
+            del self._under_way[number]
 
-    def _note(self, told: Told) -> None:
-        """Store a setting that a component has received."""
-        match told:
-            case SetParameter(component=name):
-                self._parameters.setdefault(name, {})[told.parameter] = told
-            case SwitchMode(component=name, mode=mode) if mode not in {Life.INIT, Life.SHUTDOWN}:
-                self._modes[name] = told
-
-    def _begin(
-        self, component: Component, hook: str, told: Iterable[Told], take: Callable[[], Awaitable[None]]
-    ) -> None:
-        numbers = {self._last + n: one for n, one in enumerate(told, start=1)}
-        self._under_way |= numbers
-        self._last += len(numbers)
-
+    def _begin(self, component: Component, hook: str, told: Told | None, take: Callable[[], Awaitable[None]]) -> None:
+        """Begin the delivery of an output by a call of a hook, or of all settings."""
+        number = 0 if told is None else self._number(told)
+        setting = told if hook in _SETTINGS else None
         before = self.untaken.get(component.name)
 
         async def in_order() -> None:
             if before is not None and not before.done():  # otherwise it arrives before a skill of this step can end
                 await asyncio.wait([before])
             try:
-                if hook not in _LIFE_HOOKS and component.life.state is Life.INIT:
-                    await component.life.come_alive()
-                with contained(f"{component.name}.{hook}", component.device_errors):
-                    await take()
-                for one in numbers.values():
-                    self._note(one)
-            except Exception:
-                self._refused.extend(numbers.values())
-                raise
-            finally:
-                for number in numbers:
+                if hook in _LIFE_HOOKS or await _is_ready(component, told):
+                    with contained(f"{component.name}.{hook}", component.device_errors):
+                        await take()
+                    if setting is not None:
+                        self._settings_of(component).note(setting)
+                    self._under_way.pop(number, None)
+                elif setting is not None:
+                    self._settings_of(component).note(setting, number)
+            except Exception as error:
+                if setting is not None and not isinstance(error, ProgrammingError):  # it may succeed later
+                    self._settings_of(component).note(setting, number)
+                elif told is not None:
+                    self._refused.append(told)
                     del self._under_way[number]
+                raise
             why = None if before is None else failure(before)
             if why is not None:  # the next skill fails with this error
                 raise why
@@ -188,6 +197,62 @@ class Outbox:
                 yield f"component '{name}' did not take its last output: {reason}"
 
 
+@dataclass(slots=True)
+class _Settings:
+    """Parameters and mode that the active states have given to one component.
+
+    Attributes:
+        parameters: the last values, by name, in the order of their last changes.
+        mode: the last mode; `None` before the first.
+        missing: whether the component has not taken all of them since its last start.
+        untaken: numbers of the outputs that the component has not taken.
+    """
+
+    parameters: dict[str, SetParameter] = field(default_factory=dict)
+    mode: SwitchMode | None = None
+    missing: bool = False
+    untaken: list[int] = field(default_factory=list)
+
+    def __bool__(self) -> bool:
+        return bool(self.parameters) or self.mode is not None
+
+    def note(self, told: Told, untaken: int | None = None) -> None:
+        """Add a parameter or mode, with its number if the component has not taken it."""
+        if isinstance(told, SetParameter):
+            self.parameters.pop(told.parameter, None)
+            self.parameters[told.parameter] = told
+        elif isinstance(told, SwitchMode):
+            self.mode = told
+        if untaken is not None:
+            self.untaken.append(untaken)
+            self.missing = True
+
+    def taken(self) -> list[int]:
+        """Register that the component has taken all settings, and return the numbers that were untaken."""
+        taken, self.untaken = self.untaken, []
+        self.missing = False
+        return taken
+
+
+async def _is_ready(component: Component, told: Told | None) -> bool:
+    """Start a component if necessary, and return whether it can take an output, or all settings.
+
+    A component in Shutdown takes its settings after a `switch` to `init`. All settings are delivered after each start.
+    A component that is not alive has no mode to leave.
+
+    Raises:
+        NotAliveError: the component cannot start, or is in Shutdown and cannot take a message.
+    """
+    in_vain = told is None or (isinstance(told, SwitchMode) and told.mode == NEUTRAL)
+    if component.life.state is Life.INIT or (component.life.state is Life.FATAL_ERROR and not in_vain):
+        await component.life.come_alive()
+    state = component.life.state
+    if state is not Life.ALIVE and (in_vain or (state is Life.SHUTDOWN and not isinstance(told, SendMessage))):
+        return False
+    component.life.require_alive()
+    return True
+
+
 def _hook_of(told: Told) -> str:
     match told:
         case SetParameter():
@@ -198,9 +263,9 @@ def _hook_of(told: Told) -> str:
             return port
 
 
-async def _restore_mode(component: Component, mode: str) -> None:
-    """Restore a component's mode; for `Init`, start the component instead."""
-    await (component.life.come_alive() if mode == Life.INIT else component.change_mode(mode))
+async def _restore_life(component: Component, life: str) -> None:
+    """Start or shut down a component that a restarted program has created."""
+    await (component.life.come_alive() if life == Life.INIT else component.change_mode(life))
 
 
 def failure(task: asyncio.Task[None]) -> BaseException | None:

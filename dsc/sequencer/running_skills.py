@@ -12,7 +12,7 @@ from typing import Protocol
 
 from dsc.blocking import DeadlineError
 from dsc.calls import Reports
-from dsc.components.hooks import GRACE, Classes, give_up, give_up_after, is_own, programming_error
+from dsc.components.hooks import GRACE, Classes, cancel_once, give_up, give_up_after, is_own, programming_error
 from dsc.components.turns import Claim
 from dsc.engine.steps import Start
 from dsc.errors import PreemptedError, ProgrammingError
@@ -148,7 +148,7 @@ class RunningSkill:
             return
         programming_error(bug, "")
         self.answer(faulty(self.start, str(bug)))
-        self.task.cancel()
+        cancel_once(self.task)
 
     def _post_report(self, report: Outcome, conflated: int) -> None:
         ends = report.event in {SKILL_ERROR, PROGRAMMING_ERROR}
@@ -270,7 +270,7 @@ class RunningSkill:
             return
         place = waits_at(self.task.get_coro())
         self._waited = f"at {place}" if place else ""
-        self.task.cancel()
+        cancel_once(self.task)
         self._timer = asyncio.get_running_loop().call_later(GRACE, self._overdue)
 
     def _overdue(self) -> None:

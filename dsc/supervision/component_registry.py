@@ -7,12 +7,7 @@ from collections.abc import MutableMapping
 
 from dsc.components.component import Component
 from dsc.components.hooks import contained
-from dsc.errors import SkillError
 from knowledge_base.errors import UnknownNameError
-
-
-class NotAliveError(SkillError):
-    """A required component is not alive; the message has the reason."""
 
 
 class ComponentRegistry:
@@ -69,8 +64,7 @@ class ComponentRegistry:
         component = self.known(name)
         if component is None:
             return str(UnknownNameError(f"component '{name}', which is not there", found=name, valid=self.components))
-        why = f": {component.life.reason}" if component.life.reason else ""
-        return f"component '{name}', which is in '{component.life.state}'{why}"
+        return component.life.describe()
 
 
 async def _reached(needing: Component, name: str) -> Component:

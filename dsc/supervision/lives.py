@@ -68,7 +68,7 @@ class ComponentLives:
         for component, listener in self._listeners.items():
             component.life.leave(listener)
             component.life.runs -= 1
-        due = [one for one in self._listeners if (one.life.started or one.life.activated) and not one.life.runs]
+        due = [one for one in self._listeners if one.life.is_open and not one.life.runs]
         if needed is None or not due:
             return []
         needs = {one.name: _all_needs(one, needed) for one in due}

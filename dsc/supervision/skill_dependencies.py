@@ -9,8 +9,8 @@ from typing import TypeVar
 
 from dsc.components.component import Component
 from dsc.components.life_cycle import Life, LifeCycle
+from dsc.errors import NotAliveError
 from dsc.supervision.activation import ComponentActivation
-from dsc.supervision.component_registry import NotAliveError
 from knowledge_base.errors import InputError
 
 _Result = TypeVar("_Result")
@@ -49,10 +49,9 @@ class SkillDependencies:
         """
         if self.concerned:
             await self._supervised()
-        elif self._component.life.state is not Life.ALIVE:
+        else:
             await self._component.life.come_alive()
-        if self._component.life.state is not Life.ALIVE:
-            raise NotAliveError(self._activation.registry.state_of(self._component.name)) from self._component.life.bug
+        self._component.life.require_alive()
 
     async def _supervised(self) -> None:
         supervisor = self._activation.supervisor(self._component)
@@ -83,7 +82,7 @@ class SkillDependencies:
 
         def look() -> None:
             name = self._lost()
-            if name is not None and not lost:
+            if name is not None and not lost and not me.cancelling():
                 # The component may restart before the cancellation arrives.
                 said = self._activation.registry.state_of(name)
                 lost.append(NotAliveError(said if name == self._component.name else f"it needs {said}"))

@@ -31,12 +31,12 @@ from dsc.components.publication import Publisher, Subscription
 from dsc.components.remote import RemoteComponent
 from dsc.components.robot import Wiring
 from dsc.components.streams import Push, Stream
-from dsc.errors import ProgrammingError
+from dsc.errors import NotAliveError, ProgrammingError
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
 from dsc.supervision.activation import ComponentActivation
-from dsc.supervision.component_registry import ComponentRegistry, NotAliveError
+from dsc.supervision.component_registry import ComponentRegistry
 from dsc.supervision.skill_dependencies import SkillDependencies
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
