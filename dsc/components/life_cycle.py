@@ -254,6 +254,10 @@ class LifeCycle(Announcer):
             _inside.reset(token)
             self._skills.discard(task)
 
+    def fails(self, task: asyncio.Task[Any]) -> bool:
+        """Return whether a failure of the component at this time ends the skill that the task executes or begins."""
+        return task in self._skills or self._transition is not None
+
     # -- hooks -----------------------------------------------------------------------------------------------
 
     @asynccontextmanager

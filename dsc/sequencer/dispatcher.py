@@ -326,7 +326,7 @@ class Dispatcher:
         for activation in {start.activation for start in self.started()}:
             self._cancel(activation)
         self.timers.close()
-        tasks = [*self._cleanups.tasks(), *self._forget_tasks, *self.outbox.tasks()]
+        tasks = [*self._cleanups.tasks(), *self._forget_tasks, *self.outbox.close()]
         if tasks:
             stopped, others = await asyncio.wait(tasks, timeout=CLOSING)
             for task in others:
@@ -429,9 +429,10 @@ class Dispatcher:
         return self.outbox.unconfigured(running.configuring)
 
     def _failed(self, component: Component) -> None:
-        """Post an event about a failed component, unless a running skill of the component reports the failure."""
-        if component.name in self.in_use:
-            return
+        """Post an event about a failed component, unless a skill of the component reports the failure."""
+        for running in self._running.values():
+            if running.start.component == component.name and component.life.fails(running.task):
+                return
         attributes = {"component": component.name, "reason": component.life.reason}
         self._post(Event(COMPONENT_FAILED, attributes))
 

@@ -50,6 +50,7 @@ class Outbox:
         self._refused: deque[Told] = deque(maxlen=_MOST_REFUSED)
         self._settings: dict[str, _Settings] = {}
         self._last = 0
+        self._closed = False
 
     @property
     def under_way(self) -> Collection[Told]:
@@ -77,18 +78,17 @@ class Outbox:
 
     def restore(self, component: Component, effective: Iterable[SetParameter | SwitchMode]) -> None:
         """Deliver the state of the life cycle and the settings that were effective before a restart of the program."""
-        settings = self._settings_of(component)
         for one in effective:
             if isinstance(one, SwitchMode) and one.mode in _LIVES:
                 self._begin(component, _hook_of(one), one, partial(_restore_life, component, one.mode))
             else:
-                settings.note(one, self._number(one))
+                self._note(component, one, self._number(one))
         self.repeat(component)
 
     def repeat(self, component: Component) -> None:
         """Deliver the settings again, since the component has started again."""
         settings = self._settings_of(component)
-        if settings:
+        if settings and not self._closed:
             settings.missing = True
             self._begin(component, "configure_all", None, lambda: self._configure(component))
 
@@ -99,6 +99,12 @@ class Outbox:
 
     def _settings_of(self, component: Component) -> _Settings:
         return self._settings.setdefault(component.name, _Settings())
+
+    def _note(self, component: Component, told: SetParameter | SwitchMode, untaken: int | None = None) -> None:
+        """Store a setting, with its number if the component has not taken it."""
+        replaced = self._settings_of(component).note(told, untaken)
+        if replaced is not None:
+            del self._under_way[replaced]
 
     def _number(self, told: Told) -> int:
         self._last += 1
@@ -131,7 +137,7 @@ class Outbox:
     def _begin(self, component: Component, hook: str, told: Told | None, take: Callable[[], Awaitable[None]]) -> None:
         """Begin the delivery of an output by a call of a hook, or of all settings."""
         number = 0 if told is None else self._number(told)
-        setting = told if hook in _SETTINGS else None
+        setting = told if hook in _SETTINGS and not isinstance(told, SendMessage) else None
         before = self.untaken.get(component.name)
 
         async def in_order() -> None:
@@ -142,13 +148,13 @@ class Outbox:
                     with contained(f"{component.name}.{hook}", component.device_errors):
                         await take()
                     if setting is not None:
-                        self._settings_of(component).note(setting)
+                        self._note(component, setting)
                     self._under_way.pop(number, None)
                 elif setting is not None:
-                    self._settings_of(component).note(setting, number)
+                    self._note(component, setting, number)
             except Exception as error:
                 if setting is not None and not isinstance(error, ProgrammingError):  # it may succeed later
-                    self._settings_of(component).note(setting, number)
+                    self._note(component, setting, number)
                 elif told is not None:
                     self._refused.append(told)
                     del self._under_way[number]
@@ -184,8 +190,9 @@ class Outbox:
         if self.untaken:
             await asyncio.wait(self.untaken.values(), timeout=CLOSING)
 
-    def tasks(self) -> Iterable[asyncio.Task[None]]:
-        """Return the deliveries that the end of a run waits for."""
+    def close(self) -> Collection[asyncio.Task[None]]:
+        """Repeat no settings from now on, and return the deliveries that the end of a run waits for."""
+        self._closed = True
         return self.untaken.values()
 
     def failures(self) -> Iterator[str]:
@@ -205,31 +212,39 @@ class _Settings:
         parameters: the last values, by name, in the order of their last changes.
         mode: the last mode; `None` before the first.
         missing: whether the component has not taken all of them since its last start.
-        untaken: numbers of the outputs that the component has not taken.
+        untaken: numbers of the outputs that the component has not taken, by parameter; `None` stands for the mode.
     """
 
     parameters: dict[str, SetParameter] = field(default_factory=dict)
     mode: SwitchMode | None = None
     missing: bool = False
-    untaken: list[int] = field(default_factory=list)
+    untaken: dict[str | None, int] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         return bool(self.parameters) or self.mode is not None
 
-    def note(self, told: Told, untaken: int | None = None) -> None:
-        """Add a parameter or mode, with its number if the component has not taken it."""
+    def note(self, told: SetParameter | SwitchMode, untaken: int | None = None) -> int | None:
+        """Add a parameter or mode, with its number if the component has not taken it.
+
+        Returns:
+            The number of the earlier output that this one replaces, if that one was untaken.
+        """
+        parameter = told.parameter if isinstance(told, SetParameter) else None
+        replaced = self.untaken.pop(parameter, None)
         if isinstance(told, SetParameter):
             self.parameters.pop(told.parameter, None)
             self.parameters[told.parameter] = told
-        elif isinstance(told, SwitchMode):
+        else:
             self.mode = told
         if untaken is not None:
-            self.untaken.append(untaken)
+            self.untaken[parameter] = untaken
             self.missing = True
+        return replaced
 
     def taken(self) -> list[int]:
         """Register that the component has taken all settings, and return the numbers that were untaken."""
-        taken, self.untaken = self.untaken, []
+        taken = list(self.untaken.values())
+        self.untaken.clear()
         self.missing = False
         return taken
 

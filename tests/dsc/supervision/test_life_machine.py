@@ -320,7 +320,7 @@ class Lives(RuleBasedStateMachine):
             self.require_closed()
             heard = "\n".join(self.heard)
             if not self.remote:  # a run does not watch a component at a host that nobody uses
-                assert [failure for failure in self.failures if failure not in heard] == []
+                assert [failure for failure in self.failures if failure not in heard] == [], heard
         finally:
             logging.getLogger("dsc").removeHandler(self.log)
             self.end_program()
@@ -333,7 +333,7 @@ class HostedLives(Lives):
     remote = True
 
 
-LIMIT = settings(max_examples=20, stateful_step_count=15, deadline=None)
+LIMIT = settings(max_examples=15, stateful_step_count=12, deadline=None)
 TestLives = Lives.TestCase
 TestLives.settings = LIMIT
 TestHostedLives = HostedLives.TestCase
