@@ -25,16 +25,20 @@ class Heartbeat:
         endpoint: the component's address.
         needs: returns the names of the components that this one needs at present; called at each heartbeat.
         changed: called when the component becomes active or inactive.
-        root: whether the component is active without an activator, like the sequencer.
+        keeps: returns whether the component is active without an activator, like the sequencer.
     """
 
     def __init__(
-        self, endpoint: Endpoint, needs: Callable[[], Collection[str]], changed: Changed, *, root: bool = False
+        self,
+        endpoint: Endpoint,
+        needs: Callable[[], Collection[str]],
+        changed: Changed,
+        keeps: Callable[[], bool] = lambda: False,
     ) -> None:
         self._endpoint = endpoint
         self._needs = needs
         self._changed = changed
-        self._root = root
+        self._keeps = keeps
         self._activators: dict[str, float] = {}  # by name, the loop time of the last heartbeat
         self._stirred = asyncio.Event()
         self.active = False
@@ -67,7 +71,7 @@ class Heartbeat:
     async def _beat(self) -> None:
         now = asyncio.get_running_loop().time()
         self._activators = {name: at for name, at in self._activators.items() if now - at < SILENCE}
-        await self._become(active=self._root or bool(self._activators))
+        await self._become(active=self._keeps() or bool(self._activators))
         if self.active:
             self._endpoint.broadcast("heartbeat", {"needs": sorted(self._needs())})
 

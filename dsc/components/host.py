@@ -17,7 +17,7 @@ from dsc.calls import OBSERVED, Clock, Reports, SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, Transport, encoded
 from dsc.components.heartbeat import Heartbeat
-from dsc.components.hooks import GRACE, cancel_once, contained, reason_of
+from dsc.components.hooks import GRACE, cancel_once, contained, give_up, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.publication import HostedStreams, Publisher
 from dsc.components.turns import turn_of
@@ -60,7 +60,7 @@ class Host:
         self._answer("take", "take", lambda said: component.receive(said["port"], said["message"]))
         self._answer("diagnose", "diagnose", lambda _: component.diagnose())
         self._is_active = asyncio.Event()
-        self._heart = Heartbeat(self.endpoint, self._needed, self._activated)
+        self._heart = Heartbeat(self.endpoint, self._needed, self._activated, self._actions.any_at_work)
         self._beating = asyncio.get_running_loop().create_task(self._heart.run())
         self._changed()
         component.life.listen(self._changed)
@@ -80,7 +80,8 @@ class Host:
         """Stop all services without a message, then the component; clients treat the component as failed."""
         self._component.life.leave(self._changed)
         await self.endpoint.close()
-        tasks = [self._beating, *self._actions.tasks(), *self._streams.close()]
+        await self._actions.close()
+        tasks = [self._beating, *self._streams.close()]
         for task in tasks:
             task.cancel()
         await asyncio.wait(tasks)
@@ -209,9 +210,19 @@ class HostedActions:
         endpoint.answer("how", self._how)
         endpoint.answer("stop", self._stop)
 
-    def tasks(self) -> list[asyncio.Task[None]]:
-        """Return the tasks of all actions that were not forgotten."""
-        return [action.task for action in self._actions.values() if action.task is not None]
+    def any_at_work(self) -> bool:
+        """Return whether the component executes an action; it then stays active, also without its client."""
+        return bool(self._at_work)
+
+    async def close(self) -> None:
+        """Cancel all actions, and wait for their clean-up, for `GRACE` seconds at most."""
+        tasks = [one.task for one in self._actions.values() if one.task is not None and not one.over]
+        for task in tasks:
+            cancel_once(task)
+        if tasks:
+            _, others = await asyncio.wait(tasks, timeout=GRACE)
+            for task in others:
+                give_up(task)
 
     def cancel(self) -> None:
         """Cancel the skills that the component executes, since the component is no longer alive."""

@@ -12,11 +12,10 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from contextvars import ContextVar
 from enum import StrEnum
 from typing import Any, ClassVar, Protocol
 
-from dsc.components.hooks import GRACE, Classes, can_end, contained, reason_of
+from dsc.components.hooks import GRACE, Classes, can_end, contained, reason_of, running_task
 from dsc.components.periodic_steps import StepCounts, step_periodically
 from dsc.errors import NotAliveError, ProgrammingError
 from knowledge_base.errors import InputError
@@ -35,8 +34,6 @@ class Life(StrEnum):
 
 NEUTRAL = "neutral"
 """The mode of an idle component."""
-_inside: ContextVar[frozenset[asyncio.Task[Any] | None]] = ContextVar("inside", default=frozenset())
-"""The tasks on whose behalf this code runs: a transition or a skill, and the tasks that it creates."""
 TRANSITIONS = {
     Life.INIT: {Life.ALIVE, Life.SHUTDOWN, Life.FATAL_ERROR},
     Life.ALIVE: {Life.INIT, Life.SHUTDOWN, Life.FATAL_ERROR},
@@ -233,6 +230,8 @@ class LifeCycle(Announcer):
                 except Exception as error:  # noqa: BLE001  # after any error the component may have its resources
                     if self.state is Life.ALIVE:
                         self.fail(error)
+                    else:
+                        _LOG.warning("component '%s' cannot become inactive: %s", self._hooks.name, reason_of(error))
 
     async def enter(self, mode: str) -> None:
         """Leave the present mode and enter another; raise the error of a hook."""
@@ -247,16 +246,10 @@ class LifeCycle(Announcer):
     def executing(self, task: asyncio.Task[Any]) -> Iterator[None]:
         """Return a context manager in which the task executes a skill; exit hooks wait for its end."""
         self._skills.add(task)
-        token = _inside.set(_inside.get() | {task})
         try:
             yield
         finally:
-            _inside.reset(token)
             self._skills.discard(task)
-
-    def fails(self, task: asyncio.Task[Any]) -> bool:
-        """Return whether a failure of the component at this time ends the skill that the task executes or begins."""
-        return task in self._skills or self._transition is not None
 
     # -- hooks -----------------------------------------------------------------------------------------------
 
@@ -266,17 +259,15 @@ class LifeCycle(Announcer):
 
         A hook may request a transition, and so may a skill whose end a transition waits for; these do not wait.
         """
-        inside = _inside.get()
-        if self._transition in inside or not self._skills.isdisjoint(inside):
+        task = running_task()
+        if task is not None and (task is self._transition or task in self._skills):
             yield
             return
         await self.until(lambda: self._transition is None or not can_end(self._transition))
-        self._transition = asyncio.current_task()
-        token = _inside.set(inside | {self._transition})
+        self._transition = task
         try:
             yield
         finally:
-            _inside.reset(token)
             self._transition = None
             self.announce()
 
@@ -320,7 +311,7 @@ class LifeCycle(Announcer):
 
     async def _leave(self) -> Exception | None:
         """Wait for the end of the skills, then call all exit hooks that are due; return the first error."""
-        skills = [one for one in self._skills - _inside.get() if can_end(one)]
+        skills = [one for one in self._skills if one is not running_task() and can_end(one)]
         if skills:
             await asyncio.wait(skills, timeout=GRACE)
         errors: list[Exception] = []
@@ -336,7 +327,7 @@ class LifeCycle(Announcer):
         if self.activated:
             self.activated = False
             self._begin_or_end_steps()
-            if self._stepping is not None and self._stepping not in _inside.get() and can_end(self._stepping):
+            if self._stepping not in {None, running_task()} and can_end(self._stepping):
                 await asyncio.wait([self._stepping], timeout=GRACE)
             with self._contained("activate"):
                 await self._hooks.activate(False)  # noqa: FBT003

@@ -22,7 +22,7 @@ from dsc.components.robot import Wiring, require_instances
 from dsc.components.turns import Claim, Turns
 from dsc.engine import steps
 from dsc.errors import UncertainActionError
-from dsc.events import COMPONENT_FAILED, Event
+from dsc.events import COMPONENT_FAILED, SKILL_FAILURES, Event
 from dsc.messages import LateMessage, SkillMessage, TimerMessage
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, PastClock
@@ -78,6 +78,8 @@ class Dispatcher:
         self._lives = ComponentLives(self._components.values(), self._failed, self.outbox.repeat)
         self._wiring = Wiring(self._components)
         self._faults: list[str] = []
+        self._unreported: dict[str, list[str]] = {}  # reasons of failed components, which their skills may report
+        self._closing = False
         self._clock = clock
         self._post = post
         self._running: dict[str, RunningSkill] = {}
@@ -323,6 +325,7 @@ class Dispatcher:
         Returns:
             Errors of deliveries that made no skill fail, and the faults of the run.
         """
+        self._closing = True
         for activation in {start.activation for start in self.started()}:
             self._cancel(activation)
         self.timers.close()
@@ -370,9 +373,12 @@ class Dispatcher:
         except BaseException as error:
             failed = running.failed(error, dependencies.missing or self._missing(running))
             if failed is None:
+                self._report_failures(component.name, None)
                 raise
             outcome = failed
         running.answer(outcome)
+        if self._unreported:
+            self._report_failures(component.name, None if running.stopped else outcome)
         running.task.remove_done_callback(running.ended)  # each callback costs a turn of the loop
 
     async def _outcome(
@@ -429,12 +435,26 @@ class Dispatcher:
         return self.outbox.unconfigured(running.configuring)
 
     def _failed(self, component: Component) -> None:
-        """Post an event about a failed component, unless a skill of the component reports the failure."""
-        for running in self._running.values():
-            if running.start.component == component.name and component.life.fails(running.task):
-                return
-        attributes = {"component": component.name, "reason": component.life.reason}
-        self._post(Event(COMPONENT_FAILED, attributes))
+        """Post an event about a failed component; a skill that uses the component may report the failure instead."""
+        name, reason = component.name, component.life.reason
+        if name in self.in_use:
+            self._unreported.setdefault(name, []).append(reason)
+        else:
+            self._report_failure(name, reason)
+
+    def _report_failures(self, name: str, outcome: Outcome | None) -> None:
+        """Post the failures of a component that the outcome of its skill has not reported; `None` means cancelled."""
+        failed = outcome is not None and outcome.event in SKILL_FAILURES
+        told = str(outcome.attributes["reason"]) if failed and outcome is not None else None
+        for reason in self._unreported.pop(name, ()):
+            if told is None or reason not in told:
+                self._report_failure(name, reason)
+
+    def _report_failure(self, name: str, reason: str) -> None:
+        if self._closing:  # no state hears an event any longer
+            self._fault(f"component '{name}' has failed: {reason}")
+        else:
+            self._post(Event(COMPONENT_FAILED, {"component": name, "reason": reason}))
 
     async def _forget(self, component: Component, action_id: str) -> None:
         try:

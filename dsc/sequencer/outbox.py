@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections import deque
 from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ from dsc.errors import ProgrammingError
 from dsc.messages import Told
 from dsc.sequencer.message_checks import encoded
 
+_LOG = logging.getLogger(__package__)
 CLOSING = GRACE
 """Seconds for components to receive their last outputs, and for cancelled skills to stop."""
 _LIVES = frozenset({Life.INIT, Life.SHUTDOWN})
@@ -158,6 +160,9 @@ class Outbox:
                 elif told is not None:
                     self._refused.append(told)
                     del self._under_way[number]
+                earlier = None if before is None else failure(before)
+                if earlier is not None and earlier is not error:
+                    _LOG.warning("component '%s' did not take an output: %s", component.name, reason_of(earlier))
                 raise
             why = None if before is None else failure(before)
             if why is not None:  # the next skill fails with this error

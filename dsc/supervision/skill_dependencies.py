@@ -47,10 +47,7 @@ class SkillDependencies:
             NotAliveError: the component itself cannot start, or is in Shutdown.
             InputError: components need each other in a cycle, or the hook `needed` of a component fails.
         """
-        if self.concerned:
-            await self._supervised()
-        else:
-            await self._component.life.come_alive()
+        await (self._supervised() if self.concerned else self._component.life.come_alive())
         self._component.life.require_alive()
 
     async def _supervised(self) -> None:
