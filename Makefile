@@ -8,7 +8,7 @@ BENCH  := .venv-bench
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: mistakes lively soak-robots help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
+.PHONY: mistakes lively soak-robots soak-signals help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
@@ -73,6 +73,9 @@ soak: $(VENV)/.run   ## simulated runs of the clean-up table with faults and cra
 
 soak-robots: $(VENV)/.test   ## random small robots with faults, changes by others, priorities and kills: is every promise kept? (RUNS=N FIRST=SEED)
 	$(BIN)/python tests/support/random_robots.py --runs $(or $(RUNS),2000) --first $(or $(FIRST),0)
+
+soak-signals: $(VENV)/.test   ## signals at random moments of real runs with a device: is it braked, closed one time, and the run resumed? (RUNS=N FIRST=SEED)
+	$(BIN)/python tests/support/signals_soak.py $(or $(RUNS),25) $(or $(FIRST),0)
 
 lively: $(VENV)/.test   ## robots in a world that changes every half second: is each needed step carried out once? (HOURS=H SEED=N)
 	$(BIN)/python tests/support/lively_world.py --hours $(or $(HOURS),1) --seed $(or $(SEED),0)

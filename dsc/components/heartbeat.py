@@ -25,7 +25,8 @@ class Heartbeat:
         endpoint: the component's address.
         needs: returns the names of the components that this one needs at present; called at each heartbeat.
         changed: called when the component becomes active or inactive.
-        keeps: returns whether the component is active without an activator, like the sequencer.
+        root: whether the component is active without an activator, like the sequencer.
+        busy: returns whether the component works at present, and therefore stays active without an activator.
     """
 
     def __init__(
@@ -33,12 +34,15 @@ class Heartbeat:
         endpoint: Endpoint,
         needs: Callable[[], Collection[str]],
         changed: Changed,
-        keeps: Callable[[], bool] = lambda: False,
+        *,
+        root: bool = False,
+        busy: Callable[[], bool] = lambda: False,
     ) -> None:
         self._endpoint = endpoint
         self._needs = needs
         self._changed = changed
-        self._keeps = keeps
+        self._root = root
+        self._busy = busy
         self._activators: dict[str, float] = {}  # by name, the loop time of the last heartbeat
         self._stirred = asyncio.Event()
         self.active = False
@@ -71,7 +75,7 @@ class Heartbeat:
     async def _beat(self) -> None:
         now = asyncio.get_running_loop().time()
         self._activators = {name: at for name, at in self._activators.items() if now - at < SILENCE}
-        await self._become(active=self._keeps() or bool(self._activators))
+        await self._become(active=self._root or bool(self._activators) or self._busy())
         if self.active:
             self._endpoint.broadcast("heartbeat", {"needs": sorted(self._needs())})
 

@@ -60,7 +60,7 @@ class Host:
         self._answer("take", "take", lambda said: component.receive(said["port"], said["message"]))
         self._answer("diagnose", "diagnose", lambda _: component.diagnose())
         self._is_active = asyncio.Event()
-        self._heart = Heartbeat(self.endpoint, self._needed, self._activated, self._actions.any_at_work)
+        self._heart = Heartbeat(self.endpoint, self._needed, self._activated, busy=self._actions.any_at_work)
         self._beating = asyncio.get_running_loop().create_task(self._heart.run())
         self._changed()
         component.life.listen(self._changed)
@@ -210,17 +210,21 @@ class HostedActions:
         endpoint.answer("how", self._how)
         endpoint.answer("stop", self._stop)
 
+    def tasks(self) -> list[asyncio.Task[None]]:
+        """Return the tasks of all actions that were not forgotten."""
+        return [action.task for action in self._actions.values() if action.task is not None]
+
     def any_at_work(self) -> bool:
         """Return whether the component executes an action; it then stays active, also without its client."""
         return bool(self._at_work)
 
     async def close(self) -> None:
         """Cancel all actions, and wait for their clean-up, for `GRACE` seconds at most."""
-        tasks = [one.task for one in self._actions.values() if one.task is not None and not one.over]
-        for task in tasks:
+        running = [task for task in self.tasks() if not task.done()]
+        for task in running:
             cancel_once(task)
-        if tasks:
-            _, others = await asyncio.wait(tasks, timeout=GRACE)
+        if running:
+            _, others = await asyncio.wait(running, timeout=GRACE)
             for task in others:
                 give_up(task)
 

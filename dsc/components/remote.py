@@ -47,7 +47,7 @@ class RemoteComponent(Component):
         self._skills = skills
         self._run = endpoint.life
         self._condition = Subscription(endpoint, name, CONDITION, self._changed)
-        self._heart = Heartbeat(endpoint, lambda: [name], _ignore, lambda: True)
+        self._heart = Heartbeat(endpoint, lambda: [name], _ignore, root=True)
         self._working: tuple[asyncio.Task[None], ...] = ()
         self._program = ""  # the host's life
 

@@ -451,7 +451,7 @@ class Dispatcher:
                 self._report_failure(name, reason)
 
     def _report_failure(self, name: str, reason: str) -> None:
-        if self._closing:  # no state hears an event any longer
+        if self._closing:  # no state receives an event any longer
             self._fault(f"component '{name}' has failed: {reason}")
         else:
             self._post(Event(COMPONENT_FAILED, {"component": name, "reason": reason}))

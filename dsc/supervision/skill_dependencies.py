@@ -61,7 +61,8 @@ class SkillDependencies:
                     raise one.problem
                 if one.bug is not None and one.name != self._component.name:
                     raise NotAliveError(self._activation.registry.state_of(one.name)) from one.bug
-            return all(one.on for one in supervisors) or supervisor.failures > before
+            shut_down = self._component.life.state is Life.SHUTDOWN
+            return all(one.on for one in supervisors) or supervisor.failures > before or shut_down
 
         self._waits = True
         await self._activation.until(settled)

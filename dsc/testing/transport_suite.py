@@ -499,7 +499,7 @@ class TransportSuite:
             pass
 
         host = Host(Camera(), transport, LoopClock())
-        root = Heartbeat(Endpoint("sequencer", transport), lambda: ["camera"], ignore, lambda: True)
+        root = Heartbeat(Endpoint("sequencer", transport), lambda: ["camera"], ignore, root=True)
         async with running(root.run()):
             await until(lambda: told == [True])
         await until(lambda: told == [True, False])
@@ -523,7 +523,7 @@ class TransportSuite:
                 (active.add if now else active.discard)(name)
 
             endpoint = Endpoint(name, transport)
-            hearts[name] = Heartbeat(endpoint, lambda: needs[name], changed, lambda name=name: name == "root")  # type: ignore[misc]
+            hearts[name] = Heartbeat(endpoint, lambda: needs[name], changed, root=name == "root")
             return hearts[name].run()
 
         async with running(heart("root"), heart("motor"), heart("camera")) as tasks:
@@ -553,7 +553,7 @@ class TransportSuite:
             told.append(now)
 
         dying = Endpoint("arm", transport)
-        arm = Heartbeat(dying, lambda: ["motor"], ignore, lambda: True)
+        arm = Heartbeat(dying, lambda: ["motor"], ignore, root=True)
         motor = Heartbeat(Endpoint("motor", transport), list, note)
         async with running(motor.run()):
             task = asyncio.ensure_future(arm.run())

@@ -6,6 +6,8 @@ import asyncio
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -15,6 +17,19 @@ from knowledge_base import StoreError
 from planning import Bundle, deploy
 from planning.deployment import resume
 
+
+@pytest.fixture(autouse=True)
+def usual_handlers() -> Iterator[None]:
+    """Undo the handlers of a shell that has started the tests in the background, or by `nohup`."""
+    before = {number: signal.signal(number, usual) for number, usual in USUAL.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+USUAL: dict[int, Any] = {
+    signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL, signal.SIGHUP: signal.SIG_DFL,
+}  # fmt: skip
 PLOT = parse_plot("""
 plot: go
 states:
@@ -186,6 +201,8 @@ class Base(Component):
         finally:
             signal.raise_signal(signal.NAME)
 
+usual = signal.default_int_handler if signal.NAME == signal.SIGINT else signal.SIG_DFL
+signal.signal(signal.NAME, usual)
 plot = parse_plot("{plot: p, states: {a: {entry: {trigger: base.drive}, on: {arrived: e}}, e: {final: true}}}")
 async def main():
     await Sequencer(Library([plot]), KnowledgeBase(Schema()), [Base()], LoopClock()).run("p")
@@ -209,6 +226,7 @@ INTERACTIVE = """
 import asyncio, signal, sys
 from dsc.sequencer.clock import run_real
 sys.ps1 = ">>> "
+signal.signal(signal.SIGINT, signal.default_int_handler)
 async def main():
     try:
         signal.raise_signal(signal.SIGINT)
