@@ -27,14 +27,33 @@ from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.evaluator import apply_effect, holds
 from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.evaluation.world_protocol import World
-from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, effect_parts, substitute_effect
+from knowledge_base.language.syntax.effect import (
+    Add,
+    AllOf,
+    Delete,
+    Effect,
+    NumericEffect,
+    effect_leaves,
+    effect_parts,
+    substitute_effect,
+)
 from knowledge_base.language.syntax.expression import Atom, Constant, Expression, Not, Variable
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.domain import GroundStep, PlanningAction, PlanningDomain
 from planning.ordering.partial_order import PRESENT, CausalLink, PartialOrder, reduction
-from planning.ordering.step_dependencies import Changes, Ground, Support, changes, favours, ground_conjuncts, support
+from planning.ordering.step_dependencies import (
+    Changes,
+    Ground,
+    Names,
+    Support,
+    Unlisted,
+    changes,
+    favours,
+    ground_conjuncts,
+    support,
+)
 from planning.plan import Plan, PlanStep
 from planning.problem.conditions import Literal
 from planning.problem.derived import derivation
@@ -50,7 +69,8 @@ def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression
         InputError: the plan does not lead to the goal; `planning.validation.validate` returns the failing step.
     """
     derived = derivation(domain)
-    tracing = CausalTrace(derived.world(world))
+    changing = None if derived.recursive else _changing(plan, derived.domain)
+    tracing = CausalTrace(derived.world(world), changing)
     for number, step in enumerate(plan.steps, start=1):
         tracing.take(number, step, derived.domain)
     tracing.reach(len(plan.steps) + 1, derived.expand(goal))
@@ -63,13 +83,15 @@ class CausalTrace:
 
     Args:
         world: the present world, with derived facts.
+        changing: the predicates and functions that steps change; `None` if they are unknown.
 
     Attributes:
         links: the causal links, in the order of the users.
         earlier: the steps that must end before each step, as bits.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, changing: Names | None = None) -> None:
+        self._changing = changing
         self.links: list[CausalLink] = []
         self.earlier: dict[int, int] = defaultdict(int)
         self._base, self._schema = world, world.schema
@@ -175,7 +197,7 @@ class CausalTrace:
 
     def _need_support(self, user: int, condition: Expression, whose: PlanStep | None) -> None:
         """Record that a step, or the goal, needs a ground condition of any form; raise `InputError` if it is false."""
-        found = support(condition, self._world, self._latest)
+        found = support(condition, self._world, self._latest, self._changing)
         if found is None:
             raise _missing(condition, whose)
         if not found:  # no step can change the condition
@@ -191,6 +213,8 @@ class CausalTrace:
                 self.earlier[user] |= 1 << provider
         if isinstance(ground, Literal):
             self._facts[ground.fact].users[ground.positive] |= 1 << user
+        elif isinstance(ground, Unlisted):
+            self._facts.rely_on_absence(ground.predicate, user)
         else:
             self._numbers[ground].users |= 1 << user
 
@@ -222,12 +246,15 @@ class CausalTrace:
     def _providers(self, ground: Ground) -> tuple[int, ...]:
         if isinstance(ground, Literal):
             return (self._facts[ground.fact].since[ground.positive],)
+        if isinstance(ground, Unlisted):
+            absent = {record.since[False] for record in self._facts.absent(ground.predicate)}
+            return tuple(sorted(absent)) or (PRESENT,)
         known = self._numbers[ground]
         return tuple(_numbers(known.adders | known.assigners)) or (PRESENT,)
 
     def _helps(self, provider: int, ground: Ground, condition: Expression) -> bool:
         """Return whether the provider contributes to the condition; consumption of fuel, e.g., does not."""
-        if isinstance(ground, Literal) or provider == PRESENT or self._numbers[ground].assigners:
+        if not isinstance(ground, Fact) or provider == PRESENT or self._numbers[ground].assigners:
             return True
         good = favours(condition, ground, self._world)
         return good is None or good * self._numbers[ground].moves.get(provider, 0.0) > 0
@@ -261,10 +288,23 @@ class _Records(dict[Fact, _Record]):
     def __init__(self, world: World) -> None:
         super().__init__()
         self._world = world
+        self._absence: dict[str, int] = defaultdict(int)  # users of all false facts of a predicate, as bits
 
     def __missing__(self, fact: Fact) -> _Record:
         made = self[fact] = _Record(holds=self._world.holds(fact.predicate, fact.args))
+        if not made.holds:
+            made.users[False] = self._absence.get(fact.predicate, 0)
         return made
+
+    def absent(self, predicate: str) -> list[_Record]:
+        """Return the records of the false facts of a predicate."""
+        return [record for fact, record in self.items() if fact.predicate == predicate and not record.holds]
+
+    def rely_on_absence(self, predicate: str, user: int) -> None:
+        """Record that a step needs all false facts of a predicate to stay false, also those without a record."""
+        for record in self.absent(predicate):
+            record.users[False] |= 1 << user
+        self._absence[predicate] |= 1 << user
 
 
 @dataclass(slots=True)
@@ -341,6 +381,15 @@ class _Pattern:
 
 _known: IdentityCache[GroundStep, _Known] = IdentityCache(size=1024)
 _patterns: IdentityCache[PlanningAction, _Pattern] = IdentityCache(size=256)
+
+
+def _changing(plan: Plan, domain: PlanningDomain) -> Names:
+    """Return the names of the predicates and functions that the steps change."""
+    actions = {step.action: domain.action(step) for step in plan.steps}.values()
+    effects = [one.effect for one in actions] + [one.timed.start_effect for one in actions if one.timed is not None]
+    effects += [one.timed.end_effect for one in actions if one.timed is not None]
+    leaves = [leaf for effect in effects for leaf in effect_leaves(effect)]
+    return frozenset(leaf.call.function if isinstance(leaf, NumericEffect) else leaf.atom.predicate for leaf in leaves)
 
 
 def _doing(action: PlanningAction, step: PlanStep, effect: Effect, domain: PlanningDomain, world: World) -> Changes:

@@ -2,17 +2,21 @@
 
 A condition is divided into ground conditions that must all hold. The *support* of each ground condition consists of the
 literals and numeric fluents that decide its truth. One true part suffices as the support of a disjunction.
+
+A quantified condition with more than `MOST_INSTANCES` instances is not divided. A query finds the few instances whose
+truth depends on facts that steps change, as for a condition of a plot.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, islice
+from math import prod
 
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language.evaluation.evaluator import apply_effect, choices, evaluate_argument, holds
+from knowledge_base.language.evaluation.evaluator import apply_effect, choices, evaluate_argument, holds, rows
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax import effect as eff
 from knowledge_base.language.syntax import expression as ex
@@ -21,8 +25,27 @@ from knowledge_base.language.syntax.expression import Atom, Expression, Term
 from knowledge_base.world.overlay import Overlay
 from planning.problem.conditions import Literal
 
-Ground = Literal | Fact
-"""A literal, or a numeric fluent (written as a `Fact`) whose value matters."""
+MOST_INSTANCES = 100
+"""Number of instances up to which a quantified condition is divided into them."""
+MOST_UNDECIDED = 1000
+"""Number of instances from which the false facts of a predicate together are one reason to wait."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unlisted:
+    """Facts that decide a condition with many instances, and that its support does not list.
+
+    Attributes:
+        predicate: the predicate, all of whose false facts must stay false; without one, facts that no step changes.
+    """
+
+    predicate: str = ""
+
+
+Ground = Literal | Fact | Unlisted
+"""A literal, a numeric fluent (written as a `Fact`) whose value matters, or unlisted facts."""
+Names = frozenset[str]
+"""Names of predicates and functions."""
 Support = frozenset[Ground]
 """The literals and fluents that decide the truth of a condition."""
 Rank = Callable[[Support], int]
@@ -99,6 +122,8 @@ def ground_conjuncts(e: Expression, world: World, *, wanted: bool = True) -> Ite
     match e:
         case ex.Not(body):
             yield from ground_conjuncts(body, world, wanted=not wanted)
+        case ex.Forall() | ex.Exists() if _has_many_instances(e, world):
+            yield e if wanted else ex.Not(e)
         case ex.And() | ex.Or() | ex.Imply() | ex.Forall() | ex.Exists() if _is_conjunction(e, wanted=wanted):
             for part in _parts(e, world):
                 yield from ground_conjuncts(part, world, wanted=wanted)
@@ -106,21 +131,120 @@ def ground_conjuncts(e: Expression, world: World, *, wanted: bool = True) -> Ite
             yield e if wanted else ex.Not(e)
 
 
-def support(e: Expression, world: World, rank: Rank, *, wanted: bool = True) -> Support | None:
-    """Return the support of a ground condition `e`, or of `not e` if `wanted` is false; `None` if that is false."""
+def support(
+    e: Expression, world: World, rank: Rank, changing: Names | None = None, *, wanted: bool = True
+) -> Support | None:
+    """Return the support of a ground condition, or `None` if the condition is false.
+
+    Args:
+        e: the condition.
+        world: the world in which the condition is needed.
+        rank: the rank of a support.
+        changing: the predicates and functions that steps change; `None` if they are unknown.
+        wanted: whether `e` is needed, or else its negation.
+    """
     match e:
         case Atom(predicate) if predicate in world.schema.predicates:
             fact = ground(e, world)
             as_wanted = world.holds(fact.predicate, fact.args) is wanted
             return frozenset({Literal(fact, wanted)}) if as_wanted else None
         case ex.Not(body):
-            return support(body, world, rank, wanted=not wanted)
+            return support(body, world, rank, changing, wanted=not wanted)
+        case ex.Forall() | ex.Exists() if _has_many_instances(e, world):
+            return _support_of_many(e, world, rank, changing, wanted=wanted)
         case Atom() | ex.Comparison():  # a type never changes
             as_wanted = holds(e, world, {}) is wanted
             return frozenset(chain(*(_fluents(part, world) for part in ex.parts_of(e)))) if as_wanted else None
         case _:
-            found = (support(part, world, rank, wanted=wanted) for part in _parts(e, world))
+            found = (support(part, world, rank, changing, wanted=wanted) for part in _parts(e, world))
             return _all(found) if _is_conjunction(e, wanted=wanted) else _best(found, rank)
+
+
+def _has_many_instances(e: ex.Forall | ex.Exists, world: World) -> bool:
+    numbers = [sum(1 for one in variable.types or ("object",) for _ in world.objects(one)) for variable in e.variables]
+    return prod(numbers) > MOST_INSTANCES
+
+
+def _support_of_many(
+    e: ex.Forall | ex.Exists, world: World, rank: Rank, changing: Names | None, *, wanted: bool
+) -> Support | None:
+    """Return the support of a quantified condition with many instances; arguments as for `support`."""
+    if not _is_conjunction(e, wanted=wanted):
+        true = islice(_instances(e, _in_normal_form(e.body, wanted=wanted), world), MOST_INSTANCES)
+        return _best((support(one, world, rank, changing, wanted=wanted) for one in true), rank)
+    undecided = _Undecided(world, changing, by_absence=False)
+    instances = list(islice(_instances(e, undecided.part(e.body, wanted=wanted), world), MOST_UNDECIDED))
+    if len(instances) == MOST_UNDECIDED:
+        undecided = _Undecided(world, changing, by_absence=True)
+        instances = list(_instances(e, undecided.part(e.body, wanted=wanted), world))
+    found = _all(support(one, world, rank, changing, wanted=wanted) for one in instances)
+    return None if found is None else found | {Unlisted(), *map(Unlisted, undecided.absent)}
+
+
+def _instances(e: ex.Forall | ex.Exists, condition: Expression, world: World) -> Iterator[Expression]:
+    """Yield the bodies of those instances for which a condition on the variables is true, found by a join."""
+    typed = tuple(
+        ex.Or(tuple(Atom(one, (ex.Variable(variable.name),)) for one in variable.types or ("object",)))
+        for variable in e.variables
+    )
+    for chosen in rows(ex.And((*typed, condition)), world):
+        yield ex.substitute(e.body, chosen)
+
+
+def _in_normal_form(e: Expression, *, wanted: bool) -> Expression:
+    """Return `e`, or its negation, with `not` only at its leaves and quantifiers, so that a join can use the atoms."""
+    match e:
+        case ex.Not(body):
+            return _in_normal_form(body, wanted=not wanted)
+        case ex.Imply(premise, conclusion):
+            return _in_normal_form(ex.Or((ex.Not(premise), conclusion)), wanted=wanted)
+        case ex.And(parts) | ex.Or(parts):
+            join = ex.And if isinstance(e, ex.And) is wanted else ex.Or
+            return join(tuple(_in_normal_form(part, wanted=wanted) for part in parts))
+        case _:
+            return e if wanted else ex.Not(e)
+
+
+@dataclass(slots=True)
+class _Undecided:
+    """Conditions for those instances of a body whose truth may depend on facts that steps change.
+
+    Attributes:
+        world: the present world.
+        changing: the predicates and functions that steps change; `None` if they are unknown.
+        by_absence: whether false facts of one predicate decide instances.
+        absent: the predicate whose false facts decide other instances; only one, as each is a reason to wait.
+    """
+
+    world: World
+    changing: Names | None
+    by_absence: bool
+    absent: set[str] = field(default_factory=set)
+
+    def part(self, e: Expression, *, wanted: bool) -> Expression:
+        """Return the condition for `e`, or for its negation: false if the instance stays true in any case."""
+        match e:
+            case ex.Not(body):
+                return self.part(body, wanted=not wanted)
+            case ex.Imply(premise, conclusion):
+                return self.part(ex.Or((ex.Not(premise), conclusion)), wanted=wanted)
+            case ex.And(parts) | ex.Or(parts):
+                join = ex.Or if isinstance(e, ex.And) is wanted else ex.And
+                return join(tuple(self.part(part, wanted=wanted) for part in parts))
+            case _ if not self._may_change(e):
+                return ex.Not(e) if wanted else e
+            case Atom(predicate) if self.by_absence and not wanted and self.absent <= {predicate}:
+                self.absent.add(predicate)
+                return e
+            case _:
+                return ex.And(())
+
+    def _may_change(self, e: Expression | Term) -> bool:
+        name = e.predicate if isinstance(e, Atom) else e.function if isinstance(e, ex.Call) else None
+        schema = self.world.schema
+        fixed = name is None or (isinstance(e, Atom) and name not in schema.predicates)  # a type, or computed
+        changes = not fixed and (self.changing is None or name in self.changing)
+        return changes or any(map(self._may_change, ex.parts_of(e)))
 
 
 def favours(e: Expression, fluent: Fact, world: World) -> float | None:

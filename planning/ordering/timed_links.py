@@ -20,7 +20,16 @@ from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
 from planning.ordering.partial_order import PRESENT, CausalLink, PartialOrder, scheduled
-from planning.ordering.step_dependencies import Changes, Ground, Support, changes, favours, ground_conjuncts, support
+from planning.ordering.step_dependencies import (
+    Changes,
+    Ground,
+    Support,
+    Unlisted,
+    changes,
+    favours,
+    ground_conjuncts,
+    support,
+)
 from planning.plan import Plan, PlanStep, Timing
 from planning.problem.conditions import Literal
 from planning.problem.derived import derivation
@@ -125,10 +134,21 @@ class _Tracing:
     def _providers(self, ground: Ground, condition: Expression) -> list[int]:
         """Return the providers of the condition; a step that moves a number the wrong way, e.g. uses fuel, is none."""
         makers = self.makers.get(ground, [PRESENT])
+        if isinstance(ground, Unlisted):
+            return self._removers(ground.predicate)
         if isinstance(ground, Literal) or ground in self.assigned or makers == [PRESENT]:
             return makers
         good = favours(condition, ground, self.world)
         return [one for one in makers if good is None or good * self.moves[ground, one] > 0]
+
+    def _removers(self, predicate: str) -> list[int]:
+        """Return the steps that made a fact of the predicate false last."""
+        made = [
+            makers[-1]
+            for ground, makers in self.makers.items()
+            if isinstance(ground, Literal) and ground.fact.predicate == predicate and not ground.positive
+        ]
+        return sorted({*made}) or [PRESENT]
 
     def _make(self, end: _End, doing: Changes) -> None:
         for literal in doing.makes:

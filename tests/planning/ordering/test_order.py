@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from order_strategies import Planned, planned
 
@@ -13,6 +13,7 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
 from planning.domain import PlanningDomain
+from planning.ordering import step_dependencies
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import PartialOrder, reduced, standing
 from planning.plan import Plan, PlanStep
@@ -38,9 +39,13 @@ def steps(*texts):
 # -- random plans, all linearisations ------------------------------------------------------------------------
 
 
-@settings(max_examples=60, derandomize=True, deadline=None)
+@pytest.mark.parametrize("most", [step_dependencies.MOST_INSTANCES, 1])
+@settings(max_examples=60, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(planned())
-def test_every_linearisation_leads_to_the_goal_and_to_the_same_world_and_keeps_what_stands(case: Planned):
+def test_every_linearisation_leads_to_the_goal_and_to_the_same_world_and_keeps_what_stands(
+    most: int, monkeypatch, case: Planned
+):
+    monkeypatch.setattr(step_dependencies, "MOST_INSTANCES", most)  # 1: no quantified condition is divided
     order = deordered(case.plan, case.domain, case.world, case.goal)
     ends = []
     for taken in linearisations(order):
@@ -66,6 +71,59 @@ def test_there_is_an_order_for_exactly_those_plans_that_are_valid(case: Planned,
     else:
         with pytest.raises(InputError):
             deordered(plan, case.domain, case.world, case.goal)
+
+
+# -- quantified conditions with many instances ----------------------------------------------------------------
+
+ROW = PlanningDomain.parse("""
+(define (domain row)
+  (:types thing)
+  (:predicates (par ?x ?y - thing) (mark ?x - thing) (hot ?x - thing) (g) (h))
+  (:action heat :parameters (?x - thing) :precondition (and) :effect (hot ?x))
+  (:action cool :parameters (?x - thing) :precondition (and) :effect (not (hot ?x)))
+  (:action join :parameters (?x ?y - thing) :precondition (and) :effect (par ?x ?y))
+  (:action part :parameters (?x ?y - thing) :precondition (and) :effect (not (par ?x ?y)))
+  (:action unmarked :parameters () :effect (g)
+    :precondition (forall (?a ?b ?c ?d - thing) (imply (and (par ?a ?b) (par ?b ?c) (par ?c ?d)) (not (mark ?a)))))
+  (:action cold :parameters () :effect (g)
+    :precondition (forall (?a ?b - thing) (imply (par ?a ?b) (not (hot ?b)))))
+  (:action warm :parameters () :effect (h)
+    :precondition (exists (?a ?b ?c ?d - thing) (and (par ?a ?b) (par ?b ?c) (par ?c ?d) (hot ?d)))))
+""")
+
+
+@pytest.fixture
+def row(world_of):
+    facts = tuple(fact("par", f"o{number}", f"o{number + 1}") for number in range(59))
+    return world_of(ROW.schema, {f"o{number}": "thing" for number in range(60)}, facts)
+
+
+def ordered(world, *texts, goal="(g)"):
+    return deordered(Plan(steps(*texts)), ROW, world, parse_condition(goal))
+
+
+def test_a_condition_with_millions_of_instances_is_one_link(row):
+    order = ordered(row, "unmarked")
+    assert [(link.provider, link.user) for link in order.links] == [(0, 1), (1, 2)]
+    assert "forall" in str(order.links[0])
+
+
+def test_what_falsifies_one_of_many_instances_waits_and_what_makes_it_true_precedes(row):
+    assert ordered(row, "cold", "heat o3").before == {(1, 2)}
+    assert ordered(row, "heat o3", "cool o3", "cold").before == {(1, 2), (2, 3)}
+    assert ordered(row, "cold", "heat o0").before == set()  # nothing is before o0
+    assert ordered(row, "heat o0", "cold", "join o7 o0").before == {(2, 3)}
+    assert ordered(row, "join o7 o0", "cold", "heat o0").before == {(2, 3)}
+    assert ordered(row, "heat o0", "join o5 o0", "part o5 o0", "cold").before == {(2, 3), (3, 4)}
+    with pytest.raises(InputError, match=r"\(cold\) needs"):
+        ordered(row, "heat o3", "cold")
+
+
+def test_one_of_many_witnesses_suffices(row):
+    order = ordered(row, "heat o9", "warm", "cool o9", goal="(h)")
+    assert order.before == {(1, 2), (2, 3)}
+    with pytest.raises(InputError, match=r"\(warm\) needs"):
+        ordered(row, "heat o1", "warm", goal="(h)")
 
 
 # -- what waits for what, and why ----------------------------------------------------------------------------
