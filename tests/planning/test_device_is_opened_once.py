@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from dsc import Component, Outcome, SkillCall, parse_plot, skill
-from dsc.sequencer.clock import SimulatedEventLoop
+from dsc.sequencer.clock import SimulatedEventLoop, run_simulated
 from planning import Bundle, deploy
 from planning.deployment import resume
 
@@ -145,4 +145,4 @@ def test_in_a_notebook(port: Port) -> None:
             await deployed.executive.execute("turn")
             assert port.take() == GOOD
 
-    asyncio.run(cells())
+    run_simulated(cells())
