@@ -162,9 +162,8 @@ class LifeCycle(Announcer):
 
     def describe(self) -> str:
         """Return the component with its state, as text for a message."""
-        return f"component '{self._hooks.name}', which is in '{self.state}'" + (
-            f": {self.reason}" if self.reason else ""
-        )
+        why = f": {self.reason}" if self.reason else ""
+        return f"component '{self._hooks.name}', which is in '{self.state}'{why}"
 
     def require_alive(self) -> None:
         """Raise `NotAliveError` unless the component is alive."""
