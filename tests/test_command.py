@@ -176,6 +176,15 @@ def installed(words, out):
     return done.returncode, done.stderr
 
 
+def test_a_closed_standard_error_does_not_prevent_a_plan(tmp_path):
+    domain, problem = tmp_path / "d.pddl", tmp_path / "p.pddl"
+    domain.write_text("(define (domain d) (:predicates (p)) (:action a :parameters () :effect (p)))")
+    problem.write_text("(define (problem q) (:domain d) (:init) (:goal (p)))")
+    command = [str(Path(sys.executable).with_name("dsc")), "plan", str(domain), str(problem)]
+    done = subprocess.run(["/bin/sh", "-c", '"$@" 2>&-', "sh", *command], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.splitlines()[0].strip()) == (0, "1 (a)")
+
+
 PRINTING = [["doctor"], ["doctor", "--json"], ["run", "clean-up-table", "--json"], ["plan", "none", "none", "--json"]]
 
 

@@ -73,7 +73,7 @@ def outcomes_of(state: AnyState, plots: Plots) -> Outcomes:
         found.update(plots.plot(candidate).emits)
     if state.goal is None:
         return {**found, NO_CANDIDATE: {}}
-    return {**found, NO_PLAN: {"reason": "text"}, GAVE_UP: {"reason": "text"}}
+    return {**found, NO_PLAN: {"reason": "text", "kind": "symbol"}, GAVE_UP: {"reason": "text"}}
 
 
 def answerable(state: AnyState, plots: Plots) -> Outcomes:

@@ -78,7 +78,8 @@ def read_problem(
 ) -> ProblemText:
     """Read a PDDL problem from a file (a `Path` or a file name), or from its text.
 
-    Negative facts in `:init`, and the section `:length`, are accepted and ignored.
+    Negative facts in `:init`, and the section `:length`, are accepted and ignored. An initial state that contradicts
+    itself is refused.
 
     Args:
         text_or_path: a file, or text that begins with `(` or a comment.
@@ -93,7 +94,8 @@ def read_problem(
         UnsupportedConstructError: the file uses a construct that no planner here supports.
         UnknownNameError: an undeclared type, predicate, function or object; or the problem is for another domain and
             does not match the schema.
-        SchemaError: a wrong number of arguments, a wrong type, or an object declared with two types.
+        SchemaError: a wrong number of arguments, a wrong type, or an object declared with two types. It is also raised
+            if `:init` has two values of one function, or a fact and its negation.
     """
     text, source = text_and_source(text_or_path, source)
     return parse_problem(text, schema, source, domain)
@@ -203,6 +205,7 @@ class _Init:
         self.objects = objects
         self.facts: dict[Fact, None] = {}
         self.values: dict[Fact, Content] = {}
+        self._stated: dict[Fact, tuple[Content | bool, Place | None]] = {}  # values, or whether a fact is true
 
     def read(self, node: Node) -> None:
         if isinstance(node, Group) and node.head() == "and":
@@ -217,15 +220,27 @@ class _Init:
             case Atom(predicate) if self.schema.is_type(predicate, len(e.args)):
                 self.confirm(predicate, _values(e.args)[0], e.place)
             case Atom(predicate, args):
-                self.facts[Fact(predicate, _values(args))] = None
-            case Not(Atom()):
-                pass  # facts that are not listed are false
+                fact = Fact(predicate, _values(args))
+                self._state(fact, e.place, stated=True)
+                self.facts[fact] = None
+            case Not(Atom(predicate, args)):  # facts that are not listed are false
+                self._state(Fact(predicate, _values(args)), e.place, stated=False)
             case Comparison("=", Call(function, args), said) if (content := _content(said)) is not None:
                 fluent = Fact(function, _values(args))
                 require_content(content, self.schema.result(function), fluent, said.place)
+                self._state(fluent, e.place, stated=content)
                 self.values[fluent] = content
             case _:
                 raise ParseError("':init' has facts and (= (FUNCTION ...) NUMBER)", place=e.place)
+
+    def _state(self, what: Fact, place: Place | None, *, stated: Content | bool) -> None:
+        """Store a value, or the truth of a fact; raise `SchemaError` if the initial state has stated another one."""
+        before, where = self._stated.setdefault(what, (stated, place))
+        if before != stated:
+            message = (
+                f"':init' contradicts itself: {what} is {_text_of(stated)} here, and {_text_of(before)} at {where}"
+            )
+            raise SchemaError(message, place=place, found=str(what))
 
     def confirm(self, type_name: str, thing: Value, place: Place | None) -> None:
         """Check `(truck t1)` in `:init`, which may repeat the type of t1 but cannot change it."""
@@ -240,6 +255,10 @@ def _refuse_timed(node: Node) -> None:
     time, fact = node.items[1:]
     if isinstance(time, Word) and is_number(time.text) and isinstance(fact, Group):
         raise refused(TIMED_INITIAL, f"at {time.text}", node.place)
+
+
+def _text_of(stated: object) -> str:
+    return str(stated).lower() if isinstance(stated, bool) else str(stated)
 
 
 def _content(said: Term) -> Content | None:

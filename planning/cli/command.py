@@ -6,6 +6,7 @@ import errno
 import os
 import sys
 from io import TextIOWrapper
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -84,6 +85,7 @@ def dsc(
 
 def main() -> None:
     """Run the command line; report bad input as one message with exit status 2, and never as a traceback."""
+    _open_standard_error()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # a terminal may not support every character
             stream.reconfigure(errors="backslashreplace")
@@ -101,6 +103,12 @@ def main() -> None:
         sys.exit(NOT_WRITTEN)
     finally:
         _drop_unwritten()
+
+
+def _open_standard_error() -> None:
+    """Open the null device in place of a closed standard error, which another file would take otherwise."""
+    if sys.stderr is None:
+        sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  open until the end of the program
 
 
 def _command() -> None:

@@ -35,6 +35,7 @@ from planning.execution.plan_run import Attempt, PlanRun, PlanRuns, task_of
 from planning.execution.repair import Choices, Escalation, Plotting
 from planning.execution.search import NotFound, Search
 from planning.explanation import unmet
+from planning.problem.construction import check_goal
 from planning.problem.derived import derivation
 
 if TYPE_CHECKING:
@@ -177,7 +178,7 @@ class PlanningComponent(Component):
         """Find a plan for the goal and generate the plot of the plan.
 
         `after` is the name of the plan that the new one replaces; empty for the first plan. The attribute `kind` of
-        `no_plan` is `unsolvable`, `timed_out` or `failed`.
+        `no_plan` is `unsolvable`, `timed_out`, `failed`, or `invalid` for a goal that is not a condition of the domain.
         """
         try:
             return await self._planned(call, goal, holder, seconds, replans, self._runs.get(after))
@@ -237,9 +238,16 @@ class PlanningComponent(Component):
     async def _planned(
         self, call: SkillCall, goal: str, holder: str, seconds: float, replans: int, before: PlanRun | None
     ) -> PlotFound | GoalHolds | NoPlan | GaveUp:
-        wanted, now = parse_condition(goal), self._derivation.at(self._knowledge)
+        now = self._derivation.at(self._knowledge)
+        try:
+            wanted = parse_condition(goal)
+            if before is None:  # later, an object of the goal may be missing
+                check_goal(wanted, self._knowledge)
+            reached = holds(now.condition(wanted), self._knowledge)
+        except InputError as error:
+            return self._none("invalid", str(error))
         task = task_of(wanted, holder)
-        if holds(now.condition(wanted), self._knowledge):
+        if reached:
             self._runs.conclude(task)
             return GoalHolds()
         left: int | None = None

@@ -161,3 +161,30 @@ def test_types_of_values_are_no_types_of_things() -> None:
     assert not schema.is_a("number", "object")
     assert schema.fits("truck", ())
     assert not schema.fits("text", ())
+
+
+CONTRADICTORY = Schema.parse("(define (domain d) (:types item) (:predicates (p ?i - item)) (:functions (f ?i - item)))")
+
+
+@pytest.mark.parametrize(
+    ("init", "said"),
+    [
+        ("(= (f x) 1)\n(= (f x) 3)", "2:1: ':init' contradicts itself: (f x) is 3 here, and 1 at"),
+        ("(p x)\n(not (p x))", "2:1: ':init' contradicts itself: (p x) is false here, and true at"),
+        ("(not (p x))\n(and (p x))", "(p x) is true here, and false at"),
+    ],
+)
+def test_an_initial_state_that_contradicts_itself_is_refused(init: str, said: str) -> None:
+    with pytest.raises(SchemaError) as refused:
+        read_problem(
+            f"(define (problem q) (:domain d) (:objects x - item) (:goal (p x)) (:init {init}))", CONTRADICTORY
+        )
+    assert said in str(refused.value)
+    assert ":1:" in str(refused.value)
+
+
+def test_an_initial_state_may_repeat_itself() -> None:
+    text = (
+        "(define (problem q) (:domain d) (:objects x - item) (:goal (p x)) (:init (p x) (p x) (= (f x) 1) (= (f x) 1)))"
+    )
+    assert read_problem(text, CONTRADICTORY).init == (fact("p", "x"),)

@@ -684,3 +684,50 @@ def test_streams_that_have_no_port_are_refused():
         Executive(DOMAIN, [HOLDER], [Lamps(), Meter()])
     with pytest.raises(InputError, match=r"component 'meter' takes 'lamps\.level', and there is no such component"):
         Executive(DOMAIN, [HOLDER], [Meter()])
+
+
+WORKER = parse_plot("""
+plot: worker
+receives: {order: {goal: text}, quit: }
+emits: {failed: {kind: symbol, reason: text}, served: }
+variables: {goal: {type: text, initial: ""}}
+states:
+  idle: {on: {order: {to: work, assign: {goal: ?event.goal}}, quit: over}}
+  work:
+    use: achieve
+    with: {goal: ?goal, holder: "", replans: 1, seconds: 5}
+    on:
+      done: {to: idle, emit: served}
+      no_plan: {to: idle, emit: failed, with: {kind: ?event.kind, reason: ?event.reason}}
+      gave_up: idle
+  over: {final: true}
+""")
+
+
+def test_an_invalid_goal_during_a_run_is_no_plan_and_the_run_continues():
+    with Executive(DOMAIN, [WORKER], []) as robot:
+        robot.knowledge.apply(Delta(nodes={"a": "lamp"}), author="me")
+
+        def post(sequencer):
+            for number, goal in enumerate(["(onn a)", "(on", "(on zzz)", "(not (on a))"]):
+                sequencer.post(Event("order", {"goal": goal}), after=1.0 + number)
+            sequencer.post(Event("quit"), after=9)
+
+        end = robot.run("worker", open_ended=True, prepare=post)
+    assert (end.finished, end.programming_error) == (True, None)
+    assert [one.attributes.get("kind") for one in end.emitted] == ["invalid", "invalid", "invalid", None]
+    assert "there is no predicate 'onn'; did you mean 'on'?" in end.emitted[0].attributes["reason"]
+
+
+def test_a_state_with_a_goal_reads_the_kind_of_no_plan():
+    text = """
+        plot: top
+        emits: {why: {kind: symbol}}
+        states:
+          s: {goal: (on a), on: {done: e, no_plan: {to: e, emit: why, with: {kind: ?event.kind}}, gave_up: e}}
+          e: {final: true}
+    """
+    with Executive(DOMAIN, [parse_plot(text)], []) as robot:
+        robot.knowledge.apply(Delta(nodes={"a": "lamp"}), author="me")
+        end = robot.run("top")
+    assert end.emitted[0].attributes == {"kind": "unsolvable"}
