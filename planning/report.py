@@ -128,7 +128,7 @@ def summarise(
         wall_s: the duration in real time, in seconds.
     """
     failed = bool(end.emitted) and end.emitted[-1].name in failures
-    reached = end.problem is None and (end.reached and not failed if judge == "outcome" else not left)
+    reached = end.problem is None and not failed and (end.reached if judge == "outcome" else not left)
     said = "Goal reached" if reached else "Goal not reached"
     return Report(
         robot=robot,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import select
 import tty
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,15 +34,14 @@ class Port:
     def __init__(self) -> None:
         self.device, self._end = os.openpty()
         tty.setraw(self._end)
-        os.set_blocking(self.device, False)
         self.name = os.ttyname(self._end)
 
     def take(self) -> list[str]:
-        """Return what has reached the device since the last call."""
-        try:
-            return os.read(self.device, 10_000).decode().split(";")[:-1]
-        except BlockingIOError:
-            return []
+        """Return what has reached the device since the last call; the kernel passes it on with a delay."""
+        found = ""
+        while select.select([self.device], [], [], 0.3)[0]:
+            found += os.read(self.device, 10_000).decode()
+        return found.split(";")[:-1]
 
     def close(self) -> None:
         os.close(self.device)
