@@ -20,7 +20,8 @@ from knowledge_base.language.syntax.expression import Atom, Expression
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.store import KnowledgeBase
 from planning.domain import PlanningDomain
-from planning.execution.plan_progress import PlanProgress, is_true, leads_to, shortest_end, thinned
+from planning.execution.plan_ends import leads_to, shortest_end
+from planning.execution.plan_progress import PlanProgress, is_true, thinned
 from planning.generation.carried_steps import expectation
 from planning.plan import Plan, PlanStep
 from planning.validation import validate

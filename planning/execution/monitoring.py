@@ -14,7 +14,8 @@ from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
 from planning.execution.monitor import OVERTAKING, OWN_STEPS, Broken, GoalReached, Monitor, News, Shorter
 from planning.execution.outcomes import GoalHolds, Monitored, PlanInvalid
-from planning.execution.plan_progress import cost_of, shortest_end
+from planning.execution.plan_ends import shortest_end
+from planning.execution.plan_progress import cost_of
 from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, Successor
 from planning.execution.search import Found, NotFound
 from planning.plan import PlanFound

@@ -19,6 +19,7 @@ from knowledge_base.language.syntax.expression import And, Atom, Constant, Expre
 from knowledge_base.world.overlay import Overlay
 from planning.cancellable_work import WorkLimit
 from planning.domain import PlanningDomain
+from planning.execution.plan_ends import leads_to, shortest_end
 from planning.execution.regression import CausalNeeds
 from planning.plan import Plan, PlanStep
 from planning.problem.construction import build_problem
@@ -46,28 +47,6 @@ def is_true(e: Expression, world: World) -> bool:
         return holds(e, world)
     except InputError:
         return False
-
-
-def leads_to(steps: Iterable[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> bool:
-    """Return whether the steps, executed in this order from `world`, reach the goal; `world` stays unchanged."""
-    ahead: Overlay | None = None  # made on demand, since most ends of a plan fail at their first step
-    try:
-        for step in steps:
-            if not domain.applicable(step, ahead or world):
-                return False
-            ahead = ahead or Overlay(world)
-            ahead.apply(domain.effects(step, ahead))
-        return holds(goal, ahead or world)
-    except InputError:  # an object is missing, or a value cannot be computed
-        return False
-
-
-def shortest_end(
-    steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression
-) -> tuple[PlanStep, ...] | None:
-    """Return the fewest last steps that lead from `world` to the goal; `None` if not even all steps do."""
-    ends = (tuple(steps[first:]) for first in range(len(steps), -1, -1))
-    return next((end for end in ends if leads_to(end, domain, world, goal)), None)
 
 
 def thinned(steps: Sequence[PlanStep], domain: PlanningDomain, world: World, goal: Expression) -> tuple[PlanStep, ...]:

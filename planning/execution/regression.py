@@ -11,9 +11,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.durative import FALSE
-from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When, check_depth
 from knowledge_base.language.syntax.expression import (
     TRUE,
     And,
@@ -248,11 +249,12 @@ class CausalNeeds:
         try:
             for condition, user in zip(touched, users, strict=True):
                 for part in conjuncts(regressed(condition, step.changes)):
+                    check_depth(part)
                     before = len(needed)
                     needed.setdefault(part, user)  # hashed only once, since a condition may be long
                     if len(needed) > before and _is_open(part):
                         fresh.append(part)
-        except UnregressableError:
+        except (UnregressableError, InputError, RecursionError):  # or a condition that no query can read
             return None
         gone = set(map(id, touched))
         kept = [one for one in after.open if id(one) not in gone]

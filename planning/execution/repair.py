@@ -15,7 +15,8 @@ from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.rewriting import names_of
 from knowledge_base.language.syntax.text import to_text
 from planning.execution.outcomes import GaveUp, GoalHolds, PlotFound, Repaired, Replan
-from planning.execution.plan_progress import PlanProgress, is_true, shortest_end
+from planning.execution.plan_ends import shortest_end
+from planning.execution.plan_progress import PlanProgress, is_true
 from planning.execution.plan_run import EscalationStep, Failure, PlanRun, PlanRuns, PlanState
 from planning.generation.carried_steps import expectation, implementing
 from planning.generation.control_flow import NOT_OBSERVED

@@ -16,7 +16,8 @@ from knowledge_base.errors import InputError
 from knowledge_base.world.overlay import Overlay
 from planning.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.engines.registry import timing
-from planning.execution.plan_progress import PlanProgress, cost_of, leads_to, local_repair
+from planning.execution.plan_ends import leads_to
+from planning.execution.plan_progress import PlanProgress, cost_of, local_repair
 from planning.execution.planner_call import Answer, Improvements, PlannerCalls
 from planning.explanation import why_unsolvable
 from planning.ordering.causal_tracing import deordered

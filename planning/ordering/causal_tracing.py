@@ -23,25 +23,17 @@ from dataclasses import dataclass, field
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Fact
-from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.evaluator import apply_effect, holds
-from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import (
-    Add,
-    AllOf,
-    Delete,
     Effect,
-    NumericEffect,
-    effect_leaves,
-    effect_parts,
     substitute_effect,
 )
-from knowledge_base.language.syntax.expression import Atom, Constant, Expression, Not, Variable
-from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
-from planning.domain import GroundStep, PlanningAction, PlanningDomain
+from planning.domain import PlanningAction, PlanningDomain
+from planning.ordering.known_steps import KnownStep, changed_names, literal_of
 from planning.ordering.partial_order import PRESENT, CausalLink, PartialOrder, reduction
 from planning.ordering.step_dependencies import (
     Changes,
@@ -108,7 +100,7 @@ class CausalTrace:
         """
         action, ground = domain.action(step), domain.ground(step)
         self._check_types(action, step)
-        known, before = _Known.of(ground, step, action, self._schema), len(self.links)
+        known, before = KnownStep.of(ground, step, action, self._schema), len(self.links)
         for condition, literal in known.needs:
             if literal is not None:
                 self._need(number, condition, literal, step)
@@ -189,7 +181,7 @@ class CausalTrace:
     def _need_all(self, user: int, condition: Expression, whose: PlanStep | None) -> None:
         """Record that a step, or the goal, needs all parts of a ground condition."""
         for part in ground_conjuncts(condition, self._base):  # quantifiers range over objects, which no step changes
-            literal = _literal(part, self._schema)
+            literal = literal_of(part, self._schema)
             if literal is None:
                 self._need_support(user, part, whose)
             else:
@@ -322,74 +314,10 @@ class _Number:
     moves: dict[int, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class _Known:
-    """The needs and changes of a step that do not depend on the world.
-
-    Attributes:
-        needs: the conditions; each with its literal if the condition is a literal.
-        makes: the literals that the step makes true; `None` if they depend on the world.
-        changes: the truth values of the changed facts after the step.
-        plain: whether all needs are literals and no change depends on the world.
-    """
-
-    needs: tuple[tuple[Expression, Literal | None], ...]
-    makes: tuple[Literal, ...] | None
-    changes: dict[Fact, bool]
-    plain: bool
-
-    @staticmethod
-    def of(ground: GroundStep, step: PlanStep, action: PlanningAction, schema: Vocabulary) -> _Known:
-        """Return the needs and changes; cached, since successive plans share most steps."""
-        return _known.find(ground, schema) or _known.keep(ground, schema, _Known._of(ground, step, action, schema))
-
-    @staticmethod
-    def _of(ground: GroundStep, step: PlanStep, action: PlanningAction, schema: Vocabulary) -> _Known:
-        needs = tuple([(part, _literal(part, schema)) for part in dict.fromkeys(conjuncts(ground.condition))])
-        pattern = _patterns.find(action, schema) or _patterns.keep(action, schema, _Pattern.of(action, schema))
-        if pattern.changes is None:
-            return _Known(needs, None, {}, plain=False)
-        args = dict(zip([p.name for p in action.parameters], step.args, strict=True))
-        made = {False: dict[Fact, bool](), True: dict[Fact, bool]()}
-        for predicate, names, adds in pattern.changes:
-            made[adds][Fact(predicate, tuple([args[name] for name in names]))] = adds
-        makes = tuple([Literal(fact, positive) for positive, facts in made.items() for fact in facts])
-        plain = None not in [literal for _, literal in needs]
-        return _Known(needs, makes, {**made[False], **made[True]}, plain)
-
-
-@dataclass(frozen=True, slots=True)
-class _Pattern:
-    """The changes of an action as predicate, parameters and truth value; `None` if they depend on the world."""
-
-    changes: tuple[tuple[str, tuple[str, ...], bool], ...] | None
-
-    @staticmethod
-    def of(action: PlanningAction, schema: Vocabulary) -> _Pattern:
-        """Return the pattern; its changes are `None` unless the action only adds and deletes facts unconditionally."""
-        types = {parameter.name: parameter.types for parameter in action.parameters}
-        changes = []
-        for part in effect_parts(action.effect) if action.timed is None else ():
-            if isinstance(part, AllOf):
-                continue
-            if not isinstance(part, Add | Delete) or not _may_be_told(part.atom, types, schema):
-                return _Pattern(None)
-            names = tuple([term.name for term in part.atom.args if isinstance(term, Variable)])
-            changes.append((part.atom.predicate, names, isinstance(part, Add)))
-        return _Pattern(tuple(changes) if action.timed is None else None)
-
-
-_known: IdentityCache[GroundStep, _Known] = IdentityCache(size=1024)
-_patterns: IdentityCache[PlanningAction, _Pattern] = IdentityCache(size=256)
-
-
 def _changing(plan: Plan, domain: PlanningDomain) -> Names:
     """Return the names of the predicates and functions that the steps change."""
     actions = {step.action: domain.action(step) for step in plan.steps}.values()
-    effects = [one.effect for one in actions] + [one.timed.start_effect for one in actions if one.timed is not None]
-    effects += [one.timed.end_effect for one in actions if one.timed is not None]
-    leaves = [leaf for effect in effects for leaf in effect_leaves(effect)]
-    return frozenset(leaf.call.function if isinstance(leaf, NumericEffect) else leaf.atom.predicate for leaf in leaves)
+    return frozenset(name for action in actions for name in changed_names(action))
 
 
 def _doing(action: PlanningAction, step: PlanStep, effect: Effect, domain: PlanningDomain, world: World) -> Changes:
@@ -398,27 +326,6 @@ def _doing(action: PlanningAction, step: PlanStep, effect: Effect, domain: Plann
     timed, bindings = action.timed, domain.bindings(step)
     start, end = (substitute_effect(e, bindings) for e in (timed.start_effect, timed.end_effect))
     return changes(end, world, after=start)
-
-
-def _literal(e: Expression, schema: Vocabulary) -> Literal | None:
-    """Return the condition as a literal; `None` if the condition is not a literal."""
-    atom = e.body if isinstance(e, Not) else e
-    if not isinstance(atom, Atom) or atom.predicate not in schema.predicates:
-        return None
-    values = tuple([term.value for term in atom.args if isinstance(term, Constant)])
-    return Literal(Fact(atom.predicate, values), atom is e) if len(values) == len(atom.args) else None
-
-
-def _may_be_told(atom: Atom, types: dict[str, tuple[str, ...]], schema: Vocabulary) -> bool:
-    signature = schema.predicates.get(atom.predicate)
-    if signature is None or atom.predicate in schema.functional or len(atom.args) != len(signature.parameters):
-        return False
-    for term, parameter in zip(atom.args, signature.parameters, strict=True):
-        if not isinstance(term, Variable) or term.name not in types:
-            return False
-        if not schema.fitting(types[term.name]) <= schema.fitting(parameter.types):
-            return False
-    return True
 
 
 def _missing(condition: Expression, whose: PlanStep | None) -> InputError:

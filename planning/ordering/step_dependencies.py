@@ -25,7 +25,7 @@ from knowledge_base.language.syntax.expression import Atom, Expression, Term
 from knowledge_base.world.overlay import Overlay
 from planning.problem.conditions import Literal
 
-MOST_INSTANCES = 100
+MOST_INSTANCES = 300
 """Number of instances up to which a quantified condition is divided into them."""
 MOST_UNDECIDED = 1000
 """Number of instances from which the false facts of a predicate together are one reason to wait."""

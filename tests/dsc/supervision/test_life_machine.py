@@ -20,6 +20,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 
 from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, skill
 from dsc.components.endpoint import LocalTransport
+from dsc.components.hooks import give_up
 from dsc.components.host import Host
 from dsc.components.life_cycle import Life
 from dsc.components.remote import RemoteComponent
@@ -312,7 +313,7 @@ class Lives(RuleBasedStateMachine):
         self.kb.close()
         self.loop.set_exception_handler(lambda *_: None)
         for task in asyncio.all_tasks(self.loop):
-            task._log_destroy_pending = False  # type: ignore[attr-defined]
+            give_up(task)  # its coroutine would clean up when it is freed
         self.loop.close()
 
     def teardown(self) -> None:

@@ -116,7 +116,7 @@ def test_a_type_said_again_as_a_fact() -> None:
 
 
 def test_init_in_one_conjunction() -> None:
-    read = problem("(:domain small) (:objects a - cup) (:init (and (dry) (and (full a)) (= (g) 3) (not (full a))))")
+    read = problem("(:domain small) (:objects a b - cup) (:init (and (dry) (and (full a)) (= (g) 3) (not (full b))))")
     assert read.init == (fact("dry"), fact("full", "a"))
     assert read.values == {fact("g"): 3}
 

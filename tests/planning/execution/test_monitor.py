@@ -8,7 +8,8 @@ from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanningDomain, PlanStep
 from planning.execution.monitor import Broken, GoalReached, Monitor, Shorter
-from planning.execution.plan_progress import PlanProgress, shortest_end, thinned
+from planning.execution.plan_ends import shortest_end
+from planning.execution.plan_progress import PlanProgress, thinned
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain parcels)

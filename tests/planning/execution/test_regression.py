@@ -98,3 +98,27 @@ def test_a_number_that_changes_for_many_things_by_an_amount_of_their_own_cannot_
       (:action double :parameters () :effect (forall (?b - box) (increase (weight ?b) (weight ?b)))))
     """)
     assert needed_before([PlanStep("double")], parse_condition(goal), domain) is None
+
+
+ROLLOUT = PlanningDomain.parse("""
+(define (domain rollout)
+  (:types server)
+  (:predicates (in-pool ?s - server) (new ?s - server))
+  (:action drain :parameters (?s - server) :precondition (in-pool ?s) :effect (not (in-pool ?s)))
+  (:action install :parameters (?s - server) :precondition (not (in-pool ?s)) :effect (new ?s))
+  (:action admit :parameters (?s - server) :precondition (not (in-pool ?s)) :effect (in-pool ?s)))
+""")
+
+
+@pytest.mark.parametrize("servers", [3, 40, 400])
+def test_a_quantified_goal_of_a_long_plan_is_regressed_or_reported_as_too_deep(servers):
+    steps = [PlanStep(name, (f"s{n}",)) for n in range(servers) for name in ("drain", "install", "admit")]
+    goal = parse_condition("(forall (?s - server) (and (in-pool ?s) (new ?s)))")
+    before = CausalNeeds(steps, ROLLOUT, goal).before(tuple(range(1, len(steps) + 1)))
+    if servers == 400:
+        assert before is None
+    if before is not None:
+        knowledge = KnowledgeBase(ROLLOUT.schema)
+        names = {f"s{n}": "server" for n in range(servers)}
+        knowledge.apply(Delta(nodes=names, added=tuple(fact("in-pool", one) for one in names)), author="me")
+        assert all(holds(condition, knowledge) for condition in before)
