@@ -16,12 +16,15 @@ from math import prod
 
 from knowledge_base.errors import SchemaError
 from knowledge_base.facts import Delta, Fact
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import apply_effect, choices, evaluate_argument, holds, rows
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax import effect as eff
 from knowledge_base.language.syntax import expression as ex
 from knowledge_base.language.syntax.effect import Effect
 from knowledge_base.language.syntax.expression import Atom, Expression, Term
+from knowledge_base.language.syntax.rewriting import inside, name_in
+from knowledge_base.world.derived import type_test
 from knowledge_base.world.overlay import Overlay
 from planning.problem.conditions import Literal
 
@@ -161,8 +164,11 @@ def support(
 
 
 def _has_many_instances(e: ex.Forall | ex.Exists, world: World) -> bool:
-    numbers = [sum(1 for one in variable.types or ("object",) for _ in world.objects(one)) for variable in e.variables]
-    return prod(numbers) > MOST_INSTANCES
+    """Return whether a query is to find the instances; it cannot test a type whose name is also a predicate."""
+    kinds = [variable.types or (ROOT_TYPE,) for variable in e.variables]
+    if not all(world.schema.is_type(one, 1) for types in kinds for one in types):
+        return False
+    return prod(sum(1 for one in types for _ in world.objects(one)) for types in kinds) > MOST_INSTANCES
 
 
 def _support_of_many(
@@ -183,10 +189,7 @@ def _support_of_many(
 
 def _instances(e: ex.Forall | ex.Exists, condition: Expression, world: World) -> Iterator[Expression]:
     """Yield the bodies of those instances for which a condition on the variables is true, found by a join."""
-    typed = tuple(
-        ex.Or(tuple(Atom(one, (ex.Variable(variable.name),)) for one in variable.types or ("object",)))
-        for variable in e.variables
-    )
+    typed = tuple(type_test(variable, ex.Variable(variable.name)) for variable in e.variables)
     for chosen in rows(ex.And((*typed, condition)), world):
         yield ex.substitute(e.body, chosen)
 
@@ -239,12 +242,14 @@ class _Undecided:
             case _:
                 return ex.And(())
 
-    def _may_change(self, e: Expression | Term) -> bool:
-        name = e.predicate if isinstance(e, Atom) else e.function if isinstance(e, ex.Call) else None
-        schema = self.world.schema
-        fixed = name is None or (isinstance(e, Atom) and name not in schema.predicates)  # a type, or computed
-        changes = not fixed and (self.changing is None or name in self.changing)
-        return changes or any(map(self._may_change, ex.parts_of(e)))
+    def _may_change(self, e: Expression) -> bool:
+        return any(self._is_changing(one) for one in inside(e))
+
+    def _is_changing(self, e: Expression | Term) -> bool:
+        name = name_in(e)
+        if name is None or (isinstance(e, Atom) and name not in self.world.schema.predicates):  # a type, or computed
+            return False
+        return self.changing is None or name in self.changing
 
 
 def favours(e: Expression, fluent: Fact, world: World) -> float | None:

@@ -119,6 +119,25 @@ def test_what_falsifies_one_of_many_instances_waits_and_what_makes_it_true_prece
         ordered(row, "heat o3", "cold")
 
 
+NAMED = PlanningDomain.parse("""
+(define (domain named)
+  (:types door)
+  (:predicates (door ?d - door) (near ?x ?y - door) (shut ?x - door) (g))
+  (:action shut :parameters (?x - door) :precondition (and) :effect (shut ?x))
+  (:action pass :parameters () :effect (g)
+    :precondition (forall (?a ?b - door) (imply (near ?a ?b) (not (shut ?b))))))
+""")
+
+
+def test_a_predicate_with_the_name_of_its_type_is_not_taken_for_the_type(world_of):
+    facts = tuple(fact("near", f"d{number}", f"d{number + 1}") for number in range(59))
+    world = world_of(NAMED.schema, {f"d{number}": "door" for number in range(60)}, facts)
+    plan = Plan(steps("pass", "shut d3"))
+    assert deordered(plan, NAMED, world, parse_condition("(g)")).before == {(1, 2)}
+    with pytest.raises(InputError, match=r"\(pass\) needs"):
+        deordered(Plan(steps("shut d3", "pass")), NAMED, world, parse_condition("(g)"))
+
+
 def test_one_of_many_witnesses_suffices(row):
     order = ordered(row, "heat o9", "warm", "cool o9", goal="(h)")
     assert order.before == {(1, 2), (2, 3)}
