@@ -70,7 +70,7 @@ class Host:
 
         async def answers(_: str, said: Any) -> Any:
             if hook != "diagnose":
-                await self._start()
+                await self._component.life.ensure_alive()
             with contained(f"{self._component.name}.{hook}", self._component.device_errors):
                 return await call(said)
 
@@ -114,11 +114,6 @@ class Host:
                 component.life.fail(error)
             return ()
 
-    async def _start(self) -> None:
-        """Start the component if necessary; raise `NotAliveError` if it is not alive then."""
-        await self._component.life.come_alive()
-        self._component.life.require_alive()
-
     async def _hull(self, _: str, __: Any) -> dict[str, Any]:
         skills = [asdict(signature) for signature in self._component.skills().values()]
         pushes = {name: {"values": dict(port.values)} for name, port in self._component.pushes.items()}
@@ -144,7 +139,7 @@ class Host:
 
     async def _switch(self, _: str, said: dict[str, Any]) -> dict[str, Any]:
         if said["mode"] not in {Life.INIT, Life.SHUTDOWN}:
-            await self._start()
+            await self._component.life.ensure_alive()
         with contained(f"{self._component.name}.switch", self._component.device_errors):
             await self._component.change_mode(said["mode"])
         return self._condition.newest
@@ -283,8 +278,7 @@ class HostedActions:
         """Start the component if necessary, and cancel the block when the component is no longer alive."""
         task = asyncio.current_task()
         assert task is not None  # noqa: S101  # an action is a task
-        await self._component.life.come_alive()
-        self._component.life.require_alive()
+        await self._component.life.ensure_alive()
         with self._component.life.executing(task):
             self._at_work.add(task)
             try:

@@ -187,6 +187,11 @@ class LifeCycle(Announcer):
             await self._start()
             await self._activate()
 
+    async def ensure_alive(self) -> None:
+        """Start the component if necessary; raise `NotAliveError` if it is not alive then."""
+        await self.come_alive()
+        self.require_alive()
+
     async def restart(self) -> None:
         """Leave Alive, and enter it again; the skills of the component are cancelled."""
         async with self._in_order():

@@ -99,6 +99,8 @@ def _dependents_first(components: Sequence[Component], needs: Mapping[str, set[s
     found: dict[str, None] = {}
 
     def visit(component: Component, above: tuple[Component, ...]) -> None:
+        if component.name in found:
+            return
         for name in sorted(needs[component.name] & named.keys()):
             if named[name] not in above:  # components may need each other in different modes
                 visit(named[name], (*above, component))

@@ -7,7 +7,7 @@ from enum import StrEnum
 from functools import partial
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from planning.deployment import Deployment, Task
     from planning.engines.planner import Planner
     from planning.report import Report
-
 
 GOAL_REACHED, SOMETHING_LEFT = 0, 1
 """Exit statuses of `dsc run`, besides those of every command."""
@@ -138,7 +137,7 @@ def run_command(
         deployed = _deployed(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
                              durability, target, planner)  # fmt: skip
     follow = partial(_followed, deployed, simulated=not real_time, speed=inf if speed is None else speed, until=until,
-                     on_signal=on_signal.value, quiet=json or quiet, trace=output)  # fmt: skip
+                     on_signal=on_signal, quiet=json or quiet, trace=output)  # fmt: skip
     with deployed:
         if not view:
             report = follow()
@@ -263,7 +262,7 @@ def _followed(
     simulated: bool,
     speed: float,
     until: float | None,
-    on_signal: Literal["suspend", "end"],
+    on_signal: OnSignal,
     quiet: bool,
     trace: Output | None,
     prepare: Callable[[Sequencer], None] | None = None,
@@ -293,7 +292,7 @@ def _followed(
             deployed.executive.listen(PlainProgress(typer.echo))
         else:
             stack.enter_context(redirect_stdout(sys.stderr))
-        report = deployed.run(simulated=simulated, speed=speed, until=until, on_signal=on_signal, prepare=prepare)
+        report = deployed.run(simulated=simulated, speed=speed, until=until, on_signal=on_signal.value, prepare=prepare)
     if not quiet:
         typer.echo("")  # between the progress and the report
     return report

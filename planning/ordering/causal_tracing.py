@@ -25,10 +25,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.language.evaluation.evaluator import apply_effect, holds
 from knowledge_base.language.evaluation.world_protocol import World
-from knowledge_base.language.syntax.effect import (
-    Effect,
-    substitute_effect,
-)
+from knowledge_base.language.syntax.effect import Effect, substitute_effect
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
