@@ -36,7 +36,7 @@ from planning.explanation import unmet
 from planning.problem.construction import check_goal
 from planning.problem.derived import derivation
 from planning.progress import Tally
-from planning.report import Judge, Report, failure_events, reason_of_end, summarise
+from planning.report import Judge, Report, reason_of_end, summarise
 from planning.simulation import Left, Setup, Simulation
 
 
@@ -200,8 +200,7 @@ class Deployment:
     def _report(self, end: RunEnd, wall_s: float) -> Report:
         knowledge, world = self.executive.knowledge, self.simulation
         judge, left = self._judged(end)
-        failures = failure_events(self.executive.library).union(self._bundle.failures)
-        report = summarise(self.name, judge, left, self.tally, end, failures, wall_s)
+        report = summarise(self.name, judge, left, self.tally, end, self.executive.failures, wall_s)
         if world is None:
             return report
         with contained(f"{type(world).__name__}.own_report"):
@@ -381,7 +380,7 @@ def _deployed(
         configure(components, setup.profile)
         executive = Executive(
             _domain(bundle), _library(bundle, setup.profile), components, None, planner,
-            foresight=bundle.foresight, store=setup.store, durability=durability,
+            foresight=bundle.foresight, store=setup.store, durability=durability, failures=bundle.failures,
         )  # fmt: skip
     except BaseException:
         if simulation is not None:

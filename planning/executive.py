@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import threading
-from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Coroutine, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from functools import cache
 from importlib.resources import files
@@ -19,6 +19,7 @@ from dsc.components.component import Component
 from dsc.components.robot import require_deployed, require_instances, require_wired
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
+from dsc.events import SKILL_FAILURES
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Budget
 from dsc.profiles import configure
@@ -73,6 +74,7 @@ class Executive:
         store: a file for the knowledge base and the runs, so that a run can be resumed after a crash. A missing file is
             created. With a store, the argument `knowledge` must be omitted.
         durability: with a store, "process" survives a crash of the process, and "power" also a power failure.
+        failures: further outcomes with which a plot does not reach its goal, see `failures`.
 
     Raises:
         PlotError: a plot does not pass the validator; the error contains all findings.
@@ -95,6 +97,7 @@ class Executive:
         foresight: Foresight | None = None,
         store: Path | str | None = None,
         durability: Durability = "process",
+        failures: Collection[str] = (),
     ) -> None:
         require_parts(knowledge, planner, foresight, store)
         self.components = require_instances(components)
@@ -116,6 +119,7 @@ class Executive:
         self._planner = planner
         self._parallel = parallel
         self._foresight = foresight
+        self._failures = failures
         self._listeners: list[Listener] = []
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
@@ -152,7 +156,13 @@ class Executive:
             InputError: two bundles contradict each other, or `Executive` raises the error.
         """
         found = gathered(bundles)
+        how.setdefault("failures", frozenset[str]().union(*(bundle.failures for bundle in found)))
         return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
+
+    @property
+    def failures(self) -> frozenset[str]:
+        """The outcomes that report failures: `failure_events` of the plots, and the argument `failures`."""
+        return failure_events(self.library).union(self._failures)
 
     def listen(self, listener: Listener) -> None:
         """Call `listener` with every later record of every run."""
@@ -315,7 +325,7 @@ class Executive:
         components: list[Component] = list(self.components)
         sequencer = Sequencer(
             self.library, self.knowledge, components, clock, trace, open_ended=open_ended, store=store,
-            until=math.inf if until is None else until,
+            until=math.inf if until is None else until, failures=self.failures,
         )  # fmt: skip
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self._planner_for(clock), clock, trace,
@@ -422,3 +432,10 @@ def settled() -> Iterator[None]:
             gc.set_threshold(*_thresholds.pop())
             if not _thresholds:
                 gc.unfreeze()
+
+
+def failure_events(library: Library) -> frozenset[str]:
+    """Return the failures of all skills, the outcomes of plots for planning actions, and the events of rules."""
+    emitted = {event for plot in library if plot.implements for event in plot.emits}
+    answered = {rule.on for plot in library for rule in plot.rules if rule.on is not None}
+    return frozenset({*SKILL_FAILURES, *emitted, *answered})

@@ -42,7 +42,8 @@ class Tally:
         plans: number of plans found; `replans`: number of plans that replaced a running plan.
         excluded: number of exclusions of each plan step after failures.
         unobserved: number of times that the effects of each planning action were not observed.
-        gave_up: the reason of the last goal for which there was no plan or no further plan; empty without one.
+        gave_up: the reason of the last goal for which there was no plan or no further plan; empty without
+            one, and after a later plan.
         seconds: run time of the last record, in seconds.
     """
 
@@ -68,6 +69,7 @@ class Tally:
             self.recoveries[record.data["rule"]] += 1
         elif record.type == "plan.found":
             self.plans += 1
+            self.gave_up = ""
         elif record.type == "plan.replaced":
             self.replans += 1
         elif record.type == "plan.excluded":

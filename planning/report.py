@@ -6,8 +6,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from dsc.dynamic.library import Library
-from dsc.events import SKILL_FAILURES
 from dsc.sequencer.sequencer import RunEnd
 from knowledge_base._notebook import text
 from planning.progress import Tally
@@ -124,11 +122,10 @@ def summarise(
         left: the parts of the goal that are not reached; empty for `outcome`.
         tally: the counts of the run.
         end: the end of the run.
-        failures: the outcomes of skills that count as failures, see `failure_events`.
+        failures: the outcomes of skills that count as failures, see `Executive.failures`.
         wall_s: the duration in real time, in seconds.
     """
-    failed = bool(end.emitted) and end.emitted[-1].name in failures
-    reached = end.problem is None and not failed and (end.reached if judge == "outcome" else not left)
+    reached = end.reached if judge == "outcome" else end.finished and end.failure is None and not left
     said = "Goal reached" if reached else "Goal not reached"
     return Report(
         robot=robot,
@@ -152,16 +149,6 @@ def summarise(
         outputs=end.outputs,
         headline=f"{said}{'' if reached else f': {reason_of_end(end, tally.gave_up)}'} (judge: {judge})",
     )
-
-
-def failure_events(library: Library) -> frozenset[str]:
-    """Return the events that report failures.
-
-    These are the reserved failures, the outcomes of plots that implement planning actions, and the events of rules.
-    """
-    emitted = {event for plot in library if plot.implements for event in plot.emits}
-    answered = {rule.on for plot in library for rule in plot.rules if rule.on is not None}
-    return frozenset({*SKILL_FAILURES, *emitted, *answered})
 
 
 def reason_of_end(end: RunEnd, gave_up: str = "") -> str:

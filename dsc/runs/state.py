@@ -41,6 +41,7 @@ class ReactorState(Protocol):
         problem: the reason why the run cannot continue, or `None`.
         programming_error: the programming error that is this reason, or the first one of a listener; or `None`.
         outputs: the outputs of the plot, after its end.
+        finished: whether the plot has reached its final state without a problem.
         settings: an operator's settings of plot parameters, by plot and parameter.
         caused_by: numbers of the trace records about started skills, by action id.
     """
@@ -51,6 +52,10 @@ class ReactorState(Protocol):
     problem: str | None
     programming_error: str | None
     outputs: Mapping[str, Any]
+
+    @property
+    def finished(self) -> bool: ...  # noqa: D102  described above
+
     settings: dict[tuple[str, str], ParameterMessage]
     caused_by: dict[str, int]
 

@@ -297,7 +297,7 @@ class RunStore:
     def end(self, reactor: ReactorState) -> None:
         """Write the end of the run."""
         ended = {
-            "finished": reactor.machine.state.finished, "problem": reactor.problem,
+            "finished": reactor.finished, "problem": reactor.problem,
             "programming_error": reactor.programming_error, "outputs": dict(reactor.outputs),
         }  # fmt: skip
         self.writing.end(self._run, text_of(ended), self._new_records())

@@ -90,6 +90,11 @@ class Reactor:
                 self.tracer.begun(one.what)
         self.tracer.known_plots.update(record.data["hash"] for record in kept.records if record.type == "plot")
 
+    @property
+    def finished(self) -> bool:
+        """Whether the plot has reached its final state, and its last step had no error."""
+        return self.machine.state.finished and self.problem is None
+
     def start(self, plot: str, arguments: Mapping[str, Any], serials: int = 0) -> tuple[Output, ...]:
         """Enter the plot, and return its outputs.
 

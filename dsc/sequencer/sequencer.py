@@ -43,13 +43,17 @@ _MOST_GROUPED = 100
 class RunEnd(Generic[Outputs]):
     """The end of a run; the run of a `PlotCall` has typed outputs.
 
+    An end is true if it is `reached`; a reached end is `finished`, and a finished end has no `problem`.
+
     Attributes:
-        finished: whether the plot reached its final state.
+        finished: whether the plot reached its final state, and neither its last step nor a component's stop failed.
         emitted: the latest 100 outcome events of the plot, and the latest of each name, in order.
-        problem: the reason if the run ended before the final state, or the error of its last step; else `None`.
-        outputs: the outputs of the plot by name; empty if the run ended before the final state.
+        problem: the reason if the run ended before the final state, or the error of its last step
+            or of a component's stop; else `None`.
+        outputs: the outputs of the plot by name; empty unless `finished`.
         programming_error: the first undeclared exception of user code to which the plot did not respond, with file and
             line; else `None`. The run may have finished nevertheless, e.g. if only a listener failed.
+        failure: the last outcome event of the plot if it is one of the sequencer's `failures`; else `None`.
     """
 
     finished: bool
@@ -57,11 +61,16 @@ class RunEnd(Generic[Outputs]):
     problem: str | None = None
     outputs: Outputs = field(default_factory=lambda: cast(Outputs, {}))
     programming_error: str | None = None
+    failure: str | None = None
+
+    def __bool__(self) -> bool:
+        """Return `reached`."""
+        return self.reached
 
     @property
     def reason(self) -> str:
         """The reason why the run ended as it did, as one sentence without a full stop."""
-        if self.programming_error is not None:
+        if self.programming_error is not None and not self.reached:
             return f"programming error in {self.programming_error}"
         if self.problem is not None:
             return self.problem
@@ -72,8 +81,9 @@ class RunEnd(Generic[Outputs]):
 
     @property
     def reached(self) -> bool:
-        """Whether the run finished, and none of its goals ended with `no_plan` or `gave_up`."""
-        return self.finished and not any(event.name in {NO_PLAN, GAVE_UP} for event in self.emitted)
+        """Whether the run finished without a failure, and none of its goals ended with `no_plan` or `gave_up`."""
+        without_plan = any(event.name in {NO_PLAN, GAVE_UP} for event in self.emitted)
+        return self.finished and self.failure is None and not without_plan
 
     def _repr_html_(self) -> str:
         title = f"{'reached' if self.reached else 'not reached'}: {self.reason}"
@@ -96,6 +106,7 @@ class Sequencer:
         part_of: a prefix of the action ids that components receive: an id from the run of which this run is a part.
         until: second of run time at which a run that has not ended ends with a problem; `math.inf` means never.
         phases: reports coordination phases that take long.
+        failures: outcome events with which the plot does not reach its goal, although it finishes.
 
     Attributes:
         library: all plots that the run may use.
@@ -120,6 +131,7 @@ class Sequencer:
         part_of: str = "",
         until: float = math.inf,
         phases: PhaseWatch | None = None,
+        failures: Collection[str] = (),
     ) -> None:
         message_checks.require_parts(library, knowledge, clock, trace, store)
         self.library = library
@@ -135,6 +147,7 @@ class Sequencer:
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of)
         self._open_ended = open_ended
         self._until = until
+        self._failures = failures
         self._last_late = store.last_late if store is not None else 0
         self._before_events: list[Callable[[], Awaitable[None]]] = []
 
@@ -306,7 +319,10 @@ class Sequencer:
             reactor.problem = "; ".join(untaken)
         unanswered = (bug for bug in bugs if bug not in reactor.answered_bugs)
         bug = reactor.programming_error = reactor.programming_error or next(unanswered, None)
-        end = RunEnd(self.machine.state.finished, reactor.emitted, reactor.problem, reactor.outputs, bug)
+        outputs = reactor.outputs if reactor.finished else {}
+        last = reactor.emitted[-1].name if reactor.emitted else None
+        failure = last if last in self._failures else None
+        end = RunEnd(reactor.finished, reactor.emitted, reactor.problem, outputs, bug, failure)
         self.trace.record(
             "end", finished=end.finished, reached=end.reached, problem=end.problem, reason=end.reason,
             outputs=end.outputs, programming_error=bug,

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { CHECKPOINT_EVERY, History } from "../src/core/history";
-import { kinOf, nextOf } from "../src/core/plans";
+import { endOf, kinOf, nextOf } from "../src/core/plans";
 import { recordsIn } from "../src/core/reading";
 import type { Rec } from "../src/core/records";
 import { repeated, run } from "./run";
@@ -51,6 +51,13 @@ describe("a moment", () => {
     const later = rest.map((rec, i) => ({ t: 4, cause: null, ...rec, seq: 12 + i }) as Rec);
     const made = history([...run.slice(0, 11), ...later]);
     expect(made.at(14).plans.map((plan) => [plan.name, plan.ended])).toEqual([["plan_1", 11], ["plan_2", null]]);
+  });
+
+  it("tells a plan that was interrupted from one that was given up", () => {
+    const away = { event: "low", taken: [{ from: "clear", on: "low", to: "charge" }], exited: ["clear/execute/step_2", "clear/execute", "clear"], entered: ["charge"] };
+    const interrupted = [...run.slice(0, 10), { seq: 11, t: 3, type: "step", cause: 10, microsteps: [away] } as Rec];
+    expect(history(interrupted).at(11).plans.map(endOf)).toEqual(["interrupted"]);
+    expect(history(run).at(13).plans.map(endOf)).toEqual(["given up", ""]);
   });
 
   it("knows a step that goes on in the plan that replaces its own", () => {

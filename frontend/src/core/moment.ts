@@ -179,7 +179,7 @@ function planLeft(moment: Moment, rec: Rec, path: string): void {
   moment.running.delete(path);
   const plan = moment.plans[number]!;
   const why = [moment.broken, moment.trouble].find((one) => one !== null && one > plan.seq);
-  moment.plans[number] = withEnd(plan, why ?? rec.seq, rec.t);
+  moment.plans[number] = withEnd(plan, why ?? rec.seq, rec.t, why === undefined);
 }
 
 function planStepLeft(moment: Moment, rec: Rec, path: string, taken: readonly Taken[]): void {

@@ -25,10 +25,12 @@ export interface Plan {
   readonly names: ReadonlyMap<string, number>;
   /** The record that says why it is no longer carried out; null while it is. */
   readonly ended: number | null;
+  /** Whether its state was left although nothing had failed, e.g. for a handler. */
+  readonly interrupted: boolean;
 }
 
 export function newPlan(name: string, seq: number, steps: readonly string[], engine = ""): Plan {
-  return { name, seq, steps: waiting(steps), links: [], engine, at: null, names: new Map(), ended: null };
+  return { name, seq, steps: waiting(steps), links: [], engine, at: null, names: new Map(), ended: null, interrupted: false };
 }
 
 /** The plan as it is going to be carried out: of the one found, what was done meanwhile is left out. */
@@ -45,11 +47,11 @@ export function withStep(plan: Plan, number: number, change: Partial<PlanStep>):
 }
 
 /** The plan is carried out no longer: what was at work is stopped. */
-export function withEnd(plan: Plan, ended: number, t: number): Plan {
+export function withEnd(plan: Plan, ended: number, t: number, interrupted = false): Plan {
   const steps = plan.steps.map((step) =>
     step.state === "running" ? { ...step, state: "stopped" as const, until: t } : step,
   );
-  return { ...plan, steps, ended };
+  return { ...plan, steps, ended, interrupted };
 }
 
 /** Of these steps, in their order, the number of the one that comes next; undefined if none does. */
@@ -66,4 +68,11 @@ export function kinOf(plan: Plan, step: number, other: number): "provider" | "us
 /** Whether nothing of it is left to do. */
 export function isFinished(plan: Plan): boolean {
   return plan.steps.every((step) => step.state === "done" || step.state === "skipped");
+}
+
+/** How it ended, for people; empty while it is carried out. */
+export function endOf(plan: Plan): "" | "carried out" | "interrupted" | "given up" {
+  if (plan.ended === null) return "";
+  if (isFinished(plan)) return "carried out";
+  return plan.interrupted ? "interrupted" : "given up";
 }

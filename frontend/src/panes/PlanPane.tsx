@@ -1,7 +1,7 @@
-/** The plan: what is done, at work, next; plans that were given up are grey. */
+/** The plan: what is done, at work, next; plans that ended are grey. */
 
 import { useRef } from "react";
-import { isFinished, kinOf, nextOf, SIGNS, type Plan, type PlanStep } from "../core/plans";
+import { endOf, isFinished, kinOf, nextOf, SIGNS, type Plan, type PlanStep } from "../core/plans";
 import { lanesOf } from "../core/why";
 import { session, useSelection } from "../session";
 import { useCalmEffect, useMoment } from "../turn";
@@ -32,7 +32,7 @@ function PlanView({ plan, number, open }: { plan: Plan; number: number; open: bo
   const moment = useMoment();
   const finished = isFinished(plan);
   const done = plan.steps.filter((step) => step.state === "done").length;
-  const end = plan.ended === null ? "" : finished ? "carried out" : "given up";
+  const end = endOf(plan);
   const past = plan.ended !== null || number < moment.plans.length - 1 && moment.running.get(plan.at ?? "-") !== number;
   const form = session.history.plots.get(moment.bound.get(plan.at ?? "-") ?? "");
   const lanes = open && form?.generated ? lanesOf(form, plan.names) : [];

@@ -1,6 +1,6 @@
 /** A plan: why it ended. A step of it: what it provides to whom, what it needs, what it changed. */
 
-import { isFinished, type Plan } from "../core/plans";
+import { endOf, isFinished, type Plan } from "../core/plans";
 import { joinPath } from "../core/plots";
 import type { PlanFoundRec } from "../core/records";
 import { changesBetween, conditionsInto } from "../core/why";
@@ -26,7 +26,7 @@ export function WhyPlan({ number }: { number: number }) {
       </div>
       {end && !isFinished(plan) && (
         <>
-          <h3>Why it was given up</h3>
+          <h3>{`Why it was ${endOf(plan)}`}</h3>
           <WhyRecord rec={end} />
           <Causes seq={end.seq} />
         </>

@@ -1,6 +1,6 @@
 /** The plans of a moment as a drawing: the last one step by step, what each is at, those before it in a line. */
 
-import { isFinished, nextOf, SIGNS, type Plan, type StepState } from "../core/plans";
+import { endOf, nextOf, SIGNS, type Plan, type StepState } from "../core/plans";
 import { INK, text, type Part } from "./sheet";
 
 const WIDTH = 330;
@@ -21,8 +21,8 @@ export function planPart(plans: readonly Plan[]): Part {
 
 function head(plan: Plan, y: number): string {
   const done = plan.steps.filter((one) => one.state === "done").length;
-  const end = plan.ended === null ? "" : isFinished(plan) ? ", carried out" : ", given up";
-  return text(`${plan.name}: ${done} of ${plan.steps.length} done${end}`, 0, y, WIDTH, plan.ended === null ? "bold" : "small");
+  const end = endOf(plan);
+  return text(`${plan.name}: ${done} of ${plan.steps.length} done${end && `, ${end}`}`, 0, y, WIDTH, plan.ended === null ? "bold" : "small");
 }
 
 function step(plan: Plan, number: number, next: boolean, y: number): string {

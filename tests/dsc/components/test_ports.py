@@ -192,7 +192,7 @@ def test_messages_are_taken_in_order_and_traced():
 
 def test_a_message_that_cannot_be_taken_is_told():
     end = ran(SAY.replace("TEXT", "unprintable")).end
-    assert end.finished
+    assert not end.finished
     assert "no ink" in end.problem
 
 

@@ -119,7 +119,7 @@ def test_a_bug_in_a_hook_or_a_thread_ends_the_run(where):
 @pytest.mark.parametrize("where", ["stop", "deactivate"])
 def test_a_bug_at_the_end_of_a_run_is_in_its_end(where):
     end = Ran(GRASP, arm=Arm(where=where)).end
-    assert end.finished
+    assert not end.finished
     hook = "stop" if where == "stop" else "activate"
     assert str(end.programming_error).startswith(f"arm.{hook}: AttributeError")
 

@@ -263,7 +263,7 @@ def test_what_does_not_come_off_does_not_keep_the_run():
 
     camera = Stuck("camera", [])
     end, at = ran(LOOK, camera)
-    assert end.finished
+    assert "it could not be switched off" in end.problem
     assert at == pytest.approx(75 + 30)
     assert camera.life.reason == "it could not be switched off within 30 s"
 

@@ -122,7 +122,7 @@ def test_a_component_at_a_host_leaves_alive_in_the_same_order():
         await host.close()
         return end
 
-    assert run_simulated(main()).finished
+    run_simulated(main())
     assert did(device.log) == [*ENTRY, *EXIT]
     assert device.life.state is Life.SHUTDOWN
 
