@@ -233,10 +233,10 @@ class Dispatcher:
             running.reports.taken()
 
     def dismiss(self, start: steps.Start) -> None:
-        """Stop a skill that failed by an invalid report; its later answer is ignored."""
+        """Stop a skill that counts as ended: its time is over, it was preempted, or it failed by an invalid report."""
         running = self._running.get(start.action_id)
         if running is not None:
-            running.answered = True
+            running.disbelieve()
         self.stop(start)
 
     def stop(self, start: steps.Start) -> None:
@@ -368,10 +368,11 @@ class Dispatcher:
 
     async def _execute(self, component: Component, running: RunningSkill, interrupted: InterruptedSkill | None) -> None:
         dependencies = SkillDependencies(self.activation, component)
+        running.missing = lambda: dependencies.missing or self._missing(running)
         try:
             outcome = await self._outcome(component, running, dependencies, interrupted)
         except BaseException as error:
-            failed = running.failed(error, dependencies.missing or self._missing(running))
+            failed = running.failed(error)
             if failed is None:
                 self._report_failures(component.name, None)
                 raise

@@ -145,6 +145,10 @@ class Reactor:
             return ()
         return output
 
+    def observe(self, message: SkillMessage) -> None:
+        """Apply the observations of a message that arrives after the last macrostep."""
+        self._received(message)
+
     def leave(self) -> tuple[Output, ...]:
         """Exit the active states at the end of a run, and return the outputs of exit actions, which stop components."""
         if self.machine.state.root is None:
@@ -209,11 +213,13 @@ class Reactor:
             self.trace.cause = self.caused_by.get(start.action_id)
             self._apply(outcome.observed, start.component)
             return None
+        self.trace.cause = self.caused_by.get(start.action_id)
         if message.final:
             self.tracer.answered(start)
-            self.trace.cause = self.caused_by.pop(start.action_id, None)
-        else:
-            self.trace.cause = self.caused_by.get(start.action_id)
+            if message.goes_on:
+                self._forget_causes([start.action_id])
+            else:
+                self.caused_by.pop(start.action_id, None)
         name = start.names.get(outcome.event, outcome.event)
         event = Event(name, outcome.attributes, to=start.activation)
         skill = f"{start.component}.{start.skill}"
@@ -281,7 +287,7 @@ class Reactor:
                 self.listeners.remove(listener)
 
     def _forget_causes(self, cancelled: Iterable[str]) -> None:
-        """Forget the causes of skills that were cancelled long ago; until then, the skills may still observe."""
+        """Forget the causes of the earliest of the cancelled skills; until then, a skill may still observe."""
         self._cancelled.extend(cancelled)
         while len(self._cancelled) > MOST_CANCELLED:
             self.caused_by.pop(self._cancelled.popleft(), None)

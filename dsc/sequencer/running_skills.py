@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from dsc.blocking import DeadlineError
-from dsc.calls import Reports
-from dsc.components.hooks import GRACE, Classes, cancel_once, give_up, give_up_after, is_own, programming_error
+from dsc.calls import OBSERVED, Reports
+from dsc.components.hooks import GRACE, Classes, cancel_once, give_up_after, is_own, programming_error
 from dsc.components.turns import Claim
-from dsc.engine.steps import Start
+from dsc.engine.steps import NO_CHANGE, Start
 from dsc.errors import PreemptedError, ProgrammingError
 from dsc.events import PREEMPTED, PROGRAMMING_ERROR, SKILL_ERROR
 from dsc.messages import SkillMessage
@@ -63,8 +63,8 @@ class WaitObserver(Protocol):
 class RunningSkill:
     """An execution of a skill, which posts the skill's reports and, one time, its end.
 
-    A single timer bounds the execution. The timer cancels the task at second `due`, and abandons the task after `GRACE`
-    further seconds.
+    At second `due`, a timer posts `timed_out` and cancels the task, so that the chart does not wait for the clean-up.
+    Observations that follow the end are still posted, since they are true.
 
     Args:
         start: the start of the skill.
@@ -85,6 +85,8 @@ class RunningSkill:
         configuring: deliveries of parameters and modes that end before the skill begins.
         claim: the claim to the component; `None` if the component is concurrent.
         begun: whether the skill may begin, since it has the turn of its component.
+        credible: whether observations after the end are posted; false after an invalid report.
+        missing: returns, as text, the component that the skill waits for; empty if it waits for none.
     """
 
     task: asyncio.Task[None]
@@ -111,6 +113,8 @@ class RunningSkill:
         self.configuring: Configuring = {}
         self.claim: Claim | None = None
         self.begun = True
+        self.credible = True
+        self.missing: Callable[[], str] = str
         self._turn: asyncio.Future[None] | None = None
         self._clock = clock
         self._post = post
@@ -118,15 +122,13 @@ class RunningSkill:
         self._observer = observer
         self._raises = raises
         self._thread = threading.get_ident()
-        self._expired = False
-        self._waited = ""
         self._holder: str | None = None
         self._timer: asyncio.TimerHandle | None = None
 
     # -- answers -----------------------------------------------------------------------------------------
 
     def report(self, outcome: Outcome) -> None:
-        """Post an intermediate event, unless the skill has ended.
+        """Post an intermediate event; after the end of the skill, only the observations.
 
         Raises:
             ProgrammingError: the call comes from another thread than the event loop's; the skill then fails, too.
@@ -136,9 +138,11 @@ class RunningSkill:
             bug = ProgrammingError(f"{skill}: it reports from another thread; declare it `blocking`")
             self.task.get_loop().call_soon_threadsafe(self._misused, bug)
             raise bug
-        if self.answered:
-            _LOG.warning("skill '%s.%s' reports after its end", self.start.component, self.start.skill)
-        if not self.stopped and not self.answered:
+        if self.stopped or self.answered:
+            if self.task.done():
+                _LOG.warning("skill '%s.%s' reports after its end", self.start.component, self.start.skill)
+            self._post_observed(validated(outcome, self.start, self.signature))
+        else:
             self.reports = self.reports or Reports(self._post_report)
             self.reports.put(validated(outcome, self.start, self.signature))
 
@@ -155,27 +159,40 @@ class RunningSkill:
         declared = None if ends else self.signature.outcomes.get(report.event)
         self._post(SkillMessage(self.start, report, ends, goes_on=ends, conflated=conflated, declared=declared))
 
-    def answer(self, outcome: Outcome) -> None:
-        """Post the end, one time; then stop the timer of the deadline."""
+    def _post_observed(self, outcome: Outcome) -> None:
+        if outcome.observed is not NO_CHANGE and self.credible:
+            self._post(SkillMessage(self.start, Outcome(OBSERVED, observed=outcome.observed), final=False))
+
+    def answer(self, outcome: Outcome, *, goes_on: bool = False) -> None:
+        """Post the end, one time, and stop the timer of the deadline; post only the observations of a later outcome.
+
+        Args:
+            outcome: the end.
+            goes_on: whether the task still executes; the sequencer then cancels it.
+        """
+        if self.answered:
+            self._post_observed(outcome)
+            return
+        if self.reports is not None:
+            self.reports.flush()
+        declared = self.signature.outcomes.get(outcome.event) if outcome.attributes else None
+        self._post(SkillMessage(self.start, outcome, final=True, goes_on=goes_on, declared=declared))
+        self.answered = True
+        self.end_limit()
+
+    def disbelieve(self) -> None:
+        """Ignore the later answers of a skill that failed by an invalid report."""
         if not self.answered:
-            if self.reports is not None:
-                self.reports.flush()
-            declared = self.signature.outcomes.get(outcome.event) if outcome.attributes else None
-            self._post(SkillMessage(self.start, outcome, final=True, declared=declared))
-            self.answered = True
-            self.end_limit()
+            self.answered, self.credible = True, False
 
     def ended(self, task: asyncio.Task[None]) -> None:
         """Post a failure for a task that has ended without an answer, unless the skill was stopped."""
         why = asyncio.CancelledError("its task was cancelled") if task.cancelled() else task.exception()
-        if why is not None and not self.stopped:
+        if why is not None and not self.stopped and not self.answered:
             self.answer(self._outcome_of(why))
 
-    def failed(self, error: BaseException, missing: str) -> Outcome | None:
+    def failed(self, error: BaseException) -> Outcome | None:
         """Return the outcome of a skill that raised an error; `None` if its task was cancelled from outside."""
-        cancelled = issubclass(type(error), asyncio.CancelledError)
-        if cancelled and self._expired and self.task.uncancel() <= 0:  # only the deadline has cancelled it
-            return late(self.start, self.within, f"for {missing}" if missing else self._waited)
         if not is_own(error, self.task):
             return None
         if issubclass(type(error), DeadlineError) or (self.is_late and issubclass(type(error), TimeoutError)):
@@ -227,13 +244,7 @@ class RunningSkill:
 
     def lose(self, taker: str) -> None:
         """Post `preempted`, since a skill with a higher priority takes the component; the task is then cancelled."""
-        if self.answered:
-            return
-        if self.reports is not None:
-            self.reports.flush()
-        self._post(SkillMessage(self.start, self._preempted(taker), final=True, goes_on=True))
-        self.answered = True
-        self.end_limit()
+        self.answer(self._preempted(taker), goes_on=True)
 
     def _preempted(self, taker: str) -> Outcome:
         return Outcome(PREEMPTED, {"skill": f"{self.start.component}.{self.start.skill}", "by": taker})
@@ -247,41 +258,24 @@ class RunningSkill:
 
     @property
     def is_late(self) -> bool:
-        """Whether the deadline has passed.
-
-        In real time, a task that blocks the loop counts as late too, although the loop could not execute its timer.
-        """
-        return self._expired or (not self._clock.simulated and self._clock.now() > self.due)
+        """Whether the deadline has passed before the loop could execute its timer, since a task blocked the loop."""
+        return not self._clock.simulated and self._clock.now() > self.due
 
     def begin_limit(self) -> None:
-        """Schedule the cancellation of the task at second `due`."""
+        """Schedule the end at second `due`."""
         if math.isfinite(self.due):
             self._timer = self._clock.call_at(self.due, self._expire)
 
     def end_limit(self) -> None:
-        """Stop the timer: the task has ended, or `PendingCleanups` bounds its clean-up."""
+        """Stop the timer: the skill has ended, and `PendingCleanups` bounds a clean-up."""
         if self._timer is not None:
             self._timer.cancel()
 
     def _expire(self) -> None:
-        self._expired = True
-        if self.task.done():
-            self._abandon()
-            return
-        place = waits_at(self.task.get_coro())
-        self._waited = f"at {place}" if place else ""
+        missing, place = self.missing(), waits_at(self.task.get_coro())
+        waited = f"for {missing}" if missing else f"at {place}" if place else ""
+        self.answer(late(self.start, self.within, waited), goes_on=True)
         cancel_once(self.task)
-        self._timer = asyncio.get_running_loop().call_later(GRACE, self._overdue)
-
-    def _overdue(self) -> None:
-        give_up(self.task)
-        self._abandon()
-
-    def _abandon(self) -> None:
-        """Post `timed_out` for a task that ignored its deadline, so that the chart need not wait for the task."""
-        if not self.answered:
-            self.given_up()
-            self.answer(late(self.start, self.within, self._waited))
 
     def given_up(self) -> None:
         """Report as a fault that the skill ignored its cancellation."""

@@ -315,6 +315,7 @@ class Sequencer:
             finally:
                 untaken = await self.dispatcher.close()
                 unsubscribe()
+        self._take_late_observations()
         if untaken and reactor.problem is None:
             reactor.problem = "; ".join(untaken)
         unanswered = (bug for bug in bugs if bug not in reactor.answered_bugs)
@@ -329,6 +330,15 @@ class Sequencer:
         )  # fmt: skip
         self._keep_end()
         return end
+
+    def _take_late_observations(self) -> None:
+        """Apply what skills observed during their clean-up after the last macrostep."""
+        messages = [one for one in self._inbox.waiting if isinstance(one, SkillMessage) and one.outcome.observed]
+        if not messages or (self.store is not None and self.store.lost):
+            return
+        with nullcontext() if self.store is None else self.store.writing:
+            for message in messages:
+                self._reactor.observe(self._validated(message))
 
     async def _news(self) -> None:
         """Wait for the next message, or for the end of the run.
@@ -384,7 +394,7 @@ class Sequencer:
 
     def _take(self, message: Message) -> None:
         if isinstance(message, SkillMessage):
-            message = message_checks.validated_in_world(message, self.knowledge, self.dispatcher.place_of)
+            message = self._validated(message)
         if self.store is None:
             output = self._reactor.react(message)
         else:
@@ -404,6 +414,9 @@ class Sequencer:
         elif isinstance(message, SkillMessage):
             self.dispatcher.report_taken(message.start)
         self._carry_out(output)
+
+    def _validated(self, message: SkillMessage) -> SkillMessage:
+        return message_checks.validated_in_world(message, self.knowledge, self.dispatcher.place_of)
 
     def _may_group(self, message: Message, output: Collection[Output]) -> bool:
         """Return whether the next macrostep may share the commit of this one.

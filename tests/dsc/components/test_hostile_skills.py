@@ -209,9 +209,10 @@ def test_what_cannot_be_said_while_it_is_told_something_fails_the_next_skill(kin
 
 
 @pytest.mark.parametrize("kind", RAISED)
-def test_what_is_raised_at_the_time_limit_is_not_hidden_by_the_limit(kind):
+def test_a_programming_error_in_the_clean_up_after_the_time_limit_is_in_the_end(kind):
     ran = Ran(ANSWERS.replace("SKILL", "while_cancelled"), arm=Hostile(raising(RAISED[kind])))
-    assert [event["name"] for event in answers(ran)] == ["programming_error"]
+    assert [event["name"] for event in answers(ran)] == ["timed_out"]
+    assert "arm.while_cancelled: " in (ran.end.programming_error or "")
     assert ran.at == 100
 
 

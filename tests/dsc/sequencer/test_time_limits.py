@@ -1,0 +1,103 @@
+"""A time limit ends the plot's wait; the clean-up that follows is bounded, and what it observes is known (S1.15)."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from dsc_runs import Ran
+
+from dsc import Component, Outcome, SkillCall, query, skill
+from knowledge_base import Delta, fact
+
+LIMITED = """
+    plot: p
+    states:
+      a: {entry: {trigger: arm.SKILL, within: 3}, on: {ok: e, answered: e, timed_out: b}}
+      b: {after: {seconds: 100, to: e}}
+      e: {final: true}
+"""
+THEN = LIMITED.replace(
+    "{after: {seconds: 100, to: e}}", "{entry: {trigger: arm.quick, within: LIMIT}, on: {ok: e, timed_out: e}}"
+)
+
+
+class Ok(Outcome): ...
+
+
+class Answered(Outcome):
+    """An answer."""
+
+    value: float
+
+
+class Tidy(Component):
+    """Needs ten seconds to clean up, and observes `p` meanwhile."""
+
+    name = "arm"
+
+    def __init__(self, how: str = "observes") -> None:
+        super().__init__()
+        self.how = how
+        self.log: list[str] = []
+
+    @skill
+    async def slow(self, call: SkillCall) -> Ok:
+        try:
+            await call.clock.sleep(1000)
+        except asyncio.CancelledError:
+            await asyncio.sleep(10)
+            self.log.append(f"clean at {call.clock.now():g}")
+            seen = Delta(added=(fact("p"),))
+            if self.how == "observes":
+                call.observe(seen)
+                raise
+            if self.how == "ends":
+                return Ok(observed=seen)
+            raise
+        return Ok()
+
+    @query
+    async def ask(self) -> Answered:
+        try:
+            await asyncio.sleep(1000)
+        finally:
+            await asyncio.sleep(10)
+        return Answered(value=1.0)
+
+    @skill
+    async def quick(self, call: SkillCall) -> Ok:
+        self.log.append(f"quick at {call.clock.now():g}")
+        return Ok()
+
+
+def outcomes(ran: Ran) -> list[tuple[str, float]]:
+    return [(one.data["name"], one.t) for one in ran.records if one.type == "event" and one.data["source"] != "timer"]
+
+
+@pytest.mark.parametrize("name", ["slow", "ask"])
+def test_a_clean_up_does_not_delay_the_end_of_the_wait(name: str) -> None:
+    ran = Ran(LIMITED.replace("SKILL", name), arm=Tidy("raises"))
+    assert outcomes(ran) == [("timed_out", 3.0)]
+    assert (ran.end.finished, ran.at) == (True, 103)
+
+
+@pytest.mark.parametrize("how", ["observes", "ends"])
+@pytest.mark.parametrize("text", [LIMITED, LIMITED.replace("within: 3}", "within: 50}, after: {seconds: 3, to: b}")])
+def test_an_observation_of_the_clean_up_is_known_from_then_on(text: str, how: str) -> None:
+    ran = Ran(text.replace("SKILL", "slow"), arm=Tidy(how))
+    (changed,) = [one for one in ran.records if one.type == "knowledge"]
+    assert (changed.t, changed.data["author"], changed.data["added"]) == (13.0, "arm", [["p"]])
+    assert changed.cause is not None
+
+
+def test_an_observation_after_the_last_state_is_known() -> None:
+    ran = Ran(LIMITED.replace("SKILL", "slow").replace("timed_out: b", "timed_out: e"), arm=Tidy())
+    assert (ran.end.finished, ran.kb.ask("(p)")) == (True, True)
+
+
+@pytest.mark.parametrize(("limit", "end"), [(20, "ok"), (5, "timed_out")])
+def test_the_next_skill_of_the_component_waits_for_the_clean_up_within_its_own_limit(limit: int, end: str) -> None:
+    ran = Ran(THEN.replace("SKILL", "slow").replace("LIMIT", str(limit)), arm=Tidy("raises"))
+    assert outcomes(ran)[1:] == [(end, 13.0 if end == "ok" else 8.0)]
+    assert ran.arm.log == ["clean at 13", *(["quick at 13"] if end == "ok" else [])]
