@@ -29,6 +29,8 @@ from knowledge_base.tracebacks import is_users_code, raised_at, whole_traceback
 
 _LOG = logging.getLogger(__package__)
 Classes = tuple[type[BaseException], ...]
+component_at_work: ContextVar[str | None] = ContextVar("component_at_work", default=None)
+"""Name of the component whose skill or hook the present task executes; the task's callbacks inherit it."""
 _found: ContextVar[list[str] | None] = ContextVar("found", default=None)
 _NEVER_AWAITED = "coroutine .* was never awaited"
 _RAISED = "exceptions must derive from BaseException"

@@ -15,7 +15,7 @@ from contextlib import asynccontextmanager, contextmanager
 from enum import StrEnum
 from typing import Any, ClassVar, Protocol
 
-from dsc.components.hooks import GRACE, Classes, can_end, contained, reason_of, running_task
+from dsc.components.hooks import GRACE, Classes, can_end, component_at_work, contained, reason_of, running_task
 from dsc.components.periodic_steps import StepCounts, step_periodically
 from dsc.errors import NotAliveError, ProgrammingError
 from knowledge_base.errors import InputError
@@ -368,6 +368,7 @@ class LifeCycle(Announcer):
                 self.fail(error)
 
     def _contained(self, hook: str) -> contained:
+        component_at_work.set(self._hooks.name)
         return contained(f"{self._hooks.name}.{hook}", self._hooks.device_errors)
 
     # -- states ------------------------------------------------------------------------------------------------

@@ -1,7 +1,8 @@
 """Clocks of a run, always injected: real seconds, or simulated seconds that jump to the next timer.
 
 In simulated time, the whole asyncio loop runs on the simulated clock, so that a skill sleeps as in real time. A hold
-stops the clock during the wait for a real answer, e.g. of a planner in another process. A finite speed, e.g. ten
+stops the clock during the wait for a real answer, e.g. of a planner in another process. The clock also stops while a
+skill waits for a socket, pipe or process of its component; deadlines then count real seconds. A finite speed, e.g. ten
 simulated seconds per real second, slows the jumps down for people who watch.
 """
 
@@ -19,6 +20,7 @@ from functools import partial
 from typing import Any, NamedTuple, TypeVar, TypeVarTuple, Unpack
 
 from dsc.loop_calls import LoopCalls
+from dsc.sequencer.real_input import RealInput, TasksOf
 from dsc.sequencer.signals import run_until_signal
 from knowledge_base.errors import InputError
 
@@ -97,6 +99,22 @@ class LoopClock:
         loop = asyncio.get_running_loop()
         return loop.hold() if isinstance(loop, SimulatedEventLoop) else _no_hold()
 
+    def attend(self, tasks_of: TasksOf) -> None:
+        """Let simulated time stand still while a skill waits for a socket, pipe or process of its component.
+
+        Args:
+            tasks_of: returns the tasks of the running skills of a component.
+        """
+        loop = asyncio.get_running_loop()
+        if isinstance(loop, SimulatedEventLoop):
+            loop.real_input.attended.append(tasks_of)
+
+    def disregard(self, tasks_of: TasksOf) -> None:
+        """Undo `attend`."""
+        loop = asyncio.get_running_loop()
+        if isinstance(loop, SimulatedEventLoop) and tasks_of in loop.real_input.attended:
+            loop.real_input.attended.remove(tasks_of)
+
 
 @contextmanager
 def _no_hold() -> Iterator[None]:
@@ -161,7 +179,9 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         self._holds = 0
         self._settling: list[asyncio.Future[None]] = []
         self._idle: list[tuple[float, asyncio.Future[None]]] = []
-        super().__init__(_IdleSelector(self._go_on, self._until_jump, self._advance))
+        selector = _IdleSelector(self._go_on, self._until_jump, self._advance)
+        self.real_input = RealInput(selector)
+        super().__init__(selector)
 
     def time(self) -> float:
         """Return the simulated seconds."""
@@ -199,6 +219,18 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         future.add_done_callback(lambda _: self._change_holds(-1))
         return future
 
+    async def subprocess_exec(self, *args: Any, **kwargs: Any) -> Any:
+        """Start a process, see `asyncio.loop.subprocess_exec`."""
+        transport, protocol = await super().subprocess_exec(*args, **kwargs)
+        self.real_input.add_process(transport)
+        return transport, protocol
+
+    async def subprocess_shell(self, *args: Any, **kwargs: Any) -> Any:
+        """Start a shell, see `asyncio.loop.subprocess_shell`."""
+        transport, protocol = await super().subprocess_shell(*args, **kwargs)
+        self.real_input.add_process(transport)
+        return transport, protocol
+
     async def settled(self) -> None:
         """Wait until the loop has no more work at the present time; time does not advance."""
         waits = self.create_future()
@@ -230,12 +262,21 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
             self._change_holds(+1)
 
     def _until_jump(self) -> float:
-        """Return the real seconds to wait before time jumps; without a pace, it jumps immediately."""
-        if self._pace is None or self._holds or self._settling:
+        """Return the real seconds to wait before time jumps; without pace and waits for input, it jumps immediately."""
+        if self._holds or self._settling:
             return 0.0
+        if self._pace is None:
+            return self._until_deadline() if self.real_input.may_come else 0.0
         self._drop_cancelled()
         self._advance()
         return self._pace.seconds(self._due[0].timer.when() - self._simulated_now) if self._due else 0.0
+
+    def _until_deadline(self) -> float:
+        """Return the real seconds for which a skill may still wait for input before the next scheduled call."""
+        self._drop_cancelled()
+        if not self._due or not self.real_input.is_awaited([due.timer for due in self._due]):
+            return 0.0
+        return self._due[0].timer.when() - self._simulated_now - self.real_input.waited()
 
     def _advance(self) -> None:
         """Advance simulated time by the real time that has passed, but not beyond the next scheduled call."""
@@ -281,6 +322,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         if not self._due:
             return False
         moment = self._due[0].moment
+        self.real_input.end_wait()
         while self._due and self._due[0].moment == moment:
             due = heapq.heappop(self._due)
             self._simulated_now = max(self._simulated_now, due.timer.when())

@@ -16,7 +16,7 @@ from typing import Any
 
 from dsc.calls import Clock, Ended, SkillCall, Status
 from dsc.components.component import Component
-from dsc.components.hooks import cancel_once, contained, give_up, reason_of
+from dsc.components.hooks import cancel_once, component_at_work, contained, give_up, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.robot import Wiring, require_instances
 from dsc.components.turns import Claim, Turns
@@ -87,6 +87,7 @@ class Dispatcher:
         self._asked: list[Turns] = []
         self._forget_tasks: set[asyncio.Task[None]] = set()
         self.timers = Timers(clock, post)
+        clock.attend(self._tasks_of)
 
     def deploy(self, component: Component) -> None:
         """Add a component, which replaces one with an equal name; skills that wait for it begin."""
@@ -179,6 +180,9 @@ class Dispatcher:
         for component in self._components.values():
             if component.life.started:
                 yield f"component '{component.name}' was not stopped"
+
+    def _tasks_of(self, component: str) -> list[asyncio.Task[None]]:
+        return [one.task for one in self._running.values() if one.start.component == component]
 
     def skill_of(self, task: asyncio.Task[Any]) -> str | None:
         """Return the skill whose execution is this task, as `arm.grasp`; `None` for other tasks."""
@@ -326,6 +330,7 @@ class Dispatcher:
             Errors of deliveries that made no skill fail, and the faults of the run.
         """
         self._closing = True
+        self._clock.disregard(self._tasks_of)
         for activation in {start.activation for start in self.started()}:
             self._cancel(activation)
         self.timers.close()
@@ -367,6 +372,7 @@ class Dispatcher:
         running.begin_limit()
 
     async def _execute(self, component: Component, running: RunningSkill, interrupted: InterruptedSkill | None) -> None:
+        component_at_work.set(component.name)
         dependencies = SkillDependencies(self.activation, component)
         running.missing = lambda: dependencies.missing or self._missing(running)
         try:
