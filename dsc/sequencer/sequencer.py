@@ -28,7 +28,7 @@ from dsc.sequencer.phase_watch import PhaseWatch
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.recovery import recover, require_components
 from dsc.sequencer.signals import OnSignal, ending_signal, unfinished_at_second_signal
-from dsc.sequencer.watchdog import Watchdog
+from dsc.sequencer.watchdog import watched
 from dsc.trace import Trace
 from knowledge_base._notebook import table
 from knowledge_base.errors import InputError, StoreError
@@ -272,9 +272,9 @@ class Sequencer:
 
     async def _watched(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
         is_part = self.dispatcher.is_part  # the sequencer around it has a watchdog
-        watched = nullcontext() if is_part else Watchdog(self.dispatcher.skill_of)
+        watch = nullcontext() if is_part else watched(self.dispatcher.skill_of, Sequencer._until_end.__code__)
         unfinished = unfinished_at_second_signal(self.dispatcher.unfinished)
-        with programming_errors() as bugs, unheard_errors(bugs), watched, unfinished:
+        with programming_errors() as bugs, unheard_errors(bugs), watch, unfinished:
             return await self._until_end(begin, bugs)
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]], bugs: Iterable[str]) -> RunEnd:

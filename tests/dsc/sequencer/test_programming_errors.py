@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 import threading
+import time
 
 import pytest
 from dsc_runs import SCHEMA, Ran
@@ -341,3 +342,30 @@ def test_a_skill_that_waits_blocks_nothing_and_the_watchdog_ends_with_the_run(wa
     assert Ran(GRASP.replace(", slipped: e", ""), arm=Waits(where="")).end.finished
     assert "blocks" not in caplog.text
     assert not [one for one in threading.enumerate() if one.name == "watchdog"]
+
+
+def test_code_that_is_not_the_users_is_named_with_its_own_line_and_not_the_users_call_of_the_loop(warned, caplog):
+    names: dict[str, object] = {"warned": warned, "waits": [True]}
+    library = "def listener(_):\n    if waits and waits.pop(): warned.wait(10)\n"
+    exec(compile(library, watchdog.__file__, "exec"), names)  # noqa: S102  # code of an installed package
+    Ran(GRASP, arm=Arm(where=""), prepare=lambda sequencer: sequencer.listen(names["listener"]))
+    assert re.search(
+        r"the executive blocks the event loop for 0\.05 s at .*threading\.py:\d+$", caplog.text, re.MULTILINE
+    )
+
+
+def test_a_skill_that_blocks_again_is_reported_once_with_the_number_of_its_blocks(warned, caplog):
+    class Blocks(Arm):
+        @skill
+        async def grasp(self, call) -> Grasped:
+            for _ in range(3):
+                time.sleep(0.15)  # noqa: ASYNC251  # it blocks the loop
+                await call.clock.sleep(1)
+            return Grasped()
+
+    assert Ran(GRASP.replace(", slipped: e", ""), arm=Blocks(where="")).end.finished
+    said = [one.getMessage() for one in caplog.records if "block" in one.getMessage()]
+    assert len(said) == 2
+    assert re.fullmatch(
+        r"skill 'arm\.grasp' in grasp \(.*\) has blocked the event loop 3 times, 0\.\d s in all", said[1]
+    )
