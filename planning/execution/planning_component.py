@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Collection, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from dsc.calls import Ended, SkillCall, Status
@@ -17,6 +18,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.syntax.text import parse_condition
+from planning.cancellable_work import aside
 from planning.execution.monitoring import Monitoring
 from planning.execution.outages import Outages
 from planning.execution.outcomes import (
@@ -47,7 +49,7 @@ if TYPE_CHECKING:
     from knowledge_base.store import KnowledgeBase
     from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
-    from planning.execution.search import Foresight
+    from planning.execution.search import Foresight, Found
 
 
 class PlanningComponent(Component):
@@ -265,16 +267,17 @@ class PlanningComponent(Component):
             if isinstance(found, NotFound):
                 self._runs.conclude(task)
                 return self._none(found.kind, found.reason)
-            now = self._derivation.at(self._knowledge)
             known = found.known_order(found.steps, self._knowledge.version)
-            progress = PlanProgress(found.steps, now.domain, now.condition(wanted))
+            progress = found.known_progress(found.steps, self._knowledge.version) or self._progress(found, wanted)
             if attempt is None:
                 attempt = self._runs.attempt(task, left)
             elif before is None:
                 attempt.unmet = left
                 attempt.disturbances += 1
             run = PlanRun(self._runs.new_name(), wanted, progress, attempt, holder, seconds, replans, found.better)
-            order, form = self._escalation.plotting.plotted(run, found.answer.plan, known)
+            plotted = partial(self._escalation.plotting.plotted, run, found.answer.plan, known)
+            with self._clock.hold():
+                order, form = await aside(plotted)
         except InputError as error:
             self._runs.conclude(task)
             return self._none("failed", str(error))
@@ -283,6 +286,10 @@ class PlanningComponent(Component):
         if before is not None:
             self._records.replaced(before.name, run.name, found.kept)
         return self._escalation.bound(run, order, form)
+
+    def _progress(self, found: Found, goal: Expression) -> PlanProgress:
+        now = self._derivation.at(self._knowledge)
+        return PlanProgress(found.steps, now.domain, now.condition(goal))
 
     def _interrupted(self, task: str, goal: Expression) -> tuple[Attempt | None, int | None]:
         """Return the interrupted attempt at a task, unless the goal has gained a fact since the last interruption.

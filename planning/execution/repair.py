@@ -287,7 +287,8 @@ class Escalation:
         name = self._recorded(run, steps, why, instead_of)
         found = None if run.successor is None else run.successor.found
         known = None if found is None else found.known_order(steps, self._knowledge.version)
-        progress = PlanProgress(steps, run.progress.domain, run.progress.goal)
+        progress = None if found is None else found.known_progress(steps, self._knowledge.version)
+        progress = progress or PlanProgress(steps, run.progress.domain, run.progress.goal)
         running = len(run.continuing(steps)) if keeping else 0
         again = PlanRun(
             name, run.goal, progress, run.attempt, run.holder, run.seconds, run.replans, replaces=run.name,

@@ -10,6 +10,7 @@ import contextlib
 import itertools
 from collections import deque
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from knowledge_base.errors import InputError
@@ -79,6 +80,7 @@ class Found:
         kept: the number of last steps that the plan shares with the replaced plan.
         better: the better plans of the planner; the caller must close them.
         order: the partial order of the plan, computed by the validation; `None` for a plan with a schedule.
+        progress: the progress of the plan before its first step; `None` before the validation.
         version: the version of the knowledge base on which the plan was validated.
         overtaken: whether the plan can be executed, but does not lead to the goal, since the world has changed during
             the search. A new plan is then made while the first step runs.
@@ -88,6 +90,7 @@ class Found:
     kept: int = 0
     better: Improvements | None = None
     order: PartialOrder | None = None
+    progress: PlanProgress | None = None
     version: int = -1
     overtaken: bool = False
 
@@ -100,9 +103,13 @@ class Found:
         """Return the partial order if the plan has these steps and was validated on this version; otherwise `None`."""
         return self.order if self.version == version and self.steps == steps else None
 
+    def known_progress(self, steps: tuple[PlanStep, ...], version: int) -> PlanProgress | None:
+        """Return the progress if the plan has these steps and was validated on this version; otherwise `None`."""
+        return self.progress if self.version == version and self.steps == steps else None
+
     def with_steps(self, steps: tuple[PlanStep, ...]) -> Found:
         """Return the result with other steps of the plan."""
-        return replace(self, answer=replace(self.answer, plan=Plan(steps)), order=None)
+        return replace(self, answer=replace(self.answer, plan=Plan(steps)), order=None, progress=None)
 
     async def close(self) -> None:
         """Close the generator of better plans."""
@@ -231,11 +238,13 @@ class Search:
                 return found
             if self._clock.simulated:
                 await sleep(found.answer.simulated_seconds)
-            verdict, order = self._judged(found.answer.plan, goal)
+            try:
+                verdict, found = await self._judge(found, goal, seconds)
+            except WorkLimitError:
+                await found.close()
+                return NotFound("timed_out", f"the plan found was not validated within {seconds:g} s")
             if verdict.valid:
-                accepted = await self._accepted(
-                    replace(found, order=order, version=self._knowledge.version), goal, rejected
-                )
+                accepted = await self._accepted(found, goal, rejected)
                 if accepted is not None:
                     return accepted
                 before = None
@@ -297,13 +306,33 @@ class Search:
         rejected[found.steps[verdict.failing_step]] = verdict.why
         return None
 
-    def _judged(self, plan: Plan, goal: Expression) -> tuple[Validation, PartialOrder | None]:
-        """Validate the plan and compute its partial order, in one pass over the steps."""
-        world = self._knowledge.snapshot()  # reads of a snapshot need no lock
+    async def _judge(self, found: Found, goal: Expression, seconds: float) -> tuple[Validation, Found]:
+        """Validate the plan found on the present world in a thread, again while the world changes meanwhile.
+
+        Raises:
+            WorkLimitError: the validation takes longer than `seconds`.
+        """
+        for _ in range(MAX_ATTEMPTS):
+            version, snapshot = self._knowledge.version, self._knowledge.snapshot()
+            work = partial(self._judged, found, goal, snapshot, version)
+            judged = await self._aside(work, WorkLimit(seconds))
+            if version == self._knowledge.version:
+                return judged
+        return self._judged(found, goal, self._knowledge.snapshot(), self._knowledge.version)
+
+    def _judged(self, found: Found, goal: Expression, world: World, version: int) -> tuple[Validation, Found]:
+        """Validate the plan, and compute its partial order and the needs of its steps."""
+        plan, order, found = found.answer.plan, None, replace(found, version=version)
         if not plan.schedule:
             with contextlib.suppress(InputError):
-                return Validation(valid=True), deordered(plan, self._domain, world, goal)
-        return validate(plan, self._domain, world, goal), None
+                order = deordered(plan, self._domain, world, goal)
+        verdict = Validation(valid=True) if order is not None else validate(plan, self._domain, world, goal)
+        if not verdict.valid:
+            return verdict, found
+        now = derivation(self._domain).at(world)
+        progress = PlanProgress(plan.steps, now.domain, now.condition(goal))
+        progress.needed()
+        return verdict, replace(found, order=order, progress=progress)
 
     async def _in_time(self, finding: Awaitable[Found | NotFound], seconds: float) -> Found | NotFound:
         try:
