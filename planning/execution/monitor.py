@@ -117,6 +117,7 @@ class Monitor:
         self._hear = hear
         self._links: dict[Expression, Condition] = {}
         self._to_come: dict[Expression, Condition] = {}
+        self._brought: dict[PlanStep, list[Expression]] = {}
         self._whole: Callable[[], None] = lambda: None
         self._is_broken = False
         self._goal = self._install(progress.goal, self._goal_fired)
@@ -166,9 +167,16 @@ class Monitor:
             self._whole = self._knowledge.subscribe(self._changed)
             needed = later = {}
         self._keep(self._links, {**later, **needed}, self._link_fired)
-        bring = (part for step in progress.coming() for part in _brought(step, self._domain))
+        bring = (part for step in progress.coming() for part in self._brings(step))
         fresh = [fact for fact in bring if fact not in self._links and not is_true(fact, self._knowledge)]
         self._keep(self._to_come, dict.fromkeys(fresh), self._came)
+
+    def _brings(self, step: PlanStep) -> list[Expression]:
+        """Return the facts that a step adds in every world; equal objects each time, whose tests are compiled once."""
+        if step not in self._brought:
+            parts = conjuncts(_expected(step, self._domain))
+            self._brought[step] = [part for part in parts if isinstance(part, Atom)]
+        return self._brought[step]
 
     def _keep(
         self,
@@ -249,8 +257,3 @@ class Monitor:
 
 def _expected(step: PlanStep, domain: PlanningDomain) -> Expression:
     return expectation(domain.action(step).effect, domain.bindings(step))
-
-
-def _brought(step: PlanStep, domain: PlanningDomain) -> list[Expression]:
-    """Return the facts that a step adds in every world."""
-    return [part for part in conjuncts(_expected(step, domain)) if isinstance(part, Atom)]

@@ -7,6 +7,7 @@ The conditions before a whole plan are the causal links from the present world.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -66,6 +67,8 @@ def leaves(effect: Effect) -> tuple[Leaf, ...]:
 def regressed(e: Expression, changes: Sequence[Leaf]) -> Expression:
     """Return the condition that must hold before these changes so that `e` holds after them.
 
+    A condition that the changes do not concern is returned as it is, since a long plan regresses it many times.
+
     Raises:
         UnregressableError: there is no such condition for these changes.
     """
@@ -73,16 +76,18 @@ def regressed(e: Expression, changes: Sequence[Leaf]) -> Expression:
         case Atom():
             return _atom(e, changes)
         case Not(body):
-            return negation(regressed(body, changes))
+            before = regressed(body, changes)
+            return e if before is body else negation(before)
         case And(parts) | Or(parts):
             join = conjunction if isinstance(e, And) else disjunction
-            return join(regressed(part, changes) for part in parts)
+            all_before = [regressed(part, changes) for part in parts]
+            return e if all(map(operator.is_, all_before, parts)) else join(all_before)
         case Imply(premise, conclusion):
             return disjunction((negation(regressed(premise, changes)), regressed(conclusion, changes)))
         case Exists(_, body) | Forall(_, body):
             within = regressed(body, changes)
             empty = FALSE if isinstance(e, Exists) else TRUE
-            return empty if within == empty else replace(e, body=within)
+            return e if within is body else empty if within == empty else replace(e, body=within)
         case Comparison():
             return _comparison(e, changes)
 
