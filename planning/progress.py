@@ -27,6 +27,7 @@ _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "plan.excluded": lambda data: f"{data['step']} is excluded for {data['seconds']:g} s: {data['why']}",
     "plan.readmitted": lambda data: f"{', '.join(data['steps'])} may be planned again: there is no plan without",
     "plan.rejected": lambda data: f"a plan fails in the simulation: {data['reason']}",
+    "plan.wrong": lambda data: f"a plan of {data['engine']} does not lead to the goal: {data['reason']}",
     "plan.gave_up": lambda data: f"gave up: {data['reason']}",
 }
 _STEP = re.compile(r"step_\d+")
@@ -40,6 +41,7 @@ class Tally:
         recoveries: number of uses of each rule, by its label.
         candidates: number of choices of each plot by dynamic states, without choices of planning.
         plans: number of plans found; `replans`: number of plans that replaced a running plan.
+        wrong_plans: number of plans of the planner that do not lead to the goal.
         excluded: number of exclusions of each plan step after failures.
         unobserved: number of times that the effects of each planning action were not observed.
         gave_up: the reason of the last goal for which there was no plan or no further plan; empty without
@@ -55,6 +57,7 @@ class Tally:
         self.unobserved: Counter[str] = Counter()
         self.plans = 0
         self.replans = 0
+        self.wrong_plans = 0
         self.gave_up = ""
         self.seconds = 0.0
 
@@ -72,6 +75,8 @@ class Tally:
             self.gave_up = ""
         elif record.type == "plan.replaced":
             self.replans += 1
+        elif record.type == "plan.wrong":
+            self.wrong_plans += 1
         elif record.type == "plan.excluded":
             self.excluded[record.data["step"]] += 1
         elif record.type == "plan.unobserved":

@@ -28,6 +28,7 @@ class Report:
         outcome: the last outcome event of the plot; `None` if the plot emitted none.
         attributes: the attributes of this event.
         plans, replans: the number of plans found, and the number of plans that replaced another plan.
+        wrong_plans: the number of plans of the planner that do not lead to the goal.
         skill_failures: the number of each failure outcome of skills.
         recoveries: the number of uses of each rule.
         candidates_chosen: the number of choices of each plot by dynamic states.
@@ -50,6 +51,7 @@ class Report:
     attributes: Mapping[str, Any]
     plans: int
     replans: int
+    wrong_plans: int
     skill_failures: Mapping[str, int]
     recoveries: Mapping[str, int]
     candidates_chosen: Mapping[str, int]
@@ -77,7 +79,8 @@ class Report:
             f"{self.headline}, {self.simulated_s:.0f} s of run time.",
             *([] if self._bug_is_told else [f"  programming error in {self.programming_error}"]),
             *map(self._left_line, self.left),
-            f"  plans {self.plans}, replans {self.replans}",
+            f"  plans {self.plans}, replans {self.replans}"
+            + (f", wrong plans {self.wrong_plans}" * bool(self.wrong_plans)),
         ]
         for title, counts in (
             ("skill failures", self.skill_failures),
@@ -136,6 +139,7 @@ def summarise(
         attributes=dict(end.emitted[-1].attributes) if end.emitted else {},
         plans=tally.plans,
         replans=tally.replans,
+        wrong_plans=tally.wrong_plans,
         skill_failures={name: n for name, n in sorted(tally.outcomes.items()) if name in failures},
         recoveries=dict(sorted(tally.recoveries.items())),
         candidates_chosen=dict(sorted(tally.candidates.items())),

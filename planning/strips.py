@@ -120,6 +120,19 @@ class GroundAction:
         return Act(timing, start, partial(_missing, span.over_all), _event(span.end, span.adds, span.deletes))
 
 
+@dataclass(frozen=True, slots=True)
+class WrongPlan:
+    """A plan that does not lead to the goal, with the reason for the planner that returned it.
+
+    Attributes:
+        plan: the plan.
+        reason: the first step that is not applicable, with the condition that it needs, or the violated goal.
+    """
+
+    plan: Plan
+    reason: str
+
+
 @dataclass(frozen=True)
 class Problem:
     """The input of an engine, made by `planning.problem.construction.build_problem`.
@@ -139,6 +152,7 @@ class Problem:
         one_at_a_time: whether the problem treats durative actions as instantaneous ones. Then a missing plan is not
             a proof of unsolvability.
         timed: the problem with durations, for a temporal engine, if `one_at_a_time` is true; otherwise `None`.
+        wrong: plans that the planner has returned for this problem before, and that do not lead to the goal.
     """
 
     domain: str
@@ -153,6 +167,7 @@ class Problem:
     notes: tuple[str, ...] = ()
     one_at_a_time: bool = False
     timed: Problem | None = None
+    wrong: tuple[WrongPlan, ...] = ()
 
     @property
     def whole(self) -> Problem | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -27,6 +27,7 @@ from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, P
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation
 from planning.problem.relevance import why_no_engine
+from planning.strips import WrongPlan
 from planning.validation import Validation, validate
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ MAX_ATTEMPTS = 3
 Without an executable plan, the search ends after the same number of time limits.
 """
 MAX_REJECTED = 5
-"""The maximum number of plans that the simulation may reject."""
+"""The maximum number of plans that the simulation may reject, and of wrong plans that are followed by another."""
 _IN_CONCERT = "the only plan has concurrent steps that need each other, which no plot executes yet"
 LOCAL_REPAIR_SECONDS = 2.0
 """The limit of real time for a local repair, in seconds."""
@@ -130,12 +131,25 @@ class NotFound:
     reason: str
 
 
+@dataclass(slots=True)
+class _Refused:
+    """Steps and plans that one search has refused.
+
+    Attributes:
+        steps: the steps at which the simulation foresees a failure, with the reasons.
+        plans: the plans that do not lead to the goal, although the world has not changed.
+    """
+
+    steps: dict[PlanStep, str] = field(default_factory=dict)
+    plans: list[WrongPlan] = field(default_factory=list)
+
+
 class Search:
     """Search for plans, with a list of excluded steps.
 
     Args:
         domain, knowledge, planner, clock: see `PlanningComponent`.
-        records: receives a record of each excluded, readmitted and rejected step.
+        records: receives a record of each excluded, readmitted and rejected step, and of each wrong plan.
         foresight: simulates each plan; the search returns only plans that the simulation accepts.
     """
 
@@ -217,6 +231,7 @@ class Search:
 
         A search during which the world changed is repeated; then a local repair may keep steps of the plan found. After
         `MAX_ATTEMPTS` such searches, a robot without running steps begins with the last plan that can be executed.
+        After a wrong plan the planner is asked again, with the reason in `Problem.wrong`, while time is left.
 
         Args:
             goal: the condition to reach.
@@ -228,12 +243,12 @@ class Search:
         Raises:
             InputError: the goal contains a missing object, or needs a feature that no engine supports.
         """
-        rejected: dict[PlanStep, str] = {}
+        refused, limit = _Refused(), WorkLimit(seconds)
         changed, begun = 0, self._clock.now()
         overtaken: deque[Found] = deque(maxlen=MAX_ATTEMPTS)
         while True:
             version, snapshot = self._knowledge.version, self._knowledge.snapshot()
-            found = await self._found_after(running, goal, seconds, before, rejected, snapshot)
+            found = await self._found_after(running, goal, seconds, before, refused, snapshot)
             if isinstance(found, NotFound):
                 return found
             if self._clock.simulated:
@@ -244,16 +259,19 @@ class Search:
                 await found.close()
                 return NotFound("timed_out", f"the plan found was not validated within {seconds:g} s")
             if verdict.valid:
-                accepted = await self._accepted(found, goal, rejected)
+                accepted = await self._accepted(found, goal, refused.steps)
                 if accepted is not None:
                     return accepted
                 before = None
                 continue
             await found.close()
-            changed += 1
             if version == self._knowledge.version:
-                wrong = f"the plan found does not lead to the goal: {verdict.why} ({found.answer.engine})"
-                return NotFound("failed", wrong)
+                self._refuse(found, verdict, refused.plans)
+                if len(refused.plans) > MAX_REJECTED or not limit.left:
+                    return _only_wrong(refused.plans, found)
+                continue
+            changed += 1
+            limit = WorkLimit(seconds)
             overtaken.append(found)
             latest = self._executable(overtaken) if changed >= MAX_ATTEMPTS and not running else None
             if latest is not None:
@@ -264,6 +282,12 @@ class Search:
             if not found.answer.plan.schedule:
                 now = derivation(self._domain).at(self._knowledge)
                 before = PlanProgress(found.steps[len(running) :], now.domain, now.condition(goal))
+
+    def _refuse(self, found: Found, verdict: Validation, refused: list[WrongPlan]) -> None:
+        step = None if verdict.failing_step is None else found.steps[verdict.failing_step]
+        reason = verdict.why if step is None else f"{step}: {verdict.why}"
+        self._records.wrong(step, reason, found.answer.engine)
+        refused.append(WrongPlan(found.answer.plan, reason))
 
     def _executable(self, plans: Sequence[Found]) -> Found | None:
         """Return the last of the plans whose steps can still be executed."""
@@ -280,14 +304,14 @@ class Search:
         goal: Expression,
         seconds: float,
         before: PlanProgress | None,
-        rejected: dict[PlanStep, str],
+        refused: _Refused,
         snapshot: World,
     ) -> Found | NotFound:
         """Return the running steps and a plan from the world after them."""
         world = _ahead(running, self._domain, snapshot)
         if world is None:
             return NotFound("failed", "a running step is no longer applicable")
-        found = await self._in_time(self._found(goal, seconds, before, rejected, world), seconds)
+        found = await self._in_time(self._found(goal, seconds, before, refused, world), seconds)
         return found.with_steps((*running, *found.steps)) if running and isinstance(found, Found) else found
 
     async def _accepted(self, found: Found, goal: Expression, rejected: dict[PlanStep, str]) -> Found | NotFound | None:
@@ -346,11 +370,12 @@ class Search:
         goal: Expression,
         seconds: float,
         before: PlanProgress | None,
-        rejected: dict[PlanStep, str],
+        refused: _Refused,
         snapshot: World,
     ) -> Found | NotFound:
         """Search for a plan in the world of the snapshot, first by local repair, then by a planner call."""
         budget = WorkLimit(seconds)
+        before = None if refused.plans else before
         repaired = None if before is None else await self._repaired(goal, seconds / 2, before, snapshot)
         if isinstance(repaired, Found):
             return repaired
@@ -361,14 +386,15 @@ class Search:
             )
         except WorkLimitError as error:
             return NotFound("timed_out", f"no plan within {seconds:g} s (while {error.doing})")
-        answer, better = await self._answer(problem, budget.left, rejected)
+        problem = replace(problem, wrong=tuple(refused.plans)) if refused.plans else problem
+        answer, better = await self._answer(problem, budget.left, refused.steps)
         if isinstance(answer, PlanFound):
             reproducible = answer.reproducible and repaired is None
             return Found(replace(answer, reproducible=reproducible), better=better)
         if not isinstance(answer, ProvenUnsolvable):
             return _unknown(answer, self._domain, goal, seconds)
-        if rejected:
-            reasons = "; ".join(f"{step}: {why}" for step, why in rejected.items())
+        if refused.steps:
+            reasons = "; ".join(f"{step}: {why}" for step, why in refused.steps.items())
             return NotFound("unsolvable", f"the simulation foresees that every plan fails: {reasons}")
         missing: tuple[str, ...] = ()
         left = WorkLimit(budget.left)
@@ -428,6 +454,12 @@ class Search:
             step = None if verdict.failing_step is None else plan.steps[verdict.failing_step]
             self._records.rejected(step, verdict.why, found.answer.engine)
         return verdict
+
+
+def _only_wrong(plans: Sequence[WrongPlan], found: Found) -> NotFound:
+    number = f", the last of {len(plans)} wrong plans" if len(plans) > 1 else ""
+    reason = f"the plan found does not lead to the goal: {plans[-1].reason} ({found.answer.engine}{number})"
+    return NotFound("failed", reason)
 
 
 def _running_first(steps: tuple[PlanStep, ...], running: tuple[PlanStep, ...]) -> tuple[PlanStep, ...] | None:

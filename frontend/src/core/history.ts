@@ -16,6 +16,7 @@ const MARKS: ReadonlyMap<string, Mark> = new Map(Object.entries({
   rule: "failure",
   "plan.broken": "failure",
   "plan.none": "failure",
+  "plan.wrong": "failure",
   "plan.gave_up": "failure",
   "plan.found": "plan",
   "plan.replaced": "plan",

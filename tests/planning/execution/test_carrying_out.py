@@ -276,7 +276,7 @@ class Bad:
     ("how", "said"),
     [
         ("raises", "Bad: RuntimeError: out of paper"), ("fails", "fake: killed by signal 11"), ("babbles", "Bad: no answer: 'a plan'"),
-        ("wrong", "does not lead to the goal: (way a c) is false (fake)"), ("hangs", "no plan within 5 s (Bad)"),
+        ("wrong", "does not lead to the goal: (go a c): (way a c) is false (fake, the last of 6 wrong plans)"), ("hangs", "no plan within 5 s (Bad)"),
     ],
 )  # fmt: skip
 def test_a_planner_that_misbehaves_ends_in_no_plan_and_is_named(how, said, monkeypatch):
