@@ -37,7 +37,7 @@ class Broken:
     """News that the remaining steps no longer lead to the goal.
 
     Attributes:
-        why: the condition that does not hold when its step begins, in PDDL.
+        why: the condition that does not hold when its step begins, in PDDL; for a later step, as a prediction.
         needed: the broken condition on the present world, as text; empty if no single condition is broken.
         user: the number of the first step that needs the condition; the number of steps plus one for the goal.
         author: the author of the change.
@@ -243,16 +243,25 @@ class Monitor:
         now, later = progress.needed() or {}, progress.needed_later() or {}
         if fallen is None:
             fallen = next((one for one in itertools.chain(now, later) if not is_true(one, world)), None)
-        why = validate(Plan(self._not_done(world)), self._domain, world, progress.goal).why
+        why = self._predicted(world)
         if fallen is None:
             return Broken(why, "", len(progress.steps) + 1, author, version)
         return Broken(why, to_text(fallen), now.get(fallen) or later[fallen], author, version)
 
-    def _not_done(self, world: World) -> tuple[PlanStep, ...]:
-        """Return the remaining steps, without running steps whose expected effects already hold."""
+    def _predicted(self, world: World) -> str:
+        """Return the first condition that fails, with the later step for which its failure is predicted."""
+        progress, left = self._progress, self._not_done(world)
+        found = validate(Plan(progress.steps_of(left)), self._domain, world, progress.goal)
+        if found.failing_step is None:
+            return f"after the last step: {found.why}" if left else found.why
+        number = left[found.failing_step]
+        return f"before step {number}, {progress.steps[number - 1]}: {found.why}" if found.failing_step else found.why
+
+    def _not_done(self, world: World) -> tuple[int, ...]:
+        """Return the numbers of the remaining steps, without running steps whose expected effects already hold."""
         progress = self._progress
         done = [n for n in progress.running if is_true(_expected(progress.steps[n - 1], self._domain), world)]
-        return progress.steps_of(number for number in progress.remaining if number not in done)
+        return tuple([number for number in progress.remaining if number not in done])
 
 
 def _expected(step: PlanStep, domain: PlanningDomain) -> Expression:

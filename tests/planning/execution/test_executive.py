@@ -236,7 +236,10 @@ def test_what_somebody_else_breaks_is_noticed_while_a_step_runs():
     end = robot.run("light_up", prepare=prepare)
     assert how(end) == "reached"
     (broken,) = [record for record in records if record.type == "plan.broken"]
-    assert (broken.data["author"], broken.data["reason"]) == ("somebody", "(on c) is false")
+    assert (broken.data["author"], broken.data["reason"]) == (
+        "somebody",
+        "after the last step: (on c) is false",
+    )
     assert set(lamps.switched) == {"a", "b", "c"}
     (change,) = [record for record in records if record.data.get("author") == "somebody" and record.type == "knowledge"]
     assert broken.cause == change.seq
@@ -283,7 +286,11 @@ def test_a_skill_that_works_for_another_state_is_somebody_else_to_the_monitor():
     robot.listen(records.append)
     assert robot.run("watching").finished
     (broken,) = [record for record in records if record.type == "plan.broken"]
-    assert (broken.t, broken.data["author"], broken.data["reason"]) == (0.5, "watcher", "(works b) is false")
+    assert (broken.t, broken.data["author"], broken.data["reason"]) == (
+        0.5,
+        "watcher",
+        "before step 2, (switch-on b): (works b) is false",
+    )
 
 
 @pytest.mark.parametrize(
@@ -371,7 +378,11 @@ def test_a_plan_is_watched_also_after_one_of_its_steps_has_planned_for_itself():
 
     robot.run("light_all", prepare=prepare)
     (broken,) = [record for record in records if record.type == "plan.broken"]
-    assert (broken.t, broken.data["author"], broken.data["reason"]) == (2.0, "somebody", "(works b) is false")
+    assert (broken.t, broken.data["author"], broken.data["reason"]) == (
+        2.0,
+        "somebody",
+        "before step 2, (switch-on b): (works b) is false",
+    )
 
 
 LEVEL_GOAL = "(and (on a) (< (/ 10 (level a)) 5))"

@@ -74,7 +74,9 @@ def test_what_a_late_step_needs_is_watched_from_the_beginning():
     plan.begin(1)
     change = plan.change("eve", gone="in p2 store")
     (broken,) = plan.news
-    assert broken == Broken("(in p2 store) is false", "(in p2 store)", 5, "eve", change.version)
+    assert broken == Broken(
+        "before step 5, (take bob p2 store): (in p2 store) is false", "(in p2 store)", 5, "eve", change.version
+    )
 
 
 def test_what_a_step_will_bring_is_not_missed_before():
@@ -113,7 +115,7 @@ def test_a_thing_that_was_not_known_can_break_a_goal_about_all():
     plan.begin(1)
     plan.change("eve", now="urgent p4", nodes={"p4": "parcel"})
     (broken,) = plan.news
-    assert (broken.user, broken.why) == (8, "(in p4 office) is false")
+    assert (broken.user, broken.why) == (8, "after the last step: (in p4 office) is false")
 
 
 def test_a_thing_that_is_gone_breaks_the_plan():
@@ -362,7 +364,7 @@ def test_a_broken_plan_that_needs_no_single_condition_names_its_goal():
     plan.change("bob", values={fact("weight", "p1"): 1.0})
     plan.news.clear()
     change = plan.change("eve", gone="open hall")
-    assert plan.news == [Broken("(open hall) is false", "", 4, "eve", change.version)]
+    assert plan.news == [Broken("after the last step: (open hall) is false", "", 4, "eve", change.version)]
 
 
 def test_a_goal_that_cannot_be_computed_is_not_reached():
@@ -379,4 +381,4 @@ def test_the_reason_is_what_the_goal_lacks_and_no_condition_of_a_step_that_is_do
     plan.begin(2)
     plan.do(2)  # nothing that follows has begun, so the plan still counts this step as running
     plan.change("somebody", now="urgent p3")
-    assert [one.why for one in plan.news] == ["(in p3 office) is false"]
+    assert [one.why for one in plan.news] == ["after the last step: (in p3 office) is false"]
