@@ -68,6 +68,11 @@ Without an executable plan, the search ends after the same number of time limits
 MAX_REJECTED = 5
 """The maximum number of plans that the simulation may reject, and of wrong plans that are followed by another."""
 _IN_CONCERT = "the only plan has concurrent steps that need each other, which no plot executes yet"
+_SHORT = 30
+"""The number of steps up to which the monitor computes the causal links itself, in a few milliseconds.
+
+A robot with a short plan then begins sooner; a long plan would block the event loop.
+"""
 LOCAL_REPAIR_SECONDS = 2.0
 """The limit of real time for a local repair, in seconds."""
 
@@ -355,7 +360,8 @@ class Search:
             return verdict, found
         now = derivation(self._domain).at(world)
         progress = PlanProgress(plan.steps, now.domain, now.condition(goal))
-        progress.needed()
+        if len(plan.steps) > _SHORT:
+            progress.needed()
         return verdict, replace(found, order=order, progress=progress)
 
     async def _in_time(self, finding: Awaitable[Found | NotFound], seconds: float) -> Found | NotFound:
