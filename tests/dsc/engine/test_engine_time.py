@@ -288,3 +288,22 @@ def test_entering_anew_starts_the_least_time_anew():
     assert run.active == ["o", "a"]
     assert modes(run.send("go")) == []
     assert run.active == ["o", "b"]
+
+
+OUT = "{plot: p, states: {o: {on: {out: z}, states: {a: {at_least: 1, on: {go: b}}, b: }}, z: {on: {back: o}}}}"
+
+
+def test_a_state_that_is_left_before_its_least_time_leaves_no_trace_in_the_configuration():
+    early, late = started(OUT), started(OUT)
+    passes(late, "a")
+    for run in (early, late):
+        run.send("out")
+    assert early.machine.state.root.configuration == late.machine.state.root.configuration
+
+
+def test_an_event_that_waited_for_the_least_time_is_dropped_when_its_state_is_left():
+    run = started(OUT)
+    for event in ("go", "out", "back"):
+        run.send(event)
+    passes(run, "a")
+    assert run.active == ["o", "a"]

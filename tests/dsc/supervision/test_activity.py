@@ -89,6 +89,18 @@ def test_a_component_is_on_while_a_state_uses_it_and_so_is_what_it_needs():
     ]  # fmt: skip
 
 
+def test_a_component_is_switched_off_after_those_that_need_it_even_if_that_takes_time():
+    class Slow(Device):
+        async def activate(self, active):
+            if not active:
+                await asyncio.sleep(2)
+            await super().activate(active)
+
+    log: Log = []
+    ran(LOOK, Slow("camera", log, needs=("power",)), Device("power", log))
+    assert [one for one in log if one[1].endswith("off")][:2] == [(12.0, "camera off"), (12.0, "power off")]
+
+
 def test_a_component_that_nobody_needs_is_left_alone():
     log: Log = []
     ran(LOOK, Device("camera", log), Device("power", log))

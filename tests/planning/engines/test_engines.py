@@ -107,6 +107,25 @@ def test_a_search_is_ended_when_its_time_is_up_and_the_worker_stays_warm(engine)
     assert asked(engine, PROBLEM) == {"actions": [0, 1]}
 
 
+def test_the_processes_of_a_search_that_has_ended_are_not_killed_with_the_worker(monkeypatch):
+    """Their numbers may belong to other programs by then."""
+    killed: list[int] = []
+    engine = EngineProcess(worker("pyperplan"))
+    engine.start(60)
+    assert asked(engine, PROBLEM) == {"actions": [0, 1]}
+    with pytest.raises(OutOfTimeError):
+        asked(engine, HARD, 0.3)
+    real = os.killpg
+
+    def noted(group, number):
+        killed.append(group)
+        real(group, number)
+
+    monkeypatch.setattr(os, "killpg", noted)
+    engine.kill()
+    assert killed == [engine._pid]
+
+
 def test_a_search_that_dies_takes_nothing_with_it(engine):
     searching = threading.Thread(target=_kill_the_search, args=(engine,))
     searching.start()

@@ -7,6 +7,7 @@ from breadth_first import BreadthFirst
 from obedient_robot import FAILED, ObedientRobot, plots
 
 from dsc import PlotError, parse_plot
+from dsc.trace import Record
 from knowledge_base import Delta, fact
 from planning import Executive, PlanningDomain
 
@@ -141,3 +142,25 @@ def test_a_plot_that_reads_a_recursive_predicate_is_refused():
     text = "{plot: p, states: {a: {always: {when: (connected c d), to: e}}, e: {final: true}}}"
     with pytest.raises(PlotError, match="'connected' is a recursive derived predicate, which only goals"):
         Executive(DOMAIN, [parse_plot(text)], [])
+
+
+def test_a_plan_that_is_over_is_not_examined_again_when_a_recursive_predicate_changes():
+    main = """
+    plot: main
+    states:
+      get: {goal: (at d), on: {done: rest, no_plan: rest, gave_up: rest}}
+      rest: {after: {seconds: 100, to: over}}
+      over: {final: true}
+    """
+    records: list[Record] = []
+    robot = ObedientRobot(DOMAIN)
+    with Executive(DOMAIN, [*plots(DOMAIN), parse_plot(main)], [robot], planner=BreadthFirst()) as program:
+        robot.knowledge = program.knowledge
+        doors = [fact("door", *pair) for pair in ("ab", "cb", "cd")]
+        nodes = dict.fromkeys("abcd", "room")
+        program.knowledge.apply(Delta(nodes=nodes, added=(*doors, fact("at", "a"))), "t")
+        program.listen(records.append)
+        gone = Delta(removed=(fact("door", "c", "d"), fact("at", "d")), added=(fact("at", "a"),))
+        end = program.run("main", prepare=lambda sequencer: sequencer.change(gone, "somebody", after=50))
+    assert end
+    assert max(record.t for record in records if record.type.startswith("plan.")) < 50

@@ -1,5 +1,7 @@
 """The monitor by itself: what breaks a plan, what shortens it, whose doing counts when, and what costs nothing."""
 
+import gc
+import weakref
 from typing import Any
 
 import pytest
@@ -365,6 +367,21 @@ def test_a_broken_plan_that_needs_no_single_condition_names_its_goal():
     plan.news.clear()
     change = plan.change("eve", gone="open hall")
     assert plan.news == [Broken("after the last step: (open hall) is false", "", 4, "eve", change.version)]
+
+
+@pytest.mark.parametrize(("steps", "gone"), [(STEPS, "in p2 store"), ([step("grow")] * 3, "open hall")])
+def test_a_closed_monitor_hears_nothing_and_is_not_kept(steps, gone):
+    plan = Watched(steps, GOAL if steps is STEPS else parse_condition("(and (> (weight p1) 3) (open hall))"))
+    for number in (1, 2):
+        plan.begin(number)
+    plan.news.clear()
+    plan.monitor.close()
+    plan.change("eve", gone=gone)
+    assert plan.news == []
+    monitor = weakref.ref(plan.monitor)
+    del plan.monitor
+    gc.collect()
+    assert monitor() is None
 
 
 def test_a_goal_that_cannot_be_computed_is_not_reached():
