@@ -42,7 +42,8 @@ class _Typed:
 class Outcome(_Typed):
     """The end of a skill: its outcome event, the event's attributes, and its observations.
 
-    Before the event is handled, `observed` is applied to the knowledge base, with the component as author.
+    Before the event is handled, `observed` is applied to the knowledge base, with the component as author. As in an
+    effect of a planning action, a fact that is both removed and added is true.
 
     A subclass declares one outcome: its annotations are the attributes, and `event` is by default the name of the class
     in lower case with underscores. `class Lost(Outcome, event="gave_way")` gives another name. `Outcome` itself

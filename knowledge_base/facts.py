@@ -54,8 +54,8 @@ def fact(predicate: str, *args: Value) -> Fact:
 class Delta:
     """A change of the world model as a value: applied as a whole or not at all.
 
-    Replacements are applied before removals, and removals before additions, as in PDDL effects. A fact that is both
-    removed and added stays true.
+    Replacements are applied before removals, and removals before additions, as in PDDL effects. A world refuses a
+    change with one fact that is both removed and added.
 
     Attributes:
         nodes: new objects, name to type; a known object with its type has no effect.

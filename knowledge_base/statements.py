@@ -7,7 +7,7 @@ number in the notation of problems (`(= (weight cup1) 0.2)`), or an object with 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from knowledge_base.errors import InputError, ParseError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, Fact
@@ -15,10 +15,10 @@ from knowledge_base.language.checking.check import check, check_effect
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import apply_effect
 from knowledge_base.language.evaluation.world_protocol import BoundedWorld, Bounds, Meter, World
-from knowledge_base.language.syntax.effect import Add, Effect, NumericEffect
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, NumericEffect
 from knowledge_base.language.syntax.expression import Atom, Call, Comparison, Constant, Expression
 from knowledge_base.language.syntax.sexpr import Group, read
-from knowledge_base.language.syntax.text import parse_condition, parse_effect
+from knowledge_base.language.syntax.text import parse_condition, parse_effect, to_text
 from knowledge_base.world.overlay import Overlay
 
 MOST_WORK = 500_000
@@ -43,8 +43,10 @@ def told(statements: Iterable[str], world: World, source: str | None = None, bou
         UnknownNameError: an undeclared type, predicate or function, or an object that is neither known nor declared
             here.
         SchemaError: a wrong number of arguments or a wrong type, or a known object has another type.
+        InputError: a statement and its negation.
     """
     effects = [_effect(text, _called(source, number)) for number, text in enumerate(statements, 1)]
+    _require_consistent(effects)
     view, meter = Overlay(world), Meter(bounds)
     seen = BoundedWorld(view, meter)
     for effect in effects:
@@ -75,6 +77,27 @@ def retracted(statements: Iterable[str], world: World, source: str | None = None
         check(atom, world.schema, objects=known)
         view.apply(_taken_back(atom, view))
     return view.delta
+
+
+def _require_consistent(effects: Iterable[Effect]) -> None:
+    """Raise an error that names both places if one statement is the negation of another."""
+    said: dict[Atom, Add | Delete] = {}
+    for literal in _literals(effects):
+        before = said.setdefault(literal.atom, literal)
+        if type(before) is not type(literal):
+            atom = to_text(literal.atom)
+            truth, other = ("true", "false") if isinstance(literal, Add) else ("false", "true")
+            message = f"the change contradicts itself: {atom} is {truth} here, and {other} at {before.place}"
+            raise InputError(message, place=literal.place, found=atom)
+
+
+def _literals(effects: Iterable[Effect]) -> Iterator[Add | Delete]:
+    for effect in effects:
+        match effect:
+            case Add() | Delete():
+                yield effect
+            case AllOf(parts):
+                yield from _literals(parts)
 
 
 def _called(source: str | None, number: int) -> str | None:

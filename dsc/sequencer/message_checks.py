@@ -107,6 +107,8 @@ def _conforming(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
             require_delta(observed)
         except InputError as error:
             raise InputError(f"the observation of '{event}': {error}") from None
+        if observed.removed and observed.added:  # additions win, as in an effect: a drive to the place where it begins
+            observed = NO_CHANGE.then(observed)
     return Outcome(event, _plain(event, attributes, declared) if attributes or declared else {}, observed)
 
 

@@ -197,6 +197,17 @@ def _require_one(facts: dict[Fact, None], wrong: str) -> None:
         raise SchemaError(f"{first} and {second} {wrong}")
 
 
+def _require_consistent(delta: Delta) -> None:
+    """Raise an error if a fact is to become both false and true; the facts of a removed object may begin anew."""
+    gone = set(delta.removed_nodes)
+    removed = {fact: position for position, fact in enumerate(delta.removed) if gone.isdisjoint(fact.args)}
+    for name, facts in (("added", delta.added), ("replaced", delta.replaced)):
+        for position, fact in enumerate(facts):
+            if fact in removed:
+                places = f"removed[{removed[fact]}] and {name}[{position}]"
+                raise InputError(f"the change contradicts itself: {fact} is {places}", found=str(fact))
+
+
 def check_delta(delta: Delta, world: World) -> None:
     """Raise an error unless `delta` can be applied to `world`.
 
@@ -204,8 +215,11 @@ def check_delta(delta: Delta, world: World) -> None:
         UnknownNameError: an undeclared type, predicate or function, or an unknown object.
         SchemaError: wrong arguments, a second type of an object, or a second fact of a functional predicate. The error
             is also raised for a new value of a function that is bound to a source.
-        InputError: a number that is not finite, or a new object with a name that PDDL cannot spell.
+        InputError: a number that is not finite, a new object with a name that PDDL cannot spell, or a fact that is both
+            removed and added.
     """
+    if delta.removed and (delta.added or delta.replaced):
+        _require_consistent(delta)
     schema, admission = world.schema, _Admission(delta, world)
     # One change may remove facts together with their objects.
     before = _Admission(replace(delta, removed_nodes=()), world) if delta.removed_nodes else admission

@@ -265,3 +265,16 @@ def test_all_questions_agree_on_what_can_be_computed(text, order, weights):
     assert outcome(lambda: kb.explain(text).truth) is truth
     condition = kb.install(text)
     assert (condition.truth, condition.error is None) == (truth is True, truth is not None)
+
+
+# --- contradictions
+
+
+@pytest.mark.parametrize("name", ["added", "replaced"])
+def test_a_change_that_makes_one_fact_false_and_true_is_refused_with_both_places(kb, name):
+    one, other = fact("heavy", "cup1"), fact("on", "cup1", "table")
+    before = everything(kb)
+    with pytest.raises(InputError) as error:
+        kb.apply(Delta(removed=(one, other), **{name: (other,)}), author="test")
+    assert f"(on cup1 table) is removed[1] and {name}[0]" in one_line(error)
+    assert everything(kb) == before

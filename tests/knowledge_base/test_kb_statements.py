@@ -42,7 +42,13 @@ def test_an_effect_with_endless_instances_is_refused(kb) -> None:
 
 def test_later_statements_build_on_earlier_ones(kb) -> None:
     assert told(["(increase (breaks) 1)", "(increase (breaks) 1)"], kb).values == {fact("breaks"): 2}
-    assert told(["(clean mug)", "(not (clean mug))"], kb) == Delta()
+    assert told(["(forall (?c - cup) (not (on ?c table)))", "(on mug table)"], kb) == Delta()
+
+
+def test_a_statement_and_its_negation_are_refused_with_both_places(kb) -> None:
+    said = r"FACT 3:1:18: the change contradicts itself: \(clean mug\) is false here, and true at FACT 1:1:1"
+    with pytest.raises(InputError, match=said):
+        told(["(clean mug)", "(cup red)", "(and (clean red) (not (clean mug)))"], kb, "FACT")
 
 
 def test_what_holds_already_is_no_change(kb) -> None:

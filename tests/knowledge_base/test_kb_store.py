@@ -182,7 +182,7 @@ def test_what_changes_nothing_is_not_announced(kb) -> None:
     kb.subscribe(heard.append)
     same = Delta(
         nodes={"cup1": "cup"},
-        removed=(fact("on", "cup1", "shelf"),),
+        removed=(fact("on", "cup2", "shelf"),),
         added=(fact("on", "cup1", "shelf"),),
         values={fact("weight", "cup1"): 2},
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hypothesis import strategies as st
-from kb_strategies import brute
+from kb_strategies import brute, consistent
 
 from knowledge_base import Delta, Fact, Schema
 from knowledge_base.language.checking.binding import only_tested
@@ -65,7 +65,7 @@ def changes(of: Language) -> st.SearchStrategy[Delta]:
         added=some,
         values=st.dictionaries(fluents, number, max_size=2),
         removed_nodes=st.just(()) | st.lists(thing, max_size=1).map(tuple),
-    )
+    ).map(consistent)
 
 
 def conditions(of: Language) -> st.SearchStrategy[ex.Expression]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import operator
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from hypothesis import strategies as st
@@ -156,7 +157,13 @@ def deltas() -> st.SearchStrategy[Delta]:
     return st.builds(
         Delta, nodes=st.just(THINGS), removed=some, added=some, values=st.lists(values, max_size=3).map(dict),
         replaced=st.dictionaries(items, places, max_size=2).map(lambda at: tuple(Fact("on", pair) for pair in at.items())),
-    )  # fmt: skip
+    ).map(consistent)  # fmt: skip
+
+
+def consistent(delta: Delta) -> Delta:
+    """The change without the removals that contradict it."""
+    true = {*delta.added, *delta.replaced}
+    return replace(delta, removed=tuple(one for one in delta.removed if one not in true))
 
 
 def removals() -> st.SearchStrategy[Delta]:

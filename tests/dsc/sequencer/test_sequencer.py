@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 from dsc_charts import plot
-from dsc_runs import SCHEMA, SLOW, Arm, Ran
+from dsc_runs import SCHEMA, SLOW, Arm, Item, Ran
 
+from dsc.calls import SkillCall
 from dsc.dynamic.library import Library
 from dsc.events import Event
 from dsc.outcomes import Outcome
@@ -17,7 +18,7 @@ from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.trace import Record
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.facts import Delta, Fact
+from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.store import KnowledgeBase
 
 GRASP = """
@@ -568,3 +569,20 @@ def test_an_event_from_outside_fits_the_declaration_of_a_plot_that_receives_it(a
     (error,) = errors
     assert said in error
     assert ran.end.finished
+
+
+class There(Outcome):
+    pass
+
+
+class Wanderer(Arm):
+    @skill
+    async def drive(self, call: SkillCall, start: Item, to: Item) -> There:
+        return There(observed=Delta(removed=(fact("seen", start),), added=(fact("seen", to),)))
+
+
+def test_an_observation_with_one_fact_removed_and_added_is_true_as_in_an_effect():
+    text = "{plot: p, states: {a: {entry: {trigger: arm.drive, with: {start: cup1, to: cup1}}, on: {there: e}}, e: {final: true}}}"
+    ran = Ran(text, things=["cup1"], arm=Wanderer())
+    assert ran.end.finished
+    assert ran.kb.ask("(seen cup1)")

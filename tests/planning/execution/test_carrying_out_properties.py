@@ -96,8 +96,13 @@ def a_world(domain, facts):
 
 
 def deltas():
-    few = st.lists(st.sampled_from(FACTS), max_size=2, unique=True)
-    return st.tuples(few, few).map(lambda both: Delta(removed=tuple(both[0]), added=tuple(both[1])))
+    few = st.dictionaries(st.sampled_from(FACTS), st.booleans(), max_size=4)
+    return few.map(
+        lambda truth: Delta(
+            removed=tuple(one for one, true in truth.items() if not true),
+            added=tuple(one for one, true in truth.items() if true),
+        )
+    )
 
 
 CHANGES = st.lists(st.tuples(st.floats(0.05, 3.0), deltas()), max_size=4)

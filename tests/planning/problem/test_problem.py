@@ -375,8 +375,9 @@ def test_a_poser_that_posed_before_poses_the_same_problem(actions, turns):
     domain = _random_domain(actions)
     world, builder = KnowledgeBase(domain.schema), ProblemBuilder(domain)
     for changes, goal_text in turns:
-        removed = tuple(one for one, there in changes if not there)
-        world.apply(Delta(removed=removed, added=tuple(one for one, there in changes if there)), author="test")
+        added = tuple(one for one, there in changes if there)
+        removed = tuple(one for one, there in changes if not there and one not in added)
+        world.apply(Delta(removed=removed, added=added), author="test")
         goal = parse_condition(goal_text)
         again, afresh = builder.build_problem(world, goal), ProblemBuilder(domain).build_problem(world, goal)
         assert again == afresh
