@@ -198,7 +198,7 @@ def _require_one(facts: dict[Fact, None], wrong: str) -> None:
 
 
 def _require_consistent(delta: Delta) -> None:
-    """Raise an error if a fact is to become both false and true; the facts of a removed object may begin anew."""
+    """Raise an error if a fact is to become both false and true; a removed object may become a new one."""
     gone = set(delta.removed_nodes)
     removed = {fact: position for position, fact in enumerate(delta.removed) if gone.isdisjoint(fact.args)}
     for name, facts in (("added", delta.added), ("replaced", delta.replaced)):
