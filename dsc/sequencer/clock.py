@@ -68,9 +68,9 @@ class LoopClock:
         finally:
             handle.cancel()
 
-    def call_at(self, due: float, call: Callable[[], object]) -> asyncio.TimerHandle:
+    def call_at(self, due: float, call: Callable[[], object]) -> ScheduledCall:
         """Schedule a call for second `due` of run time, or for the next loop iteration if `due` is past."""
-        return asyncio.get_running_loop().call_at(due + self._start, call)
+        return ScheduledCall(asyncio.get_running_loop(), due + self._start, call)
 
     def timeout_at(self, due: float) -> asyncio.Timeout:
         """Return a context manager that raises `TimeoutError` at second `due` of run time, or never for `math.inf`."""
@@ -114,6 +114,47 @@ class LoopClock:
         loop = asyncio.get_running_loop()
         if isinstance(loop, SimulatedEventLoop) and tasks_of in loop.real_input.attended:
             loop.real_input.attended.remove(tasks_of)
+
+
+class ScheduledCall:
+    """A call at a time of a loop; a late call lets earlier answers be received first.
+
+    After the computer slept, or a task blocked the loop, many calls and answers are due together, and the loop does not
+    know their order. A late call then waits `GRACE` seconds, so that a time limit does not discard an answer that came
+    before it.
+
+    Args:
+        loop: real or simulated; simulated time is never late.
+        due: seconds of the loop's time.
+        call: the call.
+
+    Attributes:
+        gives_way: whether the call was late and waits.
+    """
+
+    __slots__ = ("_call", "_due", "_handle", "_loop", "gives_way")
+    LATE = 0.1
+    """Seconds after which a call is late."""
+    GRACE = 0.05
+    """Seconds that a late call waits."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, due: float, call: Callable[[], object]) -> None:
+        self._loop = loop
+        self._due = max(due, loop.time())
+        self._call = call
+        self.gives_way = False
+        self._handle = loop.call_at(due, self._fire)
+
+    def cancel(self) -> None:
+        """Prevent the call."""
+        self._handle.cancel()
+
+    def _fire(self) -> None:
+        if self.gives_way or self._loop.time() - self._due < self.LATE:
+            self._call()
+            return
+        self.gives_way = True
+        self._handle = self._loop.call_later(self.GRACE, self._fire)
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dsc.engine.steps import Revoke, SendLater, Start
 from dsc.events import EVERY
 from dsc.messages import LateMessage, Message, SkillMessage, TimerMessage
-from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.clock import LoopClock, ScheduledCall
 
 MOST_AT_ONCE = 10_000
 """Upper bound of answers, timers and own events that a run handles at one simulated time.
@@ -68,7 +68,7 @@ class Timers:
     def __init__(self, clock: LoopClock, post: Callable[[TimerMessage | SendLater | LateMessage], None]) -> None:
         self._clock = clock
         self._post = post
-        self._pending: dict[int, tuple[TimerMessage | SendLater | LateMessage, float, asyncio.TimerHandle]] = {}
+        self._pending: dict[int, tuple[TimerMessage | SendLater | LateMessage, float, ScheduledCall]] = {}
         self._last = 0
 
     @property
@@ -82,7 +82,7 @@ class Timers:
         timers = [one.timer for one, _, _ in self if isinstance(one, TimerMessage)]
         return frozenset((timer.activation, timer.index) for timer in timers if timer.event == EVERY)
 
-    def __iter__(self) -> Iterator[tuple[TimerMessage | SendLater | LateMessage, float, asyncio.TimerHandle]]:
+    def __iter__(self) -> Iterator[tuple[TimerMessage | SendLater | LateMessage, float, ScheduledCall]]:
         """Iterate over scheduled messages, each with its second of run time and its handle."""
         return iter(self._pending.values())
 

@@ -19,7 +19,7 @@ from dsc.errors import PreemptedError, ProgrammingError
 from dsc.events import PREEMPTED, PROGRAMMING_ERROR, SKILL_ERROR
 from dsc.messages import SkillMessage
 from dsc.outcomes import Outcome
-from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.clock import LoopClock, ScheduledCall
 from dsc.sequencer.message_checks import failed, faulty, late, validated
 from dsc.sequencer.outbox import Configuring
 from dsc.skills import SkillSignature
@@ -123,7 +123,7 @@ class RunningSkill:
         self._raises = raises
         self._thread = threading.get_ident()
         self._holder: str | None = None
-        self._timer: asyncio.TimerHandle | None = None
+        self._timer: ScheduledCall | None = None
 
     # -- answers -----------------------------------------------------------------------------------------
 
@@ -258,8 +258,10 @@ class RunningSkill:
 
     @property
     def is_late(self) -> bool:
-        """Whether the deadline has passed before the loop could execute its timer, since a task blocked the loop."""
-        return not self._clock.simulated and self._clock.now() > self.due
+        """Whether the skill blocked the loop until after its deadline; a deadline that gives way waits for outcomes."""
+        if self._clock.simulated or (self._timer is not None and self._timer.gives_way):
+            return False
+        return self._clock.now() > self.due
 
     def begin_limit(self) -> None:
         """Schedule the end at second `due`."""

@@ -5,10 +5,14 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from dsc_runs import Ran
+from dsc_charts import plot
+from dsc_runs import SCHEMA, Arm, Ran
 
 from dsc import Component, Outcome, SkillCall, query, skill
-from knowledge_base import Delta, fact
+from dsc.dynamic.library import Library
+from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.sequencer import Sequencer
+from knowledge_base import Delta, KnowledgeBase, fact
 
 LIMITED = """
     plot: p
@@ -101,3 +105,67 @@ def test_the_next_skill_of_the_component_waits_for_the_clean_up_within_its_own_l
     ran = Ran(THEN.replace("SKILL", "slow").replace("LIMIT", str(limit)), arm=Tidy("raises"))
     assert outcomes(ran)[1:] == [(end, 13.0 if end == "ok" else 8.0)]
     assert ran.arm.log == ["clean at 13", *(["quick at 13"] if end == "ok" else [])]
+
+
+# -- after the computer slept ------------------------------------------------------------------------------
+
+
+class SleepyLoop(asyncio.SelectorEventLoop):
+    """A loop of real time on a computer that sleeps."""
+
+    slept = 0.0
+
+    def time(self):
+        return super().time() + self.slept
+
+    def sleep(self, seconds):
+        self.slept += seconds
+
+
+def ended_after_sleep(state, asleep=10.0):
+    """The outcome of a plot whose computer sleeps soon after the start."""
+
+    async def main():
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, SleepyLoop)
+        knowledge = KnowledgeBase(SCHEMA)
+        knowledge.apply(Delta(nodes={"cup1": "item"}), "test")
+        sequencer = Sequencer(Library([plot(SLEEPER % state)]), knowledge, [Arm()], LoopClock())
+        loop.call_later(0.02, loop.sleep, asleep)
+        return await sequencer.run("p")
+
+    with asyncio.Runner(loop_factory=SleepyLoop) as runner:
+        return [event.name for event in runner.run(main()).emitted]
+
+
+SLEEPER = """
+    plot: p
+    emits: {good: {}, bad: {}}
+    states:
+      a: %s
+      good: {final: true, emit: good}
+      bad: {final: true, emit: bad}
+"""
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        "{entry: {trigger: arm.grasp, with: {seconds: 4}, within: 5}, on: {grasped: good, timed_out: bad}}",
+        "{entry: {trigger: arm.grasp, with: {seconds: 4}}, after: {seconds: 5, to: bad}, on: {grasped: good}}",
+    ],
+)
+def test_an_outcome_that_was_due_before_a_limit_is_received_first(state):
+    assert ended_after_sleep(state) == ["good"]
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        "{entry: {trigger: arm.grasp, with: {seconds: 60}, within: 5}, on: {grasped: good, timed_out: bad}}",
+        "{entry: {trigger: arm.grasp, with: {seconds: 60}}, after: {seconds: 5, to: bad}, on: {grasped: good}}",
+        "{after: [{seconds: 5, to: bad}, {seconds: 6, to: good}]}",
+    ],
+)
+def test_a_limit_that_passed_ends_what_is_not_done(state):
+    assert ended_after_sleep(state) == ["bad"]
