@@ -235,7 +235,7 @@ class PlanningComponent(Component):
         """
         run = self._runs.required(plan)
         outage = await self._outages.over(run, why, call.clock)
-        return self._escalation.answer(run, why, outage=outage)
+        return await self._escalation.answer(run, why, outage=outage)
 
     async def _planned(
         self, call: SkillCall, goal: str, holder: str, seconds: float, replans: int, before: PlanRun | None

@@ -160,12 +160,13 @@ class Escalation:
     def _knowledge(self) -> KnowledgeBase:
         return self.plotting.knowledge
 
-    def answer(self, run: PlanRun, why: str, *, outage: bool = False) -> Repaired:
+    async def answer(self, run: PlanRun, why: str, *, outage: bool = False) -> Repaired:
         """Handle the failure of a plan; `outage` tells whether a device has failed, and not the step.
 
         Returns:
             The outcome of the skill `repair`.
         """
+        ordered = await self._ordered(run)
         if self._reached(run):
             return GoalHolds()
         progress, attempt = run.progress, run.attempt
@@ -177,13 +178,14 @@ class Escalation:
         failed = None if run.state is PlanState.STOPPED else self._failed_step(progress)
         if end is not None and (run.successor is not None if failed is None else failed not in end):
             attempt.completed()
-            return self._continued(run, end, why)
+            return self._continued(run, end, why, ordered=ordered)
         step, choice = self._chosen(run, failed, end, why, outage=outage)
         if step is EscalationStep.REPLAN and run.state is PlanState.MONITORED:
             self.records.failed(run.name, progress.steps_of(progress.running), why)
         if end is not None and step in (EscalationStep.RESUME, EscalationStep.OTHER_CANDIDATE):
             attempt.resumed[end[0]] += 1
-            return self._continued(run, end, why, choice if step is EscalationStep.OTHER_CANDIDATE else None)
+            instead_of = choice if step is EscalationStep.OTHER_CANDIDATE else None
+            return self._continued(run, end, why, instead_of, ordered=ordered)
         if step is EscalationStep.GIVE_UP:
             remedy = self._remedy(failed) if failed is not None and why.startswith(NOT_OBSERVED) else ""
             reason = f"{failed} has failed before, in the same way and the same situation: {why}{remedy}"
@@ -274,6 +276,7 @@ class Escalation:
         instead_of: str | None = None,
         *,
         keeping: bool = False,
+        ordered: PartialOrder | None = None,
     ) -> PlotFound:
         """Continue with `steps` without a planner call.
 
@@ -283,10 +286,13 @@ class Escalation:
             why: the reason.
             instead_of: the candidate that the first step tries last.
             keeping: whether running steps with which the new plan begins continue.
+            ordered: the partial order of a plan that may have the steps.
         """
         name = self._recorded(run, steps, why, instead_of)
         found = None if run.successor is None else run.successor.found
         known = None if found is None else found.known_order(steps, self._knowledge.version)
+        if known is None and ordered is not None and ordered.steps == steps:
+            known = ordered
         progress = None if found is None else found.known_progress(steps, self._knowledge.version)
         progress = progress or PlanProgress(steps, run.progress.domain, run.progress.goal)
         running = len(run.continuing(steps)) if keeping else 0
@@ -298,6 +304,19 @@ class Escalation:
         if keeping:
             again.take_over(run, running)
         return self.bound(again, order, form)
+
+    async def _ordered(self, run: PlanRun) -> PartialOrder | None:
+        """Return the partial order of the last steps that lead to the goal, computed outside of the event loop.
+
+        `None` if no steps lead to the goal, or if the successor knows its order.
+        """
+        end, version = self._end(run), self._knowledge.version
+        found = None if run.successor is None else run.successor.found
+        if not end or (found is not None and found.known_order(end, version) is not None):
+            return None
+        domain, world = self.plotting.derivation.original, self._knowledge.snapshot()
+        order = await self.search.aside(lambda: deordered(Plan(end), domain, world, run.goal))
+        return order if self._knowledge.version == version else None
 
     def _recorded(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None) -> str:
         """Record why other steps continue a plan, and return the name of their plot."""

@@ -344,7 +344,7 @@ class Search:
         for _ in range(MAX_ATTEMPTS):
             version, snapshot = self._knowledge.version, self._knowledge.snapshot()
             work = partial(self._judged, found, goal, snapshot, version)
-            judged = await self._aside(work, WorkLimit(seconds))
+            judged = await self.aside(work, WorkLimit(seconds))
             if version == self._knowledge.version:
                 return judged
         return self._judged(found, goal, self._knowledge.snapshot(), self._knowledge.version)
@@ -387,7 +387,7 @@ class Search:
             return repaired
         patience, durations = WorkLimit(budget.left), not self._clock.simulated and bool(timing())
         try:
-            problem = await self._aside(
+            problem = await self.aside(
                 lambda: build_problem(self._domain, snapshot, goal, durations=durations, patience=patience), patience
             )
         except WorkLimitError as error:
@@ -405,10 +405,10 @@ class Search:
         missing: tuple[str, ...] = ()
         left = WorkLimit(budget.left)
         with contextlib.suppress(WorkLimitError):  # the explanation takes too long; the reason of the planner suffices
-            missing = await self._aside(lambda: why_unsolvable(self._domain, snapshot, goal, left), left)
+            missing = await self.aside(lambda: why_unsolvable(self._domain, snapshot, goal, left), left)
         return NotFound("unsolvable", "; ".join(missing) or answer.reason)
 
-    async def _aside(self, work: Callable[[], _Result], patience: WorkLimit | None = None) -> _Result:
+    async def aside(self, work: Callable[[], _Result], patience: WorkLimit | None = None) -> _Result:
         """Call `work` in a thread; a cancellation ends the wait, and simulated time stops during the call."""
         with self._clock.hold():
             return await aside(work, patience)
@@ -429,7 +429,7 @@ class Search:
         """Return a local repair of the plan `before`; `TimedOut` at the time limit, or `None` without a repair."""
         excluded, patience = self._excluded_now(), WorkLimit(seconds)
         try:
-            how = await self._aside(
+            how = await self.aside(
                 lambda: local_repair(before, excluded, self._domain, snapshot, goal, patience), patience
             )
         except WorkLimitError:
@@ -440,9 +440,7 @@ class Search:
         answer, _ = await self._planner.solve(without(how.problem, excluded), seconds, going_on=False)
         if not isinstance(answer, PlanFound):
             return answer if isinstance(answer, TimedOut) else None
-        plan = await self._aside(
-            lambda: how.repaired(answer.plan, before.remaining_steps, self._domain, snapshot, goal)
-        )
+        plan = await self.aside(lambda: how.repaired(answer.plan, before.remaining_steps, self._domain, snapshot, goal))
         return None if plan is None else Found(replace(answer, plan=plan), kept=_equal_at_end(plan.steps, how.end))
 
     def _excluded_now(self) -> set[PlanStep]:
@@ -455,7 +453,7 @@ class Search:
         if foresight is None:
             return Validation(valid=True)
         world, plan = self._knowledge.snapshot(), found.answer.plan
-        verdict = await self._aside(lambda: foresight.foresee(plan, world))
+        verdict = await self.aside(lambda: foresight.foresee(plan, world))
         if not verdict.valid:
             step = None if verdict.failing_step is None else plan.steps[verdict.failing_step]
             self._records.rejected(step, verdict.why, found.answer.engine)

@@ -129,6 +129,37 @@ def test_what_two_need_is_off_when_neither_does():
     ]
 
 
+class Choosy(Device):
+    """Its needs follow from what is plugged in."""
+
+    plugged = ("power",)
+
+    def __init__(self, name, log, error=None):
+        super().__init__(name, log)
+        self.error = error
+
+    def needed(self):
+        if self.error is not None:
+            error, self.error = self.error, None
+            raise error
+        return self.plugged
+
+
+def test_needs_that_a_hook_returns_are_on_while_a_state_uses_the_component():
+    log: Log = []
+    end, _ = ran(LOOK, Choosy("camera", log), Device("power", log))
+    assert end.finished
+    assert log.index((0, "power on")) < log.index((0, "camera on"))
+
+
+def test_needs_that_a_device_could_not_tell_once_are_asked_again():
+    log: Log = []
+    text = LOOK.replace("skill_error: {to: e, emit: failed, with: {why: ?event.reason}}", "skill_error: a")
+    end, _ = ran(text, Choosy("camera", log, OSError("no answer")), Device("power", log))
+    assert end.finished
+    assert "power on" in [what for _, what in log]
+
+
 MAP = """
     plot: p
     states:

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import sys
+import threading
 import time
 
 import pytest
@@ -15,6 +16,7 @@ from dsc.trace import Record
 from knowledge_base import Delta, fact
 from planning import Executive, Plan, PlannerProcess, PlanStep
 from planning.execution.plan_records import why_broken
+from planning.ordering.causal_tracing import deordered
 from planning.plan import EngineFailed, PlanFound
 from planning.validation import Validation
 
@@ -63,6 +65,20 @@ def test_a_failure_that_leaves_the_plan_valid_needs_no_planner():
     assert len(run.planner.asked) == 1
     (resumed,) = run.said("resumed")
     assert (resumed["step"], resumed["why"], resumed["after"]) == ("(go b c)", "failed", "plan_1")
+
+
+def test_the_order_of_a_plan_that_continues_is_computed_outside_of_the_event_loop(monkeypatch):
+    threads = []
+
+    def noted(*given):
+        threads.append(threading.current_thread())
+        return deordered(*given)
+
+    monkeypatch.setattr("planning.execution.repair.deordered", noted)
+    run = Run("(in cup c)", {"(go b c)": [FAILED]})
+    assert run.how == "reached"
+    assert len(threads) == 1
+    assert threads[0] is not threading.main_thread()
 
 
 def test_what_was_not_observed_in_time_is_done_again_without_the_planner():
