@@ -143,3 +143,19 @@ def test_the_causes_of_cancelled_skills_do_not_accumulate_in_the_store(tmp_path:
     with archive(tmp_path / "run.kb") as runs:
         assert runs.run().ended
     assert causes[0] <= 1_001
+
+
+def test_an_answer_after_a_restart_is_caused_by_the_start_of_its_skill(tmp_path: Path) -> None:
+    alive = tmp_path / "alive"
+    alive.mkdir()
+    text = """
+        plot: p
+        states:
+          a: {entry: {trigger: robot.work, with: {seconds: 20}}, on: {did: e}}
+          e: {final: true}
+    """
+    whole = Run(alive, [text], prepare=lambda _: at(2, copying(alive, "copy")))
+    resumed = Run(tmp_path / "copy", [text], resume=True)
+    (start,) = [one.seq for one in whole.records if one.type == "action" and one.data["action"] == "start"]
+    for run in (whole, resumed):
+        assert [one.cause for one in run.records if one.type == "event" and one.data["name"] == "did"] == [start]

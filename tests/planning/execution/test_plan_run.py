@@ -56,6 +56,12 @@ def test_running_steps_continue_with_which_a_successor_begins():
     assert run.continuing(ROUND_ABOUT) == ()
 
 
+def test_a_successor_that_is_shortened_keeps_its_name():
+    run = plan_run(successor=Successor(ROUND_ABOUT, name="plan_2", kept=1))
+    assert run.shortened(ROUND_ABOUT[1:]) == Successor(ROUND_ABOUT[1:], name="plan_2", kept=1)
+    assert plan_run().shortened(STEPS[1:]) == Successor(STEPS[1:])
+
+
 SIDE_BY_SIDE = PlanStep("take", ("cup", "a"))
 
 

@@ -52,6 +52,12 @@ def test_going_on_at_the_same_step_is_bounded_whatever_the_situation():
     assert attempt.interrupted(None) is EscalationStep.REPLAN
 
 
+def test_new_plans_and_disturbances_by_others_have_their_own_budgets():
+    attempt = Attempt()
+    assert [attempt.replan(2, disturbed=True) for _ in range(3)] == [True, True, False]
+    assert [attempt.replan(1, disturbed=False) for _ in range(2)] == [True, False]
+
+
 DOMAIN = PlanningDomain.parse("""
 (define (domain places)
   (:types room)
