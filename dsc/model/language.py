@@ -11,13 +11,14 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, Generic, Self, TypeVar
+from typing import Annotated, Any, Generic, Self, TypeVar, cast
 
 from pydantic import (
     ConfigDict,
     Discriminator,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
+    PlainSerializer,
     PlainValidator,
     PrivateAttr,
     WithJsonSchema,
@@ -120,7 +121,12 @@ def _term(value: Any) -> Term:
         return Constant(value)
     if not isinstance(value, str):
         raise ValueError(f"a value was expected: a constant, ?variable or (+ ?n 1); found {value!r}")
-    return _read(parse_term, value) if value.startswith(("?", "(")) else _named(value)
+    return _read(parse_term, value) if value.startswith(("?", "(")) or _is_quoted(value) else _named(value)
+
+
+def _is_quoted(text: str) -> bool:
+    """Return whether the text has quotes as in a condition; its value is the text inside them."""
+    return len(text) > 1 and text[0] == text[-1] == '"'
 
 
 @lru_cache(maxsize=4096)  # most names repeat in a sequence of plots, e.g. those made from plans
@@ -151,7 +157,19 @@ def _text_out(part: Expression | Effect) -> str:
 
 
 def _term_out(term: Term) -> Any:
-    return term.value if isinstance(term, Constant) else to_text(term)
+    if not isinstance(term, Constant):
+        return to_text(term)
+    if isinstance(term.value, str) and term.value.startswith(("?", "(")):
+        return _in_quotes(term.value)
+    return _setting_out(term.value)
+
+
+def _setting_out(value: Value) -> Value:
+    return _in_quotes(value) if isinstance(value, str) and _is_quoted(value) else value
+
+
+def _in_quotes(text: str) -> str:
+    return to_text(Constant(text, quoted=True))
 
 
 def constant(value: Value) -> Constant:
@@ -162,6 +180,8 @@ def constant(value: Value) -> Constant:
 def _setting(value: object) -> Value:
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"a finite number was expected; found {value!r}")
+    if isinstance(value, str) and _is_quoted(value):
+        return cast("Constant", _read(parse_term, value)).value
     if isinstance(value, str | int | float | bool):
         return value
     raise ValueError(f"a number, a text or a truth value was expected; found {value!r}")
@@ -187,8 +207,13 @@ class _Text(Generic[_Part]):
         return dict(self.description)
 
 
-Setting = Annotated[Value, PlainValidator(_setting), WithJsonSchema({"type": ["string", "number", "boolean"]})]
-"""Field type of a constant value."""
+Setting = Annotated[
+    Value,
+    PlainValidator(_setting),
+    PlainSerializer(_setting_out),
+    WithJsonSchema({"type": ["string", "number", "boolean"]}),
+]
+"""Field type of a constant value; a text may have quotes, as in a condition."""
 
 ConditionField = Annotated[
     Expression,

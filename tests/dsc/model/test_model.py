@@ -467,3 +467,39 @@ def test_rules_with_equal_responses_are_told_apart_by_name_or_number():
     assert [one.label for one in plot.rules[2].continuations] == ["last resort", "last resort, give_up"]
     assert [one.label for one in plot.handlers] == ["handler low: go", "handler low: go (2)"]
     assert ActionPlot.model_validate(plot.to_form()) == plot
+
+
+QUOTED = """
+    plot: p
+    variables: {t: {type: text, initial: '"two words"'}, u: {type: text, initial: two words}}
+    parameters: {mood: {type: text, default: '"very good"', among: [very good, '"bad"']}}
+    emits: {said: {what: text}}
+    states:
+      a:
+        entry: {trigger: voice.say, with: {a: '"off I go"', b: off I go, c: '"(not a call)"', d: '"say \\"hi\\""'}}
+        on: {done: {to: b, assign: {t: '"hi"'}, emit: said, with: {what: '"hi"'}}}
+      b: {select: ?t, cases: {'"hi"': e}, else: e}
+      e: {final: true}
+"""
+
+
+def test_a_text_in_quotes_is_the_text_wherever_a_value_is_written():
+    found = plot(QUOTED)
+    trigger = found.states["a"].entry[0]
+    assert [term.value for term in trigger.arguments.values()] == ["off I go", "off I go", "(not a call)", 'say "hi"']
+    assert found.variables["t"].initial == found.variables["u"].initial
+    assert (found.parameters["mood"].default.value, found.parameters["mood"].among) == (
+        "very good",
+        ("very good", "bad"),
+    )
+    (way,) = found.states["a"].on["done"]
+    assert ActionPlot.model_validate(found.to_form()) == found
+    assert (way.assign["t"].value, way.arguments["what"].value) == ("hi", "hi")
+
+
+@PROPERTY
+@given(st.text(st.sampled_from('"\\(?a 1'), max_size=6))
+def test_a_text_survives_being_written_in_a_plot(text):
+    state = State(entry=[Trigger(trigger="voice.say", arguments={"a": Constant(text, quoted=True)})])
+    made = ActionPlot(name="p", states={"a": state})
+    assert parse_plot(plot_to_yaml(made)).states["a"].entry[0].arguments["a"].value == text
