@@ -11,6 +11,7 @@ from typing import Any
 
 from dsc.dynamic.rule_expansion import expand
 from dsc.engine.tables import CompiledPlot, compile_plot
+from dsc.events import RESERVED
 from dsc.model.plot import ActionPlot
 from dsc.model.ranges import Who
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
@@ -34,6 +35,7 @@ class Library:
         self._compiled: dict[str, CompiledPlot] = {}
         self._bound: dict[str, CompiledPlot] = {}
         self._made: dict[str, ActionPlot] = {}
+        self._heard: frozenset[str] | None = None
         if isinstance(plots, ActionPlot | str) or not isinstance(plots, Iterable):
             raise InputError(f"a library is made of a list of plots, not of {shown(plots)[:60]}")
         for plot in plots:
@@ -61,6 +63,7 @@ class Library:
                 f"two different plots are named '{plot.name}'", place=plot.place(("plot",)), found=plot.name
             )
         self._plots[plot.name] = plot
+        self._heard = None
 
     def plot(self, name: str) -> ActionPlot:
         """Return the plot of that name, without expansion; raise `UnknownNameError` if there is none."""
@@ -68,6 +71,14 @@ class Library:
         if found is None:
             raise UnknownNameError(f"there is no plot '{name}'", found=name, valid=self._plots)
         return found
+
+    def require_receiver(self, event: str) -> None:
+        """Raise `UnknownNameError` if no plot has a reaction to the event; SCXML plots match events by prefix."""
+        if self._heard is None:
+            self._heard = frozenset[str]().union(*(plot.heard() for plot in self))
+        if event not in self._heard and all(plot.dialect == "dsc" for plot in self):
+            valid = self._heard - RESERVED
+            raise UnknownNameError(f"no plot receives the event '{event}'", found=event, valid=valid)
 
     def substitute(self, name: str, plot: ActionPlot) -> Library:
         """Return a new library in which `plot` replaces the plot of that name; this library is unchanged.

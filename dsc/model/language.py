@@ -121,7 +121,12 @@ def _term(value: Any) -> Term:
         return Constant(value)
     if not isinstance(value, str):
         raise ValueError(f"a value was expected: a constant, ?variable or (+ ?n 1); found {value!r}")
-    return _read(parse_term, value) if value.startswith(("?", "(")) or _is_quoted(value) else _named(value)
+    is_read = value[:1] in _MARKS and (value[0] != '"' or _is_quoted(value))
+    return _read(parse_term, value) if is_read else _named(value)
+
+
+_MARKS = frozenset('?("')
+"""First characters of a term that is not the text itself."""
 
 
 def _is_quoted(text: str) -> bool:
@@ -159,9 +164,8 @@ def _text_out(part: Expression | Effect) -> str:
 def _term_out(term: Term) -> Any:
     if not isinstance(term, Constant):
         return to_text(term)
-    if isinstance(term.value, str) and term.value.startswith(("?", "(")):
-        return _in_quotes(term.value)
-    return _setting_out(term.value)
+    value = term.value
+    return _in_quotes(value) if isinstance(value, str) and value[:1] in _MARKS else value
 
 
 def _setting_out(value: Value) -> Value:

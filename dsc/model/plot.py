@@ -22,6 +22,7 @@ from dsc.model.states import (
     HistoryState,
     OrthogonalState,
     Region,
+    State,
     SubmachineState,
 )
 from knowledge_base._notebook import svg_by
@@ -193,6 +194,12 @@ class ActionPlot(Written):
     def walk(self) -> Iterator[tuple[str, AnyState, Path]]:
         """Yield name, state and path of every state at any depth, in document order."""
         yield from _walk(self.states, ("states",))
+
+    def heard(self) -> frozenset[str]:
+        """Return the names of the events that the plot declares under `receives`, or for which it has a reaction."""
+        ways = (event for _, state, _ in self.walk() if isinstance(state, State) for event in state.on)
+        rules, handlers = (rule.on for rule in self.rules if rule.on), (handler.on for handler in self.handlers)
+        return frozenset((*self.receives, *ways, *rules, *handlers))
 
     def scopes(self) -> Iterator[Scope]:
         """Yield the scopes: the plot, then each composite state and region. A transition must not leave its scope."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsc.calls import OBSERVED
@@ -237,13 +237,13 @@ def require_seconds(after: object) -> None:
         raise InputError(f"a delay is a finite number of seconds, not {shown(after)}")
 
 
-def checked_event(said: object, plots: Iterable[ActionPlot], knowledge: KnowledgeBase) -> Event:
+def checked_event(said: object, plots: Library, knowledge: KnowledgeBase) -> Event:
     """Return the event with copied attributes, which fit the declaration under `receives` of at least one plot.
 
     Raises:
         InputError: the value is not an event, only the executive fires the event, or an attribute is not plain data.
             An attribute may also be missing, have another type, or name a missing object.
-        UnknownNameError: the plots that receive the event do not declare an attribute.
+        UnknownNameError: no plot receives the event, or the plots that receive it do not declare an attribute.
     """
     plain = isinstance(said, Event) and said.attributes is NO_ATTRIBUTES  # the common case
     if not isinstance(said, Event) or not (plain or isinstance(said.attributes, Mapping)):
@@ -264,6 +264,7 @@ def checked_event(said: object, plots: Iterable[ActionPlot], knowledge: Knowledg
     else:
         if errors:
             raise errors[0]
+        plots.require_receiver(said.name)  # none declares the event
     if plain:
         return said
     copied = _copied(attributes, f"the attributes of '{said.name}'") if attributes else NO_ATTRIBUTES

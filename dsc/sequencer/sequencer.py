@@ -146,6 +146,7 @@ class Sequencer:
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of)
         self._open_ended = open_ended
+        self._over = False
         self._until = until
         self._failures = failures
         self._last_late = store.last_late if store is not None else 0
@@ -201,9 +202,13 @@ class Sequencer:
 
         Raises:
             InputError: only the executive itself fires the event, e.g. `done`, or an attribute is not plain data. The
-                error is also raised if the plots that receive the event declare other attributes or types.
+                error is also raised if the plots that receive the event declare other attributes or types, or if the
+                run has ended.
+            UnknownNameError: no plot receives the event.
             StoreError: the store cannot be written.
         """
+        if self._over:
+            raise InputError("the run has ended and receives nothing")
         self._hand_in(message_checks.checked_event(event, self.library, self.knowledge), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
@@ -279,6 +284,7 @@ class Sequencer:
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]], bugs: Iterable[str]) -> RunEnd:
         reactor, machine, inbox = self._reactor, self._reactor.machine, self._inbox
+        self._over = False
         # The tracer subscribes before skills do, so that consequences of a change are recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
         livelock = LivelockGuard(self.clock) if self.clock.simulated else None
@@ -308,6 +314,7 @@ class Sequencer:
                 self._keep_end()
             raise
         finally:
+            self._over = True
             if limit is not None:
                 limit.cancel()
             try:

@@ -21,7 +21,7 @@ FETCH = plot(
     """
     plot: fetch
     parameters: {item: item}
-    receives: {stop: }
+    receives: {stop: , hello: }
     emits: {fetched: {item: item}, stopped: }
     states:
       work:

@@ -443,7 +443,7 @@ def test_whoever_listens_is_told_every_step_before_its_actions_leave():
 
     heard: list[tuple[Any, list[str]]] = []
     arm = Arm()
-    ran = Ran(GRASP, arm=arm, prepare=prepare)
+    ran = Ran(GRASP.replace("emits:", "receives: {nonsense: }\n    emits:"), arm=arm, prepare=prepare)
     assert ran.end.finished
     assert [(step.event and step.event.name, step.moved) for step, _ in heard] == [
         (None, True), ("nonsense", False), (None, False), ("grasped", True),
@@ -466,7 +466,7 @@ def test_a_run_waits_for_what_is_still_to_come_and_for_no_longer():
         sequencer.post(Event("nonsense"), after=9)
         sequencer.change(Delta(added=(Fact("q"),)), "somebody", after=20)
 
-    text = "{plot: p, receives: {go: }, states: {a: {on: {go: e}, always: {to: b, when: (q)}}, b: {on: {go: e}}, e: {final: true}}}"
+    text = "{plot: p, receives: {go: , nonsense: }, states: {a: {on: {go: e}, always: {to: b, when: (q)}}, b: {on: {go: e}}, e: {final: true}}}"
     ran = Ran(text, prepare=prepare)
     assert ran.end.problem == "deadlock: no skill, timer or event is pending"
     assert ran.at == pytest.approx(20)
@@ -474,7 +474,7 @@ def test_a_run_waits_for_what_is_still_to_come_and_for_no_longer():
 
 
 def test_what_is_still_to_come_when_a_run_ends_is_dropped():
-    ran = Ran(GRASP, prepare=lambda sequencer: sequencer.post(Event("stop"), after=50))
+    ran = Ran(GRASP, prepare=lambda sequencer: sequencer.post(Event("slipped"), after=50))
     assert ran.end.finished
     assert ran.at == pytest.approx(2)
     assert [event["name"] for event in ran.of_type("event")] == ["grasped"]
@@ -484,7 +484,9 @@ def test_what_was_still_to_come_does_not_come_in_the_next_run():
     heard: list[Any] = []
 
     async def main():
-        waits = Library([plot("{plot: p, states: {a: {after: {seconds: 3, to: e}}, e: {final: true}}}")])
+        waits = Library(
+            [plot("{plot: p, receives: {stop: }, states: {a: {after: {seconds: 3, to: e}}, e: {final: true}}}")]
+        )
         sequencer = Sequencer(waits, KnowledgeBase(SCHEMA), [], LoopClock())
         sequencer.listen(heard.append)
         sequencer.post(Event("stop"), after=4)
@@ -586,3 +588,25 @@ def test_an_observation_with_one_fact_removed_and_added_is_true_as_in_an_effect(
     ran = Ran(text, things=["cup1"], arm=Wanderer())
     assert ran.end.finished
     assert ran.kb.ask("(seen cup1)")
+
+
+def test_an_event_that_no_plot_receives_is_refused_with_the_nearest_name():
+    refused = []
+
+    def prepare(sequencer):
+        for name in ("delivr", "grasped", "deliver"):
+            try:
+                sequencer.post(Event(name, {"parcel": "cup1", "floor": 2} if name == "deliver" else {}), after=1)
+            except UnknownNameError as error:
+                refused.append(str(error))
+
+    ran = Ran(RECEIVES, things=["cup1"], prepare=prepare)
+    assert ran.end.finished
+    assert refused[0] == "no plot receives the event 'delivr'; did you mean 'deliver'?"
+    assert len(refused) == 2
+
+
+def test_an_event_after_the_end_is_refused():
+    ran = Ran(GRASP, things=["cup1"])
+    with pytest.raises(InputError, match="the run has ended and receives nothing"):
+        ran.sequencer.post(Event("grasped"))
