@@ -152,6 +152,27 @@ def test_needs_that_a_hook_returns_are_on_while_a_state_uses_the_component():
     assert log.index((0, "power on")) < log.index((0, "camera on"))
 
 
+class Tuned(Component):
+    """It needs what it is tuned to, and has no activity of its own."""
+
+    name = "radio"
+
+    def needed(self):
+        return ("power",)
+
+    @skill
+    async def look(self, call, seconds: float = 5.0) -> Looked:
+        await call.clock.sleep(seconds)
+        return Looked()
+
+
+def test_needs_of_a_component_without_an_activity_are_on_while_a_state_uses_it():
+    log: Log = []
+    end, _ = ran(LOOK.replace("camera", "radio"), Tuned(), Device("power", log))
+    assert end.finished
+    assert [one for one in log if one[1] in {"power on", "power off"}][:2] == [(0, "power on"), (10, "power off")]
+
+
 def test_needs_that_a_device_could_not_tell_once_are_asked_again():
     log: Log = []
     text = LOOK.replace("skill_error: {to: e, emit: failed, with: {why: ?event.reason}}", "skill_error: a")
