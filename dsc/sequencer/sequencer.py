@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
-from contextlib import nullcontext
+from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any, Generic, cast
 
@@ -17,7 +17,7 @@ from dsc.engine.machine import Machine
 from dsc.engine.steps import Output, Start
 from dsc.errors import ProgrammingError
 from dsc.events import GAVE_UP, NO_PLAN, Event
-from dsc.messages import FromOutside, LateMessage, Message, SkillMessage
+from dsc.messages import FromOutside, KnowledgeMessage, LateMessage, Message, SkillMessage
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer import message_checks
@@ -32,7 +32,7 @@ from dsc.sequencer.watchdog import watched
 from dsc.trace import Trace
 from knowledge_base._notebook import table
 from knowledge_base.errors import InputError, StoreError
-from knowledge_base.facts import Delta
+from knowledge_base.facts import Change, Delta
 from knowledge_base.store import KnowledgeBase
 
 _MOST_GROUPED = 100
@@ -147,6 +147,8 @@ class Sequencer:
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of)
         self._open_ended = open_ended
         self._over = False
+        self._reacts = False  # changes of knowledge are then the run's own
+        self._wake_up: KnowledgeMessage | None = None  # the latest message for waiting guards
         self._until = until
         self._failures = failures
         self._last_late = store.last_late if store is not None else 0
@@ -279,18 +281,30 @@ class Sequencer:
         is_part = self.dispatcher.is_part  # the sequencer around it has a watchdog
         watch = nullcontext() if is_part else watched(self.dispatcher.skill_of, Sequencer._until_end.__code__)
         unfinished = unfinished_at_second_signal(self.dispatcher.unfinished)
-        with programming_errors() as bugs, unheard_errors(bugs), watch, unfinished:
+        with programming_errors() as bugs, unheard_errors(bugs), watch, unfinished, self._receiving():
             return await self._until_end(begin, bugs)
+
+    @contextmanager
+    def _receiving(self) -> Iterator[None]:
+        """Receive events and changes of knowledge inside the block."""
+        self._over = False
+        self._reacts = True  # until the start is complete
+        unsubscribe = self.knowledge.subscribe(self._changed)
+        try:
+            yield
+        finally:
+            unsubscribe()
+            self._over = True
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]], bugs: Iterable[str]) -> RunEnd:
         reactor, machine, inbox = self._reactor, self._reactor.machine, self._inbox
-        self._over = False
         # The tracer subscribes before skills do, so that consequences of a change are recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
         livelock = LivelockGuard(self.clock) if self.clock.simulated else None
         limit = self.clock.call_at(self._until, self._expire) if math.isfinite(self._until) else None
         try:
             await begin()
+            self._reacts = False
             while not machine.state.finished and reactor.problem is None:
                 if not inbox.waiting:
                     if self._is_deadlock():
@@ -304,7 +318,9 @@ class Sequencer:
                 if livelock is not None and (problem := livelock.problem(message)):
                     reactor.problem = problem
                     break
+                self._reacts = True
                 self._take(message)
+                self._reacts = False
         except asyncio.CancelledError:  # cancelled from outside; after a crash, this handler does not run
             reactor.problem = reactor.problem or "it was cancelled"
             if self.store is not None and ending_signal() and self.on_signal == "suspend":
@@ -314,7 +330,6 @@ class Sequencer:
                 self._keep_end()
             raise
         finally:
-            self._over = True
             if limit is not None:
                 limit.cancel()
             try:
@@ -328,8 +343,7 @@ class Sequencer:
         unanswered = (bug for bug in bugs if bug not in reactor.answered_bugs)
         bug = reactor.programming_error = reactor.programming_error or next(unanswered, None)
         outputs = reactor.outputs if reactor.finished else {}
-        last = reactor.emitted[-1].name if reactor.emitted else None
-        failure = last if last in self._failures else None
+        failure = next((last.name for last in reactor.emitted[-1:] if last.name in self._failures), None)
         end = RunEnd(reactor.finished, reactor.emitted, reactor.problem, outputs, bug, failure)
         self.trace.record(
             "end", finished=end.finished, reached=end.reached, problem=end.problem, reason=end.reason,
@@ -398,6 +412,19 @@ class Sequencer:
             output = reactor.start(plot, arguments, serials)
             self._keep_step(None, output)
         self._carry_out(output)
+
+    def _changed(self, change: Change) -> None:
+        """Receive a change of knowledge from any thread."""
+        self.clock.calls.call(self._wake, change.author)
+
+    def _wake(self, author: str) -> None:
+        """Let waiting guards be evaluated after a change of knowledge that is not the run's own."""
+        root = self.machine.state.root
+        if self._reacts or root is None or not any(frame.configuration.spontaneous for frame in root.frames()):
+            return
+        if not any(one is self._wake_up for one in self._inbox.waiting):
+            self._wake_up = KnowledgeMessage(Delta(), author)
+            self._inbox.put(self._wake_up)
 
     def _take(self, message: Message) -> None:
         if isinstance(message, SkillMessage):

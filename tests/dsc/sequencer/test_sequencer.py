@@ -610,3 +610,54 @@ def test_an_event_after_the_end_is_refused():
     ran = Ran(GRASP, things=["cup1"])
     with pytest.raises(InputError, match="the run has ended and receives nothing"):
         ran.sequencer.post(Event("grasped"))
+
+
+WAITS = """
+    plot: p
+    receives: {quit: }
+    states:
+      a: {always: {to: e, when: (and (p) (q))}, on: {quit: e}}
+      e: {final: true}
+"""
+
+
+def told_by_the_program(*predicates, text=WAITS):
+    """The end and the steps of a run whose program changes the knowledge base itself, one fact per second."""
+
+    async def main():
+        kb = KnowledgeBase(SCHEMA)
+        sequencer = Sequencer(Library([plot(text)]), kb, [], LoopClock(), open_ended=True)
+        steps: list[Any] = []
+        sequencer.listen(steps.append)
+        loop = asyncio.get_running_loop()
+        for second, predicate in enumerate(predicates, 1):
+            loop.call_later(second, kb.apply, Delta(added=(Fact(predicate),)), "program")
+        sequencer.post(Event("quit"), after=60)
+        return await sequencer.run("p"), sequencer.clock.now(), steps
+
+    return run_simulated(main())
+
+
+def test_a_waiting_guard_is_evaluated_after_a_change_by_the_program_itself():
+    end, at, steps = told_by_the_program("q", "p")
+    assert (end.finished, at) == (True, 2)
+    assert len(steps) == 3
+
+
+def test_a_change_by_the_program_wakes_no_plot_that_waits_for_events_only():
+    end, at, steps = told_by_the_program("q", "p", text=WAITS.replace("always: {to: e, when: (and (p) (q))}, ", ""))
+    assert (end.finished, at) == (True, 60)
+    assert len(steps) == 2
+
+
+def test_a_change_by_another_thread_wakes_a_waiting_guard():
+    async def main():
+        kb = KnowledgeBase(SCHEMA)
+        sequencer = Sequencer(Library([plot(WAITS)]), kb, [], LoopClock(), open_ended=True)
+        change = Delta(added=(Fact("p"), Fact("q")))
+        sequencer.post(Event("quit"), after=60)
+        _, end = await asyncio.gather(asyncio.to_thread(kb.apply, change, "thread"), sequencer.run("p"))
+        return end, sequencer.clock.now()
+
+    end, at = run_simulated(main())
+    assert (end.finished, at) == (True, 0)
