@@ -18,10 +18,7 @@ from pydantic import (
     Discriminator,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
-    PlainSerializer,
-    PlainValidator,
     PrivateAttr,
-    WithJsonSchema,
 )
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
@@ -121,15 +118,14 @@ def _term(value: Any) -> Term:
         return Constant(value)
     if not isinstance(value, str):
         raise ValueError(f"a value was expected: a constant, ?variable or (+ ?n 1); found {value!r}")
-    is_read = value[:1] in _MARKS and (value[0] != '"' or _is_quoted(value))
-    return _read(parse_term, value) if is_read else _named(value)
+    return _read(parse_term, value) if value.startswith(("?", "(")) or is_quoted(value) else _named(value)
 
 
 _MARKS = frozenset('?("')
 """First characters of a term that is not the text itself."""
 
 
-def _is_quoted(text: str) -> bool:
+def is_quoted(text: str) -> bool:
     """Return whether the text has quotes as in a condition; its value is the text inside them."""
     return len(text) > 1 and text[0] == text[-1] == '"'
 
@@ -169,7 +165,7 @@ def _term_out(term: Term) -> Any:
 
 
 def _setting_out(value: Value) -> Value:
-    return _in_quotes(value) if isinstance(value, str) and _is_quoted(value) else value
+    return _in_quotes(value) if isinstance(value, str) and is_quoted(value) else value
 
 
 def _in_quotes(text: str) -> str:
@@ -184,7 +180,7 @@ def constant(value: Value) -> Constant:
 def _setting(value: object) -> Value:
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"a finite number was expected; found {value!r}")
-    if isinstance(value, str) and _is_quoted(value):
+    if isinstance(value, str) and is_quoted(value):
         return cast("Constant", _read(parse_term, value)).value
     if isinstance(value, str | int | float | bool):
         return value
@@ -211,12 +207,7 @@ class _Text(Generic[_Part]):
         return dict(self.description)
 
 
-Setting = Annotated[
-    Value,
-    PlainValidator(_setting),
-    PlainSerializer(_setting_out),
-    WithJsonSchema({"type": ["string", "number", "boolean"]}),
-]
+Setting = Annotated[Value, _Text(_setting, _setting_out, {"type": ["string", "number", "boolean"]})]
 """Field type of a constant value; a text may have quotes, as in a condition."""
 
 ConditionField = Annotated[

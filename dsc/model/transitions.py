@@ -14,7 +14,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, field_validator, mo
 from pydantic_core import PydanticCustomError
 
 from dsc.model.actions import Assign, Emit, Internal, InternalAction, Tell, flat
-from dsc.model.language import ConditionField, EffectField, Frozen, TermField
+from dsc.model.language import ConditionField, EffectField, Frozen, TermField, is_quoted
 from dsc.model.reading import LOCATED, FormPath
 from knowledge_base.facts import Value
 from knowledge_base.language.syntax.expression import And, Comparison, Constant, Term
@@ -217,8 +217,7 @@ def case_value(key: str) -> Value:
     """Return the constant for a key of `cases`: number for `1`, truth value for `true`, text for `"1"` or `cup`."""
     if is_number(key):
         return _number(key)
-    quoted = len(key) > 1 and key[0] == key[-1] == '"'
-    return TRUTH_VALUES.get(key, key[1:-1] if quoted else key)
+    return TRUTH_VALUES.get(key, key[1:-1] if is_quoted(key) else key)
 
 
 def _number(text: str) -> int | float:

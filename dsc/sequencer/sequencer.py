@@ -343,8 +343,7 @@ class Sequencer:
         unanswered = (bug for bug in bugs if bug not in reactor.answered_bugs)
         bug = reactor.programming_error = reactor.programming_error or next(unanswered, None)
         outputs = reactor.outputs if reactor.finished else {}
-        failure = next((last.name for last in reactor.emitted[-1:] if last.name in self._failures), None)
-        end = RunEnd(reactor.finished, reactor.emitted, reactor.problem, outputs, bug, failure)
+        end = RunEnd(reactor.finished, reactor.emitted, reactor.problem, outputs, bug, self._failure())
         self.trace.record(
             "end", finished=end.finished, reached=end.reached, problem=end.problem, reason=end.reason,
             outputs=end.outputs, programming_error=bug,
@@ -360,6 +359,12 @@ class Sequencer:
         with nullcontext() if self.store is None else self.store.writing:
             for message in messages:
                 self._reactor.observe(self._validated(message))
+
+    def _failure(self) -> str | None:
+        """Return the last outcome of the plot if it is declared as a failure."""
+        emitted = self._reactor.emitted
+        last = emitted[-1].name if emitted else None
+        return last if last in self._failures else None
 
     async def _news(self) -> None:
         """Wait for the next message, or for the end of the run.

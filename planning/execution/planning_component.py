@@ -18,7 +18,6 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.syntax.text import parse_condition
-from planning.cancellable_work import aside
 from planning.execution.monitoring import Monitoring
 from planning.execution.outages import Outages
 from planning.execution.outcomes import (
@@ -276,8 +275,7 @@ class PlanningComponent(Component):
                 attempt.disturbances += 1
             run = PlanRun(self._runs.new_name(), wanted, progress, attempt, holder, seconds, replans, found.better)
             plotted = partial(self._escalation.plotting.plotted, run, found.answer.plan, known)
-            with self._clock.hold():
-                order, form = await aside(plotted)
+            order, form = await self._search.aside(plotted)
         except InputError as error:
             self._runs.conclude(task)
             return self._none("failed", str(error))
