@@ -23,7 +23,7 @@ GAVE_UP = "gave_up"
 TIMED_OUT = "timed_out"
 """Failure of a skill: it did not end before its deadline and was cancelled."""
 SKILL_ERROR = "skill_error"
-"""Failure of a skill's infrastructure: a device, host or component is lost, or the skill's effect is unknown."""
+"""Failure of a skill's infrastructure, or of a command: a device is lost, or the skill's effect is unknown."""
 PROGRAMMING_ERROR = "programming_error"
 """Failure of code: a skill raised an undeclared exception, or ended without a valid outcome.
 
@@ -32,7 +32,9 @@ Only a transition, rule or handler that names the event responds to it; otherwis
 PREEMPTED = "preempted"
 """Loss of a component to a skill with a higher priority; by default, the state is entered again and waits (S1.21)."""
 COMPONENT_FAILED = "component_failed"
-"""Failure of a component without a running skill, which could report the failure; all plots see the event."""
+"""Failure of a component that no skill or command can report to its state; all plots see the event."""
+COMPONENT_RECOVERED = "component_recovered"
+"""Start of a component that had failed; all plots see the event."""
 ERROR = "error"
 """Failure of the evaluation of an action or guard."""
 DONE_STATE = "done.state."
@@ -54,7 +56,9 @@ ERRORS = frozenset({ERROR, EXECUTION_ERROR, PROGRAMMING_ERROR})
 TIMERS = frozenset({AFTER, EVERY, AT_LEAST})
 """Events of the executive's clock for one state; no transition may have them under `on`."""
 RESERVED = (
-    TIMERS | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, PREEMPTED, COMPONENT_FAILED, ERROR} | SKILL_FAILURES
+    TIMERS
+    | {DONE, NO_CANDIDATE, NO_PLAN, GAVE_UP, TIMED_OUT, PREEMPTED, COMPONENT_FAILED, COMPONENT_RECOVERED, ERROR}
+    | SKILL_FAILURES
 )
 """Events that only the executive fires, with one exception.
 
@@ -97,3 +101,23 @@ class Event(NamedTuple):
     def bindings(self) -> dict[str, Any]:
         """Return the attributes by their name in charts, `event.attribute`."""
         return {f"event.{name}": value for name, value in self.attributes.items()}
+
+
+def command_failure(name: str, component: str, port: str, reason: str, to: int) -> Event:
+    """Return the event for the failure of a command; its attribute `component` distinguishes it from a skill's failure.
+
+    Args:
+        name: `SKILL_ERROR` or `PROGRAMMING_ERROR`.
+        component: the component that could not take the command.
+        port: the component's port that received the command, as `arm.force`.
+        reason: the error.
+        to: the activation that sent the command.
+    """
+    return Event(name, {"skill": port, "component": component, "reason": reason}, to=to)
+
+
+def for_all_plots(event: Event) -> Event | None:
+    """Return the failure of a command as the failure of its component; `None` for other events."""
+    if event.name != SKILL_ERROR or "component" not in event.attributes:
+        return None
+    return Event(COMPONENT_FAILED, {name: event.attributes[name] for name in ("component", "reason")})

@@ -143,11 +143,9 @@ def programming_error(error: BaseException, hook: str, raises: Classes = ()) -> 
         hook: the name of the hook or skill, as `arm.grasp`.
         raises: the exceptions that the component declares.
     """
-    cause: BaseException | None = error
-    while cause is not None:
-        if type(cause) is ProgrammingError:  # logged before
-            return cause
-        cause = cause.__cause__
+    known = bug_in(error)
+    if known is not None:  # logged before
+        return known
     kind = type(error)
     if issubclass(kind, (SkillError, *raises)):
         return None
@@ -161,6 +159,14 @@ def programming_error(error: BaseException, hook: str, raises: Classes = ()) -> 
     if found is not None and len(found) < _MOST_FOUND:
         found.append(str(bug))
     return bug
+
+
+def bug_in(error: BaseException) -> ProgrammingError | None:
+    """Return the programming error that an error is, or that caused it; `None` for other errors."""
+    cause: BaseException | None = error
+    while cause is not None and type(cause) is not ProgrammingError:
+        cause = cause.__cause__
+    return cause
 
 
 def reason_of(error: BaseException) -> str:

@@ -156,9 +156,14 @@ class LifeCycle(Announcer):
         return bool(self._activators)
 
     @property
+    def in_transition(self) -> bool:
+        """Whether a hook is being called."""
+        return self._transition is not None
+
+    @property
     def is_open(self) -> bool:
         """Whether an exit hook is due, or another hook is being called."""
-        return self.started or self.activated or self._transition is not None
+        return self.started or self.activated or self.in_transition
 
     def describe(self) -> str:
         """Return the component with its state, as text for a message."""

@@ -18,7 +18,7 @@ from dsc.engine.steps import Note, SendMessage, Step
 from dsc.engine.tables import TransitionEdge
 from dsc.engine.transition_selection import Addressed, Enabled, Trigger, select
 from dsc.errors import RunawayError
-from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event, goes_outwards
+from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event, for_all_plots, goes_outwards
 from dsc.model.actions import Send
 from dsc.model.states import FinalState
 from knowledge_base.errors import InputError
@@ -54,8 +54,13 @@ class Macrostep:
         return self._step(None, handled=True)
 
     def react(self, event: Event | None) -> Step:
-        """Handle the event and run to completion; an event that a waiting state keeps also counts as handled."""
+        """Handle the event and run to completion; an event that a waiting state keeps also counts as handled.
+
+        If no state handles the failure of a command, all plots see it as the failure of the component.
+        """
         handled = event is not None and self._take(event)
+        if event is not None and not handled and (failure := for_all_plots(event)) is not None:
+            handled = self._take(failure)
         if event is not None and event.name == EVERY:
             self._next_period(event)
         self._rest()

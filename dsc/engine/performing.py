@@ -169,12 +169,12 @@ class Performer:
                 )
             case Configure():
                 component, parameter = action.set.split(".")
-                return steps.SetParameter(component, parameter, self.value(frame, action.to))
+                return steps.SetParameter(component, parameter, self.value(frame, action.to), activation)
             case Send():
                 component, port = action.send.split(".")
-                return steps.SendMessage(component, port, self.values(frame, action.arguments))
+                return steps.SendMessage(component, port, self.values(frame, action.arguments), activation)
             case _:
-                return steps.SwitchMode(action.switch, action.to)
+                return steps.SwitchMode(action.switch, action.to, activation)
 
     def _perform(self, frame: Frame, state: str, action: Internal) -> None:
         match action:

@@ -52,11 +52,16 @@ class Cancel:
 
 @dataclass(frozen=True, slots=True)
 class SetParameter:
-    """Set a parameter of a component to a value."""
+    """Set a parameter of a component to a value.
+
+    `activation` is the serial number of the activation that sends the command and receives its failure. It is 0 for an
+    operator's command. The other commands have the same attribute.
+    """
 
     component: str
     parameter: str
     value: Any
+    activation: int = field(default=0, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +70,7 @@ class SwitchMode:
 
     component: str
     mode: str
+    activation: int = field(default=0, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +80,7 @@ class SendMessage:
     component: str
     port: str
     arguments: Mapping[str, Any]
+    activation: int = field(default=0, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dsc.events import DONE
 from dsc.model import states
-from dsc.model.actions import ExternalAction, Internal, Trigger
+from dsc.model.actions import ExternalAction, Internal
 from dsc.model.language import TermField
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.transitions import Connector, Transition
@@ -146,7 +146,7 @@ class StateNode:
         state = self.state if isinstance(self.state, states.State) else None
         self.timed = state is not None and (bool(state.after or state.every) or self.at_least is not None)
         actions = (*self.entry, *self.exit, *self.broken)
-        starts = bool(actions) and any(isinstance(action, Trigger) for action in actions)
+        starts = bool(actions) and any(isinstance(action, ExternalAction) for action in actions)
         ends = state is not None and DONE in state.on
         self.addressed = starts or self.timed or self.holds_plot or ends
 

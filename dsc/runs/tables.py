@@ -35,7 +35,7 @@ TABLES = {
     "forms": "CREATE TABLE forms (hash TEXT PRIMARY KEY, form TEXT NOT NULL) WITHOUT ROWID",
     "fence": "CREATE TABLE fence (epoch INTEGER NOT NULL, format INTEGER NOT NULL)",
 }
-FORMAT = 6
+FORMAT = 7
 """Format number of these tables; the first format had no number."""
 CHAIN = "steps"
 """Name of the chain of runs and macrosteps in the store's table of ends."""

@@ -16,19 +16,27 @@ from typing import Any
 
 from dsc.calls import Clock, Ended, SkillCall, Status
 from dsc.components.component import Component
-from dsc.components.hooks import cancel_once, component_at_work, contained, give_up, reason_of
+from dsc.components.hooks import bug_in, cancel_once, component_at_work, contained, give_up, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.robot import Wiring, require_instances
 from dsc.components.turns import Claim, Turns
 from dsc.engine import steps
 from dsc.errors import UncertainActionError
-from dsc.events import COMPONENT_FAILED, SKILL_FAILURES, Event
-from dsc.messages import LateMessage, SkillMessage, TimerMessage
+from dsc.events import (
+    COMPONENT_FAILED,
+    COMPONENT_RECOVERED,
+    PROGRAMMING_ERROR,
+    SKILL_ERROR,
+    SKILL_FAILURES,
+    Event,
+    command_failure,
+)
+from dsc.messages import LateMessage, SkillMessage, TimerMessage, Told
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, PastClock
 from dsc.sequencer.inbox import Timers
 from dsc.sequencer.message_checks import encoded, late, validated
-from dsc.sequencer.outbox import CLOSING, Outbox, failure
+from dsc.sequencer.outbox import CLOSING, Outbox, command, failure, port_of
 from dsc.sequencer.running_skills import InterruptedSkill, PendingCleanups, RunningSkill, WaitObserver
 from dsc.skills import SkillSignature
 from dsc.supervision.activation import ComponentActivation
@@ -74,10 +82,11 @@ class Dispatcher:
         self._part_of = part_of
         self._components = {component.name: component for component in require_instances(components)}
         self.activation = ComponentActivation(ComponentRegistry(self._components), self._in_use)
-        self.outbox = Outbox()
-        self._lives = ComponentLives(self._components.values(), self._failed, self.outbox.repeat)
+        self.outbox = Outbox(self._refused)
+        self._lives = ComponentLives(self._components.values(), self._failed, self._recovered)
         self._wiring = Wiring(self._components)
         self._faults: list[str] = []
+        self._failures: dict[str, str] = {}  # reasons of the components that have failed and not recovered
         self._unreported: dict[str, list[str]] = {}  # reasons of failed components, which their skills may report
         self._closing = False
         self._clock = clock
@@ -380,12 +389,14 @@ class Dispatcher:
         except BaseException as error:
             failed = running.failed(error)
             if failed is None:
-                self._report_failures(component.name, None)
+                self._report_failures(component.name)
                 raise
             outcome = failed
         running.answer(outcome)
         if self._unreported:
-            self._report_failures(component.name, None if running.stopped else outcome)
+            if outcome.event in SKILL_FAILURES and not running.stopped:
+                self._forget_failures(component.name, str(outcome.attributes["reason"]))
+            self._report_failures(component.name)
         running.task.remove_done_callback(running.ended)  # each callback costs a turn of the loop
 
     async def _outcome(
@@ -411,15 +422,13 @@ class Dispatcher:
         call = SkillCall(action_id, clock, report, running.due, self._fault, start.rank, running.held)
         if not running.begun:
             await running.turn()
+        outbox = self.outbox
         if running.configuring:
-            await self.outbox.configured(running.configuring)
-        self.outbox.remind(component)
-        if component.name in self.outbox.untaken:
-            await self.outbox.taken(component)
+            await outbox.configured(running.configuring)
+        await outbox.configured_now(component, running.configuring)
         if dependencies.concerned or component.life.state is not Life.ALIVE:
             await dependencies.ready()
-            if component.name in self.outbox.untaken:  # the component was started again, without its settings
-                await self.outbox.taken(component)
+            await outbox.configured_now(component, {})  # the component may have started again, without its settings
         if interrupted is not None and began is not None:
             status = await component.status(call.action_id, start.skill, start.arguments)
             if isinstance(status, Ended):
@@ -441,21 +450,49 @@ class Dispatcher:
             return f"component '{running.start.component}'{doing}"
         return self.outbox.unconfigured(running.configuring)
 
+    def _refused(self, told: Told, error: Exception) -> None:
+        """Post an event for the state whose command has failed; at the end of the run, report the failure."""
+        bug, failed = bug_in(error), f"{command(told)}: {reason_of(error)}"
+        reason = " ".join((failed if bug is None else str(bug)).split())
+        self._forget_failures(told.component, reason)
+        if self._closing:
+            self._fault(failed)
+        else:
+            name = SKILL_ERROR if bug is None else PROGRAMMING_ERROR
+            self._post(command_failure(name, told.component, port_of(told), reason, told.activation))
+
     def _failed(self, component: Component) -> None:
-        """Post an event about a failed component; a skill that uses the component may report the failure instead."""
+        """Post an event about a failed component, unless its skill, or a command to it, reports the failure."""
         name, reason = component.name, component.life.reason
+        if self._failures.get(name) == reason:  # another attempt to start has failed
+            return
+        self._failures[name] = reason
+        delivery = self.outbox.untaken.get(name)
         if name in self.in_use:
             self._unreported.setdefault(name, []).append(reason)
+        elif delivery is not None and not delivery.done():
+            self._unreported.setdefault(name, []).append(reason)
+            delivery.add_done_callback(lambda _: self._report_failures(name))
         else:
             self._report_failure(name, reason)
 
-    def _report_failures(self, name: str, outcome: Outcome | None) -> None:
-        """Post the failures of a component that the outcome of its skill has not reported; `None` means cancelled."""
-        failed = outcome is not None and outcome.event in SKILL_FAILURES
-        told = str(outcome.attributes["reason"]) if failed and outcome is not None else None
+    def _recovered(self, component: Component) -> None:
+        """Post an event about a component that has started after a failure, and deliver its settings again."""
+        self._failures.pop(component.name, None)
+        self.outbox.repeat(component)
+        if not self._closing:
+            self._post(Event(COMPONENT_RECOVERED, {"component": component.name}))
+
+    def _forget_failures(self, name: str, told: str) -> None:
+        """Forget the failures of a component that the reason of another failure contains."""
+        unreported = self._unreported.pop(name, ())
+        if kept := [reason for reason in unreported if reason not in told]:
+            self._unreported[name] = kept
+
+    def _report_failures(self, name: str) -> None:
+        """Post the failures of a component that nothing else has reported."""
         for reason in self._unreported.pop(name, ()):
-            if told is None or reason not in told:
-                self._report_failure(name, reason)
+            self._report_failure(name, reason)
 
     def _report_failure(self, name: str, reason: str) -> None:
         if self._closing:  # no state receives an event any longer

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 from dsc.components.component import Component
 from dsc.components.hooks import GRACE, contained, reason_of
@@ -30,7 +31,9 @@ _MOST_REFUSED = 1000
 """Upper bound of the number of stored refusals; a run without a store never reads them."""
 
 
-Configuring = dict[str, asyncio.Task[None]]
+Delivery = asyncio.Task[Exception | None]
+"""Delivery of an output; its result is the error that a listener has received, and `None` after a success."""
+Configuring = dict[str, Delivery]
 """Deliveries of the parameters and modes of a macrostep, by component."""
 
 
@@ -40,13 +43,19 @@ class Outbox:
     The settings of a component are its parameters and its mode. The outbox delivers them again before the next skill if
     the component has started again, or could not take them.
 
+    Args:
+        failed: receives an output that a component could not take, with the error. Per macrostep, component and
+            activation it receives the first failure.
+
     Attributes:
         untaken: by component, the task that delivers the latest output; removed when a skill has waited for the task.
         configuring: by component, the task that delivers the latest parameter or mode of the present macrostep.
     """
 
-    def __init__(self) -> None:
-        self.untaken: dict[str, asyncio.Task[None]] = {}
+    def __init__(self, failed: Callable[[Told, Exception], None]) -> None:
+        self._failed = failed
+        self._failures: set[tuple[str, int]] = set()  # components and activations of the present macrostep
+        self.untaken: dict[str, Delivery] = {}
         self.configuring: Configuring = {}
         self._under_way: dict[int, Told] = {}
         self._refused: deque[Told] = deque(maxlen=_MOST_REFUSED)
@@ -71,6 +80,8 @@ class Outbox:
         """Begin the outputs of another macrostep."""
         if self.configuring:
             self.configuring = {}
+        if self._failures:
+            self._failures = set()
 
     def send(self, component: Component, told: Told) -> None:
         """Deliver an output to the component, after all earlier outputs."""
@@ -93,11 +104,6 @@ class Outbox:
         if settings and not self._closed:
             settings.missing = True
             self._begin(component, "configure_all", None, lambda: self._configure(component))
-
-    def remind(self, component: Component) -> None:
-        """Deliver the settings again if the component has not taken them since its last start."""
-        if component.name not in self.untaken and self._settings_of(component).missing:
-            self.repeat(component)
 
     def _settings_of(self, component: Component) -> _Settings:
         return self._settings.setdefault(component.name, _Settings())
@@ -126,13 +132,20 @@ class Outbox:
                 await component.receive(told.port, encoded(told.arguments))
 
     async def _configure(self, component: Component) -> None:
-        """Pass all settings to a component: the parameters as one set, then the mode."""
+        """Pass all settings to a component, unless it has them: the parameters as one set, then the mode."""
         settings = self._settings_of(component)
-        if settings.parameters:
-            values = {name: one.value for name, one in settings.parameters.items()}
-            await component.configure_all(encoded(values))
-        if settings.mode is not None:
-            await component.change_mode(settings.mode.mode)
+        if not settings.missing:
+            return
+        settings.missing = False  # a start during the delivery sets it again
+        try:
+            if settings.parameters:
+                values = {name: one.value for name, one in settings.parameters.items()}
+                await component.configure_all(encoded(values))
+            if settings.mode is not None:
+                await component.change_mode(settings.mode.mode)
+        except BaseException:
+            settings.missing = True
+            raise
         for number in settings.taken():
             del self._under_way[number]
 
@@ -141,8 +154,9 @@ class Outbox:
         number = 0 if told is None else self._number(told)
         setting = told if hook in _SETTINGS and not isinstance(told, SendMessage) else None
         before = self.untaken.get(component.name)
+        failures = self._failures
 
-        async def in_order() -> None:
+        async def in_order() -> Exception | None:
             if before is not None and not before.done():  # otherwise it arrives before a skill of this step can end
                 await asyncio.wait([before])
             try:
@@ -155,20 +169,27 @@ class Outbox:
                 elif setting is not None:
                     self._note(component, setting, number)
             except Exception as error:
+                if told is None:  # the next skill fails with this error
+                    raise
                 if setting is not None and not isinstance(error, ProgrammingError):  # it may succeed later
                     self._note(component, setting, number)
-                elif told is not None:
+                else:
                     self._refused.append(told)
                     del self._under_way[number]
-                earlier = None if before is None else failure(before)
-                if earlier is not None and earlier is not error:
-                    _LOG.warning("component '%s' did not take an output: %s", component.name, reason_of(earlier))
-                raise
-            why = None if before is None else failure(before)
-            if why is not None:  # the next skill fails with this error
+                self._report(component, told, error, failures)
+                return error
+            if before is not None and (why := failure(before)) is not None:
                 raise why
+            return None
 
         self.untaken[component.name] = asyncio.get_running_loop().create_task(in_order())
+
+    def _report(self, component: Component, told: Told, error: Exception, failures: set[tuple[str, int]]) -> None:
+        """Report a failure, unless the same activation knows of another failure of the component in the macrostep."""
+        _LOG.warning("%s: %s", command(told), reason_of(error))
+        if (component.name, told.activation) not in failures:
+            failures.add((component.name, told.activation))
+            self._failed(told, error)
 
     async def configured(self, tasks: Configuring) -> None:
         """Wait until the components have received or refused the parameters and modes of a macrostep."""
@@ -180,7 +201,23 @@ class Outbox:
         name = next((name for name, task in tasks.items() if not task.done()), None)
         return "" if name is None else f"component '{name}', which has not received its parameters and modes"
 
-    async def taken(self, component: Component) -> None:
+    async def configured_now(self, component: Component, tasks: Configuring) -> None:
+        """Wait until the component has taken its outputs, and deliver the settings that it has not taken again.
+
+        Raises:
+            Exception: the component has refused a setting of the macrostep of `tasks`, or refuses one again.
+        """
+        own = tasks.get(component.name)
+        if own is not None and (why := own.result()) is not None:
+            raise why
+        if component.name in self.untaken:
+            await self._taken(component)
+        settings = self._settings.get(component.name)
+        if settings is not None and settings.missing:
+            self.repeat(component)
+            await self._taken(component)
+
+    async def _taken(self, component: Component) -> None:
         """Wait until the component has received its `untaken` outputs; raise the error of a delivery, one time."""
         pending = self.untaken[component.name]
         await asyncio.wait([pending])  # `await pending` would cancel the delivery together with the skill
@@ -190,12 +227,17 @@ class Outbox:
         if why is not None:
             raise why
 
+    @property
+    def busy(self) -> Collection[Delivery]:
+        """Deliveries that have not ended."""
+        return [task for task in self.untaken.values() if not task.done()]
+
     async def all_taken(self) -> None:
         """Wait until all components have received or refused their outputs, for `CLOSING` seconds at most."""
         if self.untaken:
             await asyncio.wait(self.untaken.values(), timeout=CLOSING)
 
-    def close(self) -> Collection[asyncio.Task[None]]:
+    def close(self) -> Collection[Delivery]:
         """Repeat no settings from now on, and return the deliveries that the end of a run waits for."""
         self._closed = True
         return self.untaken.values()
@@ -250,7 +292,6 @@ class _Settings:
         """Register that the component has taken all settings, and return the numbers that were untaken."""
         taken = list(self.untaken.values())
         self.untaken.clear()
-        self.missing = False
         return taken
 
 
@@ -288,6 +329,28 @@ async def _restore_life(component: Component, life: str) -> None:
     await (component.life.come_alive() if life == Life.INIT else component.change_mode(life))
 
 
-def failure(task: asyncio.Task[None]) -> BaseException | None:
-    """Return the error of a task that is done; `None` without an error or after a cancellation."""
+def failure(task: asyncio.Task[Any]) -> BaseException | None:
+    """Return the error that ended a task; `None` without an error or after a cancellation."""
     return None if task.cancelled() else task.exception()
+
+
+def command(told: Told) -> str:
+    """Return a command as text, as it is in a plot."""
+    match told:
+        case SetParameter():
+            return f"set {told.component}.{told.parameter}"
+        case SwitchMode():
+            return f"switch {told.component} to '{told.mode}'"
+        case SendMessage():
+            return f"send {told.component}.{told.port}"
+
+
+def port_of(told: Told) -> str:
+    """Return the port of a component that receives the command, as `arm.force`; the attribute `skill` of a failure."""
+    match told:
+        case SetParameter():
+            return f"{told.component}.{told.parameter}"
+        case SwitchMode():
+            return f"{told.component}.switch"
+        case SendMessage():
+            return f"{told.component}.{told.port}"

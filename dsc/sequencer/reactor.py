@@ -14,7 +14,7 @@ from dsc.engine.machine import Machine
 from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import NO_CHANGE, Cancel, Output, SendLater, SendMessage, SetParameter, Start, StartTimer, Step
 from dsc.errors import RunawayError
-from dsc.events import EVERY, PROGRAMMING_ERROR, SKILL_FAILURES, Event
+from dsc.events import EVERY, PROGRAMMING_ERROR, RESERVED, SKILL_FAILURES, Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.runs.kept import Kept
 from dsc.sequencer.phase_watch import PhaseWatch, described
@@ -29,6 +29,8 @@ MOST_CANCELLED = 1_000
 """Upper bound of the number of cancelled skills whose cause is kept, for the trace of late observations."""
 MOST_EMITTED = 100
 """Number of outcome events of the plot that are kept: the latest events, and the latest event of each name."""
+MOST_UNHEARD = 100
+"""Upper bound of the number of failed commands that are reported at the end of a run."""
 CHART = "chart"
 """Author of the changes that a plot makes with `tell`."""
 StepListener = Callable[[Step], None]
@@ -45,6 +47,8 @@ class Reactor:
         programming_error: the programming error that is this reason, else `None`.
         answered_bugs: the programming errors to which the plot has responded.
         outputs: the outputs of the plot by name, after its end.
+        unheard: reasons of failed commands that no state has handled, and whose own states were left; at most
+            `MOST_UNHEARD`.
         in_vain: activation and number of periods without any effect since the last other message.
         settings: an operator's settings of plots, by plot and parameter.
         caused_by: by action id, the number of the trace record about the start of a skill that may still answer. Of
@@ -68,6 +72,7 @@ class Reactor:
         self.programming_error: str | None = None
         self.answered_bugs: set[str] = set()
         self.outputs: Mapping[str, Any] = {}
+        self.unheard: list[str] = []
         self.in_vain: set[tuple[int, int]] = set()
         self.settings: dict[tuple[str, str], ParameterMessage] = {}
         self.caused_by: dict[str, int] = {}
@@ -190,7 +195,7 @@ class Reactor:
             return self._answered(message)
         event = message.event if isinstance(message, SendLater) else message
         self.trace.cause = None
-        self.trace.cause = self.tracer.event(event, "outside")
+        self.trace.cause = self.tracer.event(event, _source(event))
         return event
 
     def _set_default(self, setting: ParameterMessage) -> None:
@@ -299,20 +304,36 @@ class Reactor:
             self.in_vain.add((message.timer.activation, message.timer.index))
 
     def _unhandled(self, message: Message, event: Event) -> None:
-        """End the run if an active state ignores its skill's final answer, as the state would wait without end.
+        """End the run if an active state ignores the final answer of its skill, or the failure of its command.
 
-        A programming error ends the run in any case.
+        After an answer, the state would wait without end. A programming error ends the run in any case.
         """
-        if event.name == PROGRAMMING_ERROR and isinstance(message, SkillMessage):
+        final = isinstance(message, Event) or (isinstance(message, SkillMessage) and message.final)
+        if event.to is None or not final:
+            return
+        if event.name == PROGRAMMING_ERROR:
             self.fail(event.attributes["reason"])
             return
-        if not isinstance(message, SkillMessage) or not message.final or event.to is None:
-            return
         caller = self.machine.state.state_of(event.to)
-        if caller is not None:
-            skill = f"{message.start.component}.{message.start.skill}"
-            whose = f": {event.attributes['reason']}" if event.name in SKILL_FAILURES else f" of {skill}"
+        if caller is None and isinstance(message, Event):
+            self._report(event.attributes["reason"])
+        elif caller is not None:
+            whose = f": {event.attributes['reason']}" if event.name in SKILL_FAILURES else f" of {_skill(message)}"
             self.problem = f"no transition handles '{event.name}'{whose}; the caller is {described(*caller)}"
+
+    def _report(self, reason: str) -> None:
+        if reason not in self.unheard and len(self.unheard) < MOST_UNHEARD:
+            self.unheard.append(reason)
+
+
+def _skill(message: Message) -> str:
+    return f"{message.start.component}.{message.start.skill}" if isinstance(message, SkillMessage) else ""
+
+
+def _source(event: Event) -> str:
+    """Return what fires an event that is neither an answer nor of a timer: a component, its port, or `outside`."""
+    attributes = event.attributes if event.name in RESERVED else {}
+    return str(attributes.get("skill") or attributes.get("component") or "outside")
 
 
 def _is_vain(step: Step) -> bool:

@@ -11,7 +11,7 @@ from typing import Any, Generic, cast
 
 from dsc.calls import Outputs, PlotCall
 from dsc.components.component import Component
-from dsc.components.hooks import programming_errors, unheard_errors
+from dsc.components.hooks import GRACE, programming_errors, unheard_errors
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output, Start
@@ -307,9 +307,6 @@ class Sequencer:
             self._reacts = False
             while not machine.state.finished and reactor.problem is None:
                 if not inbox.waiting:
-                    if self._is_deadlock():
-                        reactor.problem = self._deadlock()
-                        break
                     await self._news()
                     continue
                 for wait in self._before_events:
@@ -338,8 +335,8 @@ class Sequencer:
                 untaken = await self.dispatcher.close()
                 unsubscribe()
         self._take_late_observations()
-        if untaken and reactor.problem is None:
-            reactor.problem = "; ".join(untaken)
+        if (unheard := [*reactor.unheard, *untaken]) and reactor.problem is None:
+            reactor.problem = "; ".join(unheard)
         unanswered = (bug for bug in bugs if bug not in reactor.answered_bugs)
         bug = reactor.programming_error = reactor.programming_error or next(unanswered, None)
         outputs = reactor.outputs if reactor.finished else {}
@@ -367,10 +364,14 @@ class Sequencer:
         return last if last in self._failures else None
 
     async def _news(self) -> None:
-        """Wait for the next message, or for the end of the run.
+        """Wait for the next message, or for the end of the run; a deadlock is the problem of the run.
 
         A skill that only watches, such as the monitor of a plan, ends in a deadlock if nothing else can happen.
         """
+        if self._is_deadlock():
+            if not await self._delivers():
+                self._reactor.problem = self._deadlock()
+            return
         arrival = self._inbox.arrival()
         if self._open_ended or self.dispatcher.waiting or not self.dispatcher.watching:
             await arrival
@@ -380,6 +381,15 @@ class Sequencer:
         idle.cancel()
         if not arrival.done():
             self._reactor.problem = self._deadlock()
+
+    async def _delivers(self) -> bool:
+        """Wait for the end of a delivery, as its failure is an event; return `False` without a delivery."""
+        awaited: list[asyncio.Future[Any]] = [*self.dispatcher.outbox.busy]
+        if not awaited:
+            return False
+        awaited.append(self._inbox.arrival())
+        done, _ = await asyncio.wait(awaited, timeout=GRACE, return_when=asyncio.FIRST_COMPLETED)
+        return bool(done)
 
     def _expire(self) -> None:
         reactor = self._reactor

@@ -39,7 +39,7 @@ class StepTracer:
 
         Args:
             event: the event, by its name in the chart.
-            source: the skill, `timer` or `outside`.
+            source: the skill, the component or its port, `timer` or `outside`.
             original: the skill's own name for the event.
             conflated: the number of older reports that the event replaces.
         """

@@ -19,17 +19,17 @@ class ComponentLives:
     Args:
         components: the components at the start of the run.
         failed: receives each component that enters FatalError.
-        restarted: receives each component that is alive again after a failure.
+        recovered: receives each component that is alive again after a failure, and has its resources.
     """
 
     def __init__(
         self,
         components: Iterable[Component],
         failed: Callable[[Component], None],
-        restarted: Callable[[Component], None],
+        recovered: Callable[[Component], None],
     ) -> None:
         self._failed = failed
-        self._restarted = restarted
+        self._recovered = recovered
         self._lost: set[Component] = set()
         self._last: dict[Component, Life] = {}
         self._listeners: dict[Component, Callable[[], None]] = {}
@@ -52,9 +52,9 @@ class ComponentLives:
         if component.life.state is Life.FATAL_ERROR is not before:
             self._lost.add(component)
             self._failed(component)
-        elif component.life.state is Life.ALIVE and component in self._lost:
+        elif component.life.state is Life.ALIVE and component in self._lost and not component.life.in_transition:
             self._lost.discard(component)
-            self._restarted(component)
+            self._recovered(component)
 
     async def close(self, needed: Callable[[Component], Iterable[str]] | None) -> list[str]:
         """Stop listening; also stop the components that no other run has, each after those that need it.

@@ -393,7 +393,7 @@ def test_runs_in_tables_of_another_format_are_refused_with_that_reason(tmp_path)
     for look in (has_run, records_of):
         with pytest.raises(StoreError, match="the runs in this store have format 1"):
             look(path)
-    with KnowledgeBase.open(SCHEMA, path) as kb, pytest.raises(StoreError, match="resumes format 6"):
+    with KnowledgeBase.open(SCHEMA, path) as kb, pytest.raises(StoreError, match="resumes format 7"):
         RunStore(kb, path)
     assert run_with(new(tmp_path), TWICE, Robot())[0].finished
 

@@ -160,7 +160,8 @@ def test_a_plot_hears_of_the_failure_of_a_component_that_nobody_uses():
 
 def test_a_plot_hears_that_a_component_without_a_skill_cannot_start():
     end, _ = ran(HEARS, Device("lamp", [], fails="start"))
-    assert end.emitted[0].attributes == {"component": "lamp", "reason": "OSError: no power"}
+    heard = end.emitted[0].attributes
+    assert (heard["component"], heard["reason"].rpartition(": OSError: ")[2]) == ("lamp", "no power")
 
 
 def test_only_the_skill_reports_a_failure_while_it_runs():
