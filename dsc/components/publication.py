@@ -35,21 +35,28 @@ class Publisher:
         port: the port's name.
         values: names and types of the values; subscribers that require other values are refused.
 
-    Attributes:
-        newest: the newest value with its number, in the form for `Subscription.take`.
     """
 
     def __init__(self, endpoint: Endpoint, port: str, values: Values | None = None) -> None:
         self._endpoint = endpoint
         self._port = port
         self._values = values
-        self.newest: dict[str, Any] = {"life": endpoint.life, "n": 0, "value": None}
+        self._number = 0
+        self._value: Any = None
+        self._since = 0.0  # loop time of the value
         self._subscribers: dict[str, float] = {}
         endpoint.answer(f"subscribe {port}", self._subscribe)
 
-    def put(self, value: Any) -> None:
-        """Push a new value to all subscribers; raise `InputError` if it is not plain data."""
-        self.newest = {"life": self._endpoint.life, "n": self.newest["n"] + 1, "value": value}
+    @property
+    def newest(self) -> dict[str, Any]:
+        """The newest value with its number and its age in seconds, in the form for `Subscription.take`."""
+        age = asyncio.get_running_loop().time() - self._since
+        return {"life": self._endpoint.life, "n": self._number, "value": self._value, "age": age}
+
+    def put(self, value: Any, age: float = 0.0) -> None:
+        """Push a value that is `age` seconds old to all subscribers; raise `InputError` if it is not plain data."""
+        self._number, self._value = self._number + 1, value
+        self._since = asyncio.get_running_loop().time() - age
         self._forget()
         for subscriber in self._subscribers:
             self._endpoint.push(subscriber, _kind(self._endpoint.address, self._port), self.newest)
@@ -76,7 +83,7 @@ class Subscription:
         endpoint: the subscriber's address.
         publisher: the publisher's address.
         port: the port's name.
-        receive: called with each value that is newer than the known ones.
+        receive: called with each value that is newer than the known ones, and its age in seconds.
         wanted: names and types of the required values.
 
     Attributes:
@@ -89,7 +96,7 @@ class Subscription:
         endpoint: Endpoint,
         publisher: str,
         port: str,
-        receive: Callable[[Any], None] | None = None,
+        receive: Callable[[Any, float], None] | None = None,
         wanted: Values | None = None,
     ) -> None:
         self.value: Any = None
@@ -137,7 +144,7 @@ class Subscription:
             InputError: `newest` is malformed; the known value is unchanged.
         """
         match newest:
-            case {"life": str(life), "n": int(number), "value": value}:
+            case {"life": str(life), "n": int(number), "value": value, "age": float(age) | int(age)} if age >= 0:
                 self._at = asyncio.get_running_loop().time()
             case _:
                 raise InputError(f"'{self._publisher}' has pushed '{self._port}' in a form that cannot be read")
@@ -146,7 +153,7 @@ class Subscription:
             before, self.value = self.value, value
             try:
                 if self._receive is not None:
-                    self._receive(value)
+                    self._receive(value, age)
             except BaseException:
                 self.value = before
                 raise
@@ -185,7 +192,7 @@ class RemotePush(Push):
 
     def __init__(self, endpoint: Endpoint, component: str, port: str, values: Mapping[str, str | None]) -> None:
         super().__init__(values, name=f"{component}.{port}")
-        self._subscription = Subscription(endpoint, component, port, lambda value: self.put(**value))
+        self._subscription = Subscription(endpoint, component, port, self.take)
         self._running: asyncio.Task[None] | None = None
 
     def listen(self, listener: Receiver) -> None:

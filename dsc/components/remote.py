@@ -144,7 +144,7 @@ class RemoteComponent(Component):
         finally:
             renewing.cancel()
 
-    def _changed(self, condition: Any) -> None:
+    def _changed(self, condition: Any, _: float) -> None:
         match condition:
             case {
                 "life": str(life), "reason": str(reason), "bug": bool(bug), "mode": str(mode), "needs": [*needs],

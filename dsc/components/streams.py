@@ -6,6 +6,7 @@ import asyncio
 import json
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from dsc.components.endpoint import NoAnswerError, encoded
@@ -17,8 +18,8 @@ from knowledge_base.language.checking.inputs import shown
 
 Values = Mapping[str, str | None]
 """Names of pushed values with types: `number`, `boolean`, another type for a word, or `None` for any plain data."""
-Receiver = Callable[[dict[str, Any]], None]
-"""Function that receives pushed values, as a separate copy."""
+Receiver = Callable[[dict[str, Any], float], None]
+"""Function that receives pushed values, as a separate copy, and their age: the seconds since their `put`."""
 _EXAMPLE = "{'metres': 'number'}"
 
 
@@ -49,13 +50,14 @@ class Push:
         self._name = name
         self._life = life
         self._newest: bytes | None = None
+        self._put: tuple[asyncio.AbstractEventLoop, float] | None = None  # loop and loop time of the newest values
         self._listeners: dict[Receiver, None] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._calls = LoopCalls()
 
     def __getstate__(self) -> dict[str, object]:
         """Return the state for pickling, without listeners, which stay in this process."""
-        return {**self.__dict__, "_listeners": {}, "_timer": None}
+        return {**self.__dict__, "_listeners": {}, "_timer": None, "_put": None}
 
     def put(self, **values: Any) -> None:
         """Set new values, from any thread; listeners are called in their own loop's thread.
@@ -64,6 +66,10 @@ class Push:
             InputError: a value is missing, has another type, or is not plain data.
             UnknownNameError: a value is not declared.
         """
+        self.take(values, 0.0)
+
+    def take(self, values: Mapping[str, Any], age: float) -> None:
+        """Set values that are `age` seconds old; raise as `put`."""
         for name in values:
             if name not in self.values:
                 raise UnknownNameError(f"'{self._name}' has no value '{name}'", found=name, valid=self.values)
@@ -72,10 +78,13 @@ class Push:
                 raise InputError(f"'{self._name}' needs its value '{name}'")
             if kind is not None:
                 Range(kind).check(f"{self._name}.{name}", values[name])
-        self._calls.call(self._take, encoded(values))
+        self._calls.call(self._take, encoded(dict(values)), age)
 
-    def _take(self, newest: bytes) -> None:
-        self._newest = newest
+    def _take(self, newest: bytes, age: float) -> None:
+        self._newest, self._put = newest, None
+        with suppress(RuntimeError):  # no loop is running: the values count as new when a loop first reads them
+            loop = asyncio.get_running_loop()
+            self._put = loop, loop.time() - age
         if self.period is None:
             self._push()
         else:
@@ -86,7 +95,7 @@ class Push:
         self._calls.bind()
         self._listeners[listener] = None
         if self._newest is not None:
-            listener(json.loads(self._newest))
+            listener(json.loads(self._newest), self._age())
         self._start_timer()
 
     def leave(self, listener: Receiver) -> None:
@@ -96,7 +105,13 @@ class Push:
     def _push(self) -> None:
         if self._newest is not None:
             for listener in tuple(self._listeners):
-                listener(json.loads(self._newest))
+                listener(json.loads(self._newest), self._age())
+
+    def _age(self) -> float:
+        loop = asyncio.get_running_loop()
+        if self._put is None or self._put[0] is not loop:
+            self._put = loop, loop.time()
+        return loop.time() - self._put[1]
 
     def _start_timer(self) -> None:
         if self.period is not None and self._timer is None and self._listeners and self._newest is not None:
@@ -143,14 +158,15 @@ class Stream:
 
     @property
     def age(self) -> float:
-        """Seconds since the newest value; infinite before the first.
+        """Seconds since the `put` of the newest values; infinite before the first.
 
-        An age far above the port's period indicates a lost publisher.
+        A timed port repeats its values, whose age increases. An age far above the usual one indicates that the
+        publisher is lost, or has no new values.
         """
-        return asyncio.get_running_loop().time() - self._at
+        return _now() - self._at
 
     async def next(self, within: float) -> dict[str, Any]:
-        """Wait for the next values and return them; raise `NoAnswerError` after `within` seconds."""
+        """Wait for the next push and return its values; raise `NoAnswerError` after `within` seconds."""
         coming: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._waiting.add(coming)
         try:
@@ -165,10 +181,10 @@ class Stream:
         assert self.value is not None  # noqa: S101
         return self.value
 
-    def receive(self, value: dict[str, Any]) -> None:
-        """Store pushed values, and resume the tasks that wait for them."""
+    def receive(self, value: dict[str, Any], age: float) -> None:
+        """Store pushed values that are `age` seconds old, and resume the tasks that wait for them."""
         self.value = value
-        self._at = asyncio.get_running_loop().time()
+        self._at = _now() - age
         for coming in self._waiting:
             if not coming.done():
                 coming.set_result(None)
@@ -187,6 +203,10 @@ def require_fitting(source: str, wanted: Values, offered: Values) -> None:
         if kind is not None and offered[name] != kind:
             found = offered[name] or "plain data of any type"
             raise SchemaError(f"'{source}' pushes '{name}' as {found}, and {kind} is wanted", found=name)
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()
 
 
 def _no_problem() -> None:
