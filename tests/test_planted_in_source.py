@@ -242,7 +242,7 @@ BUGS = {
     "a stop does not wait": (
         HostedActions, "_stop", "await asyncio.wait([action.task])", "pass", stopping_is_over_when_things_are_in_order),
     "a host forgets nothing": (
-        RemoteComponent, "forget", 'await self._ask_about(action_id, "stop")', "pass",
+        RemoteComponent, "_release", 'await self._ask_about(action_id, "stop")', "pass",
         what_is_forgotten_here_is_forgotten_there),
     "an answer is settled before the commit": (
         Sequencer, "_take", "\n    if self.store is None:", SETTLED, an_end_is_forgotten_only_when_it_is_kept),

@@ -192,6 +192,9 @@ class Component(ComponentHooks, RestartHooks):
     def mode(self, mode: str) -> None:
         self.life.mode = mode
 
+    def watch(self, watching: bool) -> None:  # noqa: FBT001
+        """Begin to watch a device in another program before the first run, or end after the last run."""
+
     def needed(self) -> tuple[str, ...]:
         """Return the names of required components in the present mode; override if needs depend on other values."""
         return tuple(dict.fromkeys((*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))))

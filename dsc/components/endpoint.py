@@ -2,8 +2,8 @@
 
 An endpoint repeats a call until its answer arrives. The receiver stores the answer until the caller has received it. So
 every pattern with an answer (query, param, state, send, event) tolerates loss, duplicates and reordering of frames. A
-call without an answer in time raises `NoAnswerError`. Pushes are sent one time; a push that arrives after a newer one
-is dropped.
+receiver that still executes a call answers each repetition with the frame `running`. So a call may take any time, and
+raises `NoAnswerError` only after a silence. Pushes are sent one time; a push that arrives after a newer one is dropped.
 
 Any bytes may arrive. A malformed frame, or a frame beyond a bound, is dropped and counted; its caller sends it again.
 An endpoint remembers a peer until `REMEMBERED` seconds after the peer's last frame. So a flood of frames from new
@@ -33,9 +33,11 @@ Receive = Callable[[str, bytes], None]
 EVERYBODY = "*"
 """The address of all attached endpoints except the sender."""
 WITHIN = 5.0
-"""Default timeout of a call, in seconds."""
+"""Default bound of the silence during a call, in seconds."""
 AGAIN = 0.2
 """Seconds after which an unanswered call is sent again."""
+RESOLUTION = 1e-6
+"""Seconds below which a remaining time counts as over; the loop's time, a float, could not advance by less."""
 MOST_PEERS = 1_000
 """Number of senders that an endpoint remembers; a restarted sender counts as a new one."""
 REMEMBERED = 60.0
@@ -113,6 +115,14 @@ def encoded(value: Any) -> bytes:
 
 
 @dataclass(slots=True)
+class _Call:
+    """A call that waits for its answer; `heard` is the loop time of the last frame about it, or of its start."""
+
+    answer: asyncio.Future[Any]
+    heard: float
+
+
+@dataclass(slots=True)
 class _Peer:
     """State about one sender, from the sender's start to its end; a restarted sender is another peer.
 
@@ -149,7 +159,7 @@ class Endpoint:
         self.life = life or secrets.token_hex(6)
         self._answering: dict[str, Answers] = {}
         self._hearing: dict[str, Hears] = {}
-        self._asked: dict[int, asyncio.Future[Any]] = {}
+        self._asked: dict[int, _Call] = {}
         self._peers: dict[tuple[str, str], _Peer] = {}  # by address and life
         self._lives: dict[str, str] = {}  # the present life of each address
         self.dropped: Counter[str] = Counter()
@@ -175,22 +185,22 @@ class Endpoint:
         """Send a call to the address, and return its answer.
 
         Raises:
-            NoAnswerError: no answer arrived within that many seconds; the call may have been executed.
+            NoAnswerError: nothing has arrived for `within` seconds; the call may have been executed.
             RefusedError: the other endpoint could not execute the call.
             ProgrammingError: code at the other endpoint failed, which has logged the traceback.
             InputError: the body is not plain data.
         """
         number = self._last = self._last + 1
-        answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        self._asked[number] = answer
+        loop = asyncio.get_running_loop()
+        call = self._asked[number] = _Call(loop.create_future(), loop.time())
         try:
-            async with asyncio.timeout(within):
-                while not answer.done():
-                    self._send(to, "call", kind, number, body)
-                    await asyncio.wait([answer], timeout=AGAIN)
-                return answer.result()
-        except TimeoutError:
-            raise NoAnswerError(f"'{to}' has not answered '{kind}' within {within:g} s") from None
+            while not call.answer.done():
+                left = call.heard + within - loop.time()
+                if left <= RESOLUTION:
+                    raise NoAnswerError(f"'{to}' has not answered '{kind}' within {within:g} s")
+                self._send(to, "call", kind, number, body)
+                await asyncio.wait([call.answer], timeout=min(AGAIN, left))
+            return call.answer.result()
         finally:
             del self._asked[number]
 
@@ -223,7 +233,7 @@ class Endpoint:
         said = _frame(frame)
         if said is None:
             self.dropped["no frame"] += 1
-        elif said["what"] in {"answer", "refusal", "bug"}:
+        elif said["what"] in _TO_CALLER:
             if said["life"] == self.life:
                 self._answered(said)
         elif (peer := self._peer(sender, said["life"])) is None:
@@ -264,8 +274,11 @@ class Endpoint:
                 self.dropped[f"push '{kind}' that cannot be read"] += 1
 
     def _answered(self, said: Mapping[str, Any]) -> None:
-        waiting = self._asked.get(said["n"])
-        if waiting is None or waiting.done():
+        call = self._asked.get(said["n"])
+        if call is None or call.answer.done():
+            return
+        call.heard, waiting = asyncio.get_running_loop().time(), call.answer
+        if said["what"] == "running":
             return
         if said["what"] == "answer":
             waiting.set_result(said["body"])
@@ -283,8 +296,9 @@ class Endpoint:
             return  # a late duplicate: the caller no longer waits for an answer
         if number in peer.answers:
             again = peer.answers[number]
-            if again is not None:
-                self._transport.send(self.address, sender, again)
+            if again is None:
+                again = encoded({"what": "running", "n": number, "life": said["life"], "body": None})
+            self._transport.send(self.address, sender, again)
             return
         if len(peer.answers) >= MOST_CALLS:
             self.dropped["too many calls"] += 1
@@ -316,6 +330,10 @@ class Endpoint:
         return "answer", body
 
 
+_TO_CALLER = frozenset({"answer", "refusal", "bug", "running"})
+"""Kinds of the frames that an endpoint receives about its calls."""
+
+
 def _frame(frame: bytes) -> dict[str, Any] | None:
     """Return the content of a frame; `None` if no endpoint can have sent the frame."""
     try:
@@ -327,7 +345,7 @@ def _frame(frame: bytes) -> dict[str, Any] | None:
     if not (type(said["n"]) is int and isinstance(said["life"], str) and len(said["life"]) <= _LONGEST):
         return None
     match said:
-        case {"what": "answer" | "refusal" | "bug"}:
+        case {"what": str(what)} if what in _TO_CALLER:
             return said
         case {"what": "call" | "push", "kind": str(kind), "low": int(low)}:
             return said if len(kind) <= _LONGEST and low <= said["n"] else None

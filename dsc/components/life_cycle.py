@@ -98,6 +98,9 @@ class LifeHooks(Protocol):
     async def step(self) -> None:
         """Execute one periodic step."""
 
+    def watch(self, watching: bool) -> None:  # noqa: FBT001
+        """Begin to watch the device before the first run, or end after the last run."""
+
 
 class LifeCycle(Announcer):
     """The life cycle of one component; it announces changes of state, mode and needs.
@@ -388,6 +391,14 @@ class LifeCycle(Announcer):
         if not self.runs and self.state is not Life.ALIVE:
             self.mode = NEUTRAL
         self.runs += 1
+        if self.runs == 1:
+            self._hooks.watch(True)  # noqa: FBT003
+
+    def end_run(self) -> None:
+        """Remove a run."""
+        self.runs -= 1
+        if not self.runs:
+            self._hooks.watch(False)  # noqa: FBT003
 
     def fail(self, error: Exception) -> None:
         """Enter FatalError after an error of a hook."""

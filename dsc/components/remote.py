@@ -1,9 +1,9 @@
 """Remote components: clients of hosted components, used like local components.
 
 An action has an id, by which the host executes it only one time, also if frames are repeated. The host stores the
-action's end until the client has received it, so that a resumed run also receives it. The client queries the host
-periodically. After `SILENCE` seconds without an answer, the client's component enters FatalError. The action then ends
-with `skill_error`, and the next action connects again.
+action's end until the client has received it, so that a resumed run also receives it. During a run, the client queries
+the host every second. After `SILENCE` seconds without an answer, the client's component enters FatalError, also if no
+skill uses it. A skill then ends with `skill_error`, and the next one connects again.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any
 
 from dsc.calls import Ended, SkillCall, Status
 from dsc.components.component import Component
-from dsc.components.endpoint import WITHIN, Endpoint, NoAnswerError, RefusedError, Transport
+from dsc.components.endpoint import AGAIN, RESOLUTION, WITHIN, Endpoint, NoAnswerError, RefusedError, Transport
 from dsc.components.heartbeat import Heartbeat
 from dsc.components.host import CONDITION, outcome_of
 from dsc.components.life_cycle import Life
-from dsc.components.publication import RENEWED, RemotePush, Subscription
+from dsc.components.publication import RemotePush, Subscription
 from dsc.errors import PreemptedError, ProgrammingError
 from dsc.outcomes import Outcome
 from dsc.skills import SkillSignature
@@ -48,7 +48,12 @@ class RemoteComponent(Component):
         self._run = endpoint.life
         self._condition = Subscription(endpoint, name, CONDITION, self._changed)
         self._heart = Heartbeat(endpoint, lambda: [name], _ignore, root=True)
-        self._working: tuple[asyncio.Task[None], ...] = ()
+        self._is_silent = False
+        self._unreleased: dict[str, None] = {}  # ids of actions, in their order
+        self._releasing: asyncio.Task[None] | None = None
+        self._beating: asyncio.Task[None] | None = None
+        self._is_watched = False
+        self._watching: tuple[asyncio.Task[None], ...] = ()
         self._program = ""  # the host's life
 
     def remember(self) -> str:
@@ -107,24 +112,41 @@ class RemoteComponent(Component):
             NoAnswerError: the host does not answer.
             RefusedError: the component cannot start.
         """
-        self._require_alive(await self._endpoint.call(self.name, "come alive"))
+        condition = await self._endpoint.call(self.name, "come alive", within=SILENCE)
+        self._is_silent = False
+        await self._release()
+        self._require_alive(condition)
+
+    def watch(self, watching: bool) -> None:  # noqa: FBT001
+        """Begin or end to query the host about the component's life, mode and needs; an active component is queried."""
+        self._is_watched = watching
+        self._begin_or_end_queries()
+
+    def _begin_or_end_queries(self) -> None:
+        loop, wanted = asyncio.get_running_loop(), self._is_watched or self._beating is not None
+        if wanted and not self._watching:
+            self._watching = loop.create_task(self._watch()), loop.create_task(self._condition.run())
+        elif not wanted:
+            watched, self._watching = self._watching, ()
+            for task in watched:
+                task.cancel()
 
     async def activate(self, active: bool) -> None:  # noqa: FBT001
-        """Activate the component at its host, and watch the host while the component is active.
+        """Activate the component at its host, by heartbeats.
 
         Raises:
             NoAnswerError: the host does not answer.
             RefusedError: the component cannot become active.
         """
-        loop = asyncio.get_running_loop()
         if active:
-            self._working = self._working or (loop.create_task(self._watch()), loop.create_task(self._heart.run()))
-            self._require_alive(await self._endpoint.call(self.name, "be active"))
-        elif self._working:
-            working, self._working = self._working, ()
-            for task in working:
-                task.cancel()
-            await asyncio.wait(working)
+            self._beating = self._beating or asyncio.get_running_loop().create_task(self._heart.run())
+            self._begin_or_end_queries()
+            self._require_alive(await self._endpoint.call(self.name, "be active", within=SILENCE))
+        elif self._beating is not None:
+            beating, self._beating = self._beating, None
+            self._begin_or_end_queries()
+            beating.cancel()
+            await asyncio.wait([beating])
 
     def _require_alive(self, condition: dict[str, Any]) -> None:
         self._condition.take(condition)
@@ -135,19 +157,27 @@ class RemoteComponent(Component):
             raise RefusedError(f"it is in '{life}' there" + (f": {reason}" if reason else ""))
 
     async def _watch(self) -> None:
-        renewing = asyncio.get_running_loop().create_task(self._condition.run())
-        try:
-            while True:
-                await asyncio.sleep(WATCH)
-                if self._condition.age > RENEWED + SILENCE and self.life.state is Life.ALIVE:
-                    self.life.become(Life.FATAL_ERROR, f"'{self.name}' has not answered for {SILENCE:g} s")
-        finally:
-            renewing.cancel()
+        """Enter FatalError after a silence of the host, and leave it when the host answers again."""
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        while True:
+            left = SILENCE - min(self._condition.age, loop.time() - began)
+            if left > RESOLUTION:
+                if self._is_silent:
+                    self._is_silent = False
+                    self._follow(self._condition.value)
+                    self._releasing = loop.create_task(self._release())
+                await asyncio.sleep(left)
+                continue
+            self._is_silent = True
+            if self.life.state in {Life.INIT, Life.ALIVE}:
+                self.life.become(Life.FATAL_ERROR, f"'{self.name}' has not answered for {SILENCE:g} s")
+            await asyncio.sleep(AGAIN)
 
     def _changed(self, condition: Any, _: float) -> None:
         match condition:
             case {
-                "life": str(life), "reason": str(reason), "bug": bool(bug), "mode": str(mode), "needs": [*needs],
+                "life": str(life), "reason": str(), "bug": bool(), "mode": str(mode), "needs": [*needs],
                 "program": str(program),
             } if life in list(Life):  # fmt: skip
                 for need in needs:
@@ -155,13 +185,23 @@ class RemoteComponent(Component):
             case _:
                 raise InputError(f"the condition of '{self.name}' cannot be read: {text_of(condition, repr)}")
         restarted, self._program = self._program not in {"", program}, program
-        if self._working and not self.life.starting:
-            if restarted and self.life.state is Life.ALIVE:
-                self.life.become(Life.FATAL_ERROR, f"the program of '{self.name}' was restarted")
-            if self.life.state is Life.SHUTDOWN and life != Life.SHUTDOWN:
-                self.life.become(Life.INIT)
-            self.life.become(Life(life), reason, ProgrammingError(reason) if bug else None)
+        if restarted and self._watching and self.life.state in {Life.INIT, Life.ALIVE} and not self.life.starting:
+            self.life.become(Life.FATAL_ERROR, f"the program of '{self.name}' was restarted")
+        self._follow(condition)
         self.life.mode = mode
+
+    def _follow(self, condition: Mapping[str, Any]) -> None:
+        """Enter the state that the component has at its host."""
+        life, reason, mine = Life(condition["life"]), condition["reason"], self.life
+        if not self._watching or mine.starting:
+            return
+        if not mine.active and life is not Life.FATAL_ERROR:  # this program does not use the component
+            if mine.state is Life.FATAL_ERROR:
+                mine.become(Life.INIT)
+            return
+        if mine.state is Life.SHUTDOWN and life is not Life.SHUTDOWN:
+            mine.become(Life.INIT)
+        mine.become(life, reason, ProgrammingError(reason) if condition["bug"] else None)
 
     async def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         """Execute the skill at the host, and return its outcome.
@@ -185,8 +225,7 @@ class RemoteComponent(Component):
             await self._ask_about(call.action_id, "start", **said)
             return await self._end_of(call, news)
         except asyncio.CancelledError:
-            with suppress(NoAnswerError):  # if the host is lost, the action is lost too
-                await self._ask_about(call.action_id, "stop", WITHIN if self.life.state is Life.ALIVE else WATCH)
+            await self.forget(call.action_id)
             raise
         finally:
             self._endpoint.deafen(f"news {call.action_id}")
@@ -234,9 +273,21 @@ class RemoteComponent(Component):
         return next((Ended(outcome_of(form["ended"])) for form in messages or () if "ended" in form), None)
 
     async def forget(self, action_id: str) -> None:
-        """Release the action at the host, if the host still answers."""
-        with suppress(NoAnswerError):
-            await self._ask_about(action_id, "stop")
+        """Stop and release the action at the host; if the host is silent, when it answers again."""
+        self._unreleased[action_id] = None
+        if not self._is_silent:
+            await self._release()
+
+    async def _release(self) -> None:
+        """Release the actions whose release the host has not answered; a restarted host knows none of them."""
+        for action_id in tuple(self._unreleased):
+            try:
+                await self._ask_about(action_id, "stop")
+            except NoAnswerError:
+                return
+            except RefusedError:
+                pass
+            self._unreleased.pop(action_id, None)
 
     async def configure(self, parameter: str, value: object) -> None:
         """Set a parameter at the host; raise `NoAnswerError` or `RefusedError`."""

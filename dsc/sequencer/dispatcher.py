@@ -477,10 +477,10 @@ class Dispatcher:
             self._report_failure(name, reason)
 
     def _recovered(self, component: Component) -> None:
-        """Post an event about a component that has started after a failure, and deliver its settings again."""
-        self._failures.pop(component.name, None)
-        self.outbox.repeat(component)
-        if not self._closing:
+        """Post an event about the end of a failure, and deliver the settings again to a component that has started."""
+        if component.life.state is Life.ALIVE:
+            self.outbox.repeat(component)
+        if self._failures.pop(component.name, None) is not None and not self._closing:
             self._post(Event(COMPONENT_RECOVERED, {"component": component.name}))
 
     def _forget_failures(self, name: str, told: str) -> None:

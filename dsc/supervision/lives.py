@@ -12,6 +12,9 @@ from dsc.components.hooks import GRACE, give_up, reason_of
 from dsc.components.life_cycle import Life
 from knowledge_base.errors import InputError
 
+_READY = frozenset({Life.INIT, Life.ALIVE})
+"""States after the end of a failure."""
+
 
 class ComponentLives:
     """Listener to the life cycles of all components that are deployed in a run.
@@ -19,7 +22,7 @@ class ComponentLives:
     Args:
         components: the components at the start of the run.
         failed: receives each component that enters FatalError.
-        recovered: receives each component that is alive again after a failure, and has its resources.
+        recovered: receives each component that can start again after a failure, and then the one that has started.
     """
 
     def __init__(
@@ -52,8 +55,9 @@ class ComponentLives:
         if component.life.state is Life.FATAL_ERROR is not before:
             self._lost.add(component)
             self._failed(component)
-        elif component.life.state is Life.ALIVE and component in self._lost and not component.life.in_transition:
-            self._lost.discard(component)
+        elif component in self._lost and component.life.state in _READY and not component.life.in_transition:
+            if component.life.state is Life.ALIVE:
+                self._lost.discard(component)
             self._recovered(component)
 
     async def close(self, needed: Callable[[Component], Iterable[str]] | None) -> list[str]:
@@ -67,7 +71,7 @@ class ComponentLives:
         """
         for component, listener in self._listeners.items():
             component.life.leave(listener)
-            component.life.runs -= 1
+            component.life.end_run()
         due = [one for one in self._listeners if one.life.is_open and not one.life.runs]
         if needed is None or not due:
             return []

@@ -326,8 +326,7 @@ class Lives(RuleBasedStateMachine):
                 self.loop.run_until_complete(self.run_task)
             self.require_closed()
             heard = "\n".join(self.heard)
-            if not self.remote:  # a run does not watch a component at a host that nobody uses
-                assert [failure for failure in self.failures[self.killed_after :] if failure not in heard] == [], heard
+            assert [failure for failure in self.failures[self.killed_after :] if failure not in heard] == [], heard
         finally:
             logging.getLogger("dsc").removeHandler(self.log)
             self.end_program()
