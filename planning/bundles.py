@@ -283,13 +283,13 @@ def domain_of(bundles: Collection[Bundle]) -> PlanningDomain:
 
 
 def shipped_by(components: Iterable[Component]) -> list[DomainText]:
-    """Return the domain fragments that the classes of the components declare, one for each class.
+    """Return the domain fragments of the components, one for each class; also those of components of other programs.
 
     Raises:
         InputError: a file cannot be read, or does not contain a planning domain.
     """
-    kinds = dict.fromkeys(type(component) for component in components)
-    return [_read(kind.domain, kind.__name__) for kind in kinds if kind.domain is not None]
+    fragments = dict.fromkeys((component.domain, type(component).__name__) for component in components)
+    return [_read(domain, owner) for domain, owner in fragments if domain is not None]
 
 
 def _loaded(point: EntryPoint) -> Bundle:

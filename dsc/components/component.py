@@ -46,7 +46,7 @@ class ComponentHooks:
     """
 
     name: str = ""
-    domain: ClassVar[Path | str | None] = None
+    domain: Path | str | None = None
     concurrent: bool = False
     modes: ClassVar[tuple[str, ...] | Mapping[str, tuple[str, ...]]] = ()
     device_errors: ClassVar[tuple[type[BaseException], ...]] = ()

@@ -11,6 +11,7 @@ import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from dsc.calls import OBSERVED, Clock, Reports, SkillCall
@@ -19,6 +20,7 @@ from dsc.components.endpoint import Endpoint, Transport, encoded
 from dsc.components.heartbeat import Heartbeat
 from dsc.components.hooks import GRACE, cancel_once, contained, give_up, reason_of
 from dsc.components.life_cycle import Life
+from dsc.components.parameters import Configuration
 from dsc.components.publication import HostedStreams, Publisher
 from dsc.components.turns import turn_of
 from dsc.errors import PreemptedError, ProgrammingError
@@ -55,6 +57,7 @@ class Host:
         self.endpoint.answer("come alive", self._come_alive)
         self.endpoint.answer("be active", self._be_active)
         self.endpoint.answer("switch", self._switch)
+        self.endpoint.answer("bind", self._bind)
         self._answer("set", "configure", lambda said: component.configure(said["parameter"], said["value"]))
         self._answer("set all", "configure_all", component.configure_all)
         self._answer("take", "take", lambda said: component.receive(said["port"], said["message"]))
@@ -117,8 +120,19 @@ class Host:
     async def _hull(self, _: str, __: Any) -> dict[str, Any]:
         skills = [asdict(signature) for signature in self._component.skills().values()]
         pushes = {name: {"values": dict(port.values)} for name, port in self._component.pushes.items()}
-        said = {"skills": skills, "pushes": pushes, "concurrent": self._component.concurrent}
-        return {**said, "condition": self._condition.newest}
+        return {
+            "skills": skills,
+            "pushes": pushes,
+            "concurrent": self._component.concurrent,
+            "parameters": parameters_form(self._component.configuration),
+            "domain": _domain_of(self._component),
+            "condition": self._condition.newest,
+        }
+
+    async def _bind(self, _: str, said: dict[str, Any]) -> None:
+        """Set parameters by the profile of a client, before the start of the component."""
+        configuration = self._component.configuration
+        configuration.replace(configuration.after(said))
 
     async def _come_alive(self, _: str, __: Any) -> dict[str, Any]:
         await self._component.life.come_alive()
@@ -143,6 +157,18 @@ class Host:
         with contained(f"{self._component.name}.switch", self._component.device_errors):
             await self._component.change_mode(said["mode"])
         return self._condition.newest
+
+
+def parameters_form(configuration: Configuration) -> dict[str, Any]:
+    """Return declarations, relations and values of parameters as plain data."""
+    declared = {name: asdict(parameter) for name, parameter in configuration.declared.items()}
+    return {"declared": declared, "relations": configuration.relations, "values": dict(configuration.parameters)}
+
+
+def _domain_of(component: Component) -> str | None:
+    """Return the text of the component's part of the planning domain."""
+    domain = component.domain
+    return domain.read_text(encoding="utf-8") if isinstance(domain, Path) else domain
 
 
 def outcome_form(outcome: Outcome) -> dict[str, Any]:

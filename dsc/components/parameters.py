@@ -106,6 +106,19 @@ class Parameters(Mapping[str, Any]):
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in self.items())})"
 
 
+def parameters_of(declared: Mapping[str, Parameter], relations: tuple[str, ...]) -> type[Parameters]:
+    """Return a class of parameters for declarations of another program; raise `InputError` if they are not valid."""
+    check_declarations("Parameters", declared, relations)
+
+    class DeclaredParameters(Parameters):
+        pass
+
+    DeclaredParameters.declared, DeclaredParameters.relations = declared, relations
+    for name in declared:
+        setattr(DeclaredParameters, name, property(partial(_value, name)))
+    return DeclaredParameters
+
+
 def _declared(kind: type[Parameters], names: Namespace) -> Iterator[tuple[str, Parameter]]:
     """Yield the parameters that the annotations of a class declare, and give the class an attribute for each."""
     annotations = get_annotations(kind)
@@ -153,12 +166,16 @@ class Configuration:
     Args:
         component: the component's name, for messages.
         kind: the class of the parameters; `Parameters` itself permits any name.
+
+    Attributes:
+        declared: the declarations by name.
+        relations: conditions between the parameters.
     """
 
     def __init__(self, component: str, kind: type[Parameters]) -> None:
         self.component = component
         self.declared = kind.declared
-        self._relations = kind.relations
+        self.relations = kind.relations
         self._as_one_set = False
         self._values: dict[str, Any] = {}
         with tolerated():
@@ -240,6 +257,6 @@ class Configuration:
         return changed(self.component, self.declared, values, settings)
 
     def _check_relations(self, values: Mapping[str, Any]) -> None:
-        for text in self._relations:
+        for text in self.relations:
             if reason := violated(text, values):
                 raise SchemaError(f"component '{self.component}' needs {text}, but {reason}")

@@ -10,16 +10,18 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from dsc.calls import Ended, SkillCall, Status
 from dsc.components.component import Component
+from dsc.components.declarations import Parameter
 from dsc.components.endpoint import AGAIN, RESOLUTION, WITHIN, Endpoint, NoAnswerError, RefusedError, Transport
 from dsc.components.heartbeat import Heartbeat
 from dsc.components.host import CONDITION, outcome_of
 from dsc.components.life_cycle import Life
+from dsc.components.parameters import Configuration, Parameters, parameters_of
 from dsc.components.publication import RemotePush, Subscription
 from dsc.errors import PreemptedError, ProgrammingError
 from dsc.outcomes import Outcome
@@ -48,6 +50,8 @@ class RemoteComponent(Component):
         self._run = endpoint.life
         self._condition = Subscription(endpoint, name, CONDITION, self._changed)
         self._heart = Heartbeat(endpoint, lambda: [name], _ignore, root=True)
+        self._values_there: dict[str, Any] = {}
+        self._profile: dict[str, Any] | None = None  # values of this program's profile; `None` before the first start
         self._is_silent = False
         self._unreleased: dict[str, None] = {}  # ids of actions, in their order
         self._releasing: asyncio.Task[None] | None = None
@@ -85,11 +89,24 @@ class RemoteComponent(Component):
             remote.concurrent = bool(said["concurrent"])
             for port, form in said["pushes"].items():
                 remote.pushes[port] = RemotePush(endpoint, name, port, form["values"])
+            remote._take_parameters(said["parameters"])
+            if said["domain"] is not None:
+                require_text(said["domain"], "the part of the planning domain")
+                remote.domain = said["domain"]
             remote._condition.take(said["condition"])
         except Exception as error:
             await endpoint.close()
             raise RefusedError(f"the description of '{name}' cannot be read: {described(error)}") from error
         return remote
+
+    def _take_parameters(self, form: Mapping[str, Any]) -> None:
+        """Declare the parameters that the component has at its host, with their present values."""
+        declared = {name: _parameter_of(one) for name, one in form["declared"].items()}
+        kind = parameters_of(declared, tuple(form["relations"])) if declared else Parameters
+        self.configuration = Configuration(self.name, kind)
+        self.configuration.replace(form["values"])
+        self.parameters = self.configuration.parameters
+        self._values_there = dict(form["values"])
 
     def skills(self) -> dict[str, SkillSignature]:
         """Return the signatures at the time of the connection."""
@@ -106,12 +123,17 @@ class RemoteComponent(Component):
                 return await RemoteComponent.connect(name, self._transport, WATCH)
 
     async def start(self) -> None:
-        """Start the component at its host.
+        """Start the component at its host, with the values that this program's profile gives to its parameters.
 
         Raises:
             NoAnswerError: the host does not answer.
             RefusedError: the component cannot start.
         """
+        if self._profile is None:
+            there = self._values_there
+            self._profile = {name: value for name, value in self.parameters.items() if there.get(name) != value}
+        if self._profile:
+            await self._endpoint.call(self.name, "bind", self._profile, SILENCE)
         condition = await self._endpoint.call(self.name, "come alive", within=SILENCE)
         self._is_silent = False
         await self._release()
@@ -290,12 +312,35 @@ class RemoteComponent(Component):
             self._unreleased.pop(action_id, None)
 
     async def configure(self, parameter: str, value: object) -> None:
-        """Set a parameter at the host; raise `NoAnswerError` or `RefusedError`."""
-        await self._ask("set", {"parameter": parameter, "value": value})
+        """Set a parameter at the host.
+
+        Raises:
+            UnknownNameError: the component declares parameters, and `parameter` is not among them.
+            InputError: the value violates its declaration or a relation.
+            NoAnswerError: the host does not answer.
+            RefusedError: the component refuses the value.
+        """
+        with self._reverted():
+            self.configuration.set(parameter, value)
+            await self._ask("set", {"parameter": parameter, "value": value})
 
     async def configure_all(self, values: Mapping[str, Any]) -> None:
-        """Set parameters at the host as one set; raise `NoAnswerError` or `RefusedError`."""
-        await self._ask("set all", dict(values))
+        """Set parameters at the host as one set; raise as `configure`."""
+        with self._reverted():
+            with self.configuration.as_one_set(values):
+                for parameter, value in values.items():
+                    self.configuration.set(parameter, value)
+            await self._ask("set all", dict(values))
+
+    @contextmanager
+    def _reverted(self) -> Iterator[None]:
+        """Return a context manager that restores the values of the parameters after an error."""
+        before = dict(self.parameters)
+        try:
+            yield
+        except BaseException:
+            self.configuration.replace(before)
+            raise
 
     async def change_mode(self, mode: str) -> None:
         """Change the mode at the host; raise `NoAnswerError` or `RefusedError`."""
@@ -324,3 +369,7 @@ class RemoteComponent(Component):
 
 async def _ignore(_: bool) -> None:  # noqa: FBT001
     """Do nothing: a client acquires no resources for its heartbeat."""
+
+
+def _parameter_of(form: Mapping[str, Any]) -> Parameter:
+    return Parameter(**{**form, "among": tuple(form["among"]), "depends_on": tuple(form["depends_on"])})
