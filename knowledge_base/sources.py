@@ -7,6 +7,8 @@ immediately, in the present version. Versions, changes and journals do not conta
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
+from itertools import count
 from types import TracebackType
 from typing import Self
 
@@ -85,6 +87,10 @@ class DataSource:
         self._closed = True
 
 
+SourceListener = Callable[[DataSource], None]
+"""Function that is called with a source after its value has changed, in any thread."""
+
+
 class Sources:
     """All open sources of a knowledge base, in the order of their binding."""
 
@@ -98,6 +104,20 @@ class Sources:
         self._state, self._graph, self._installed = state, graph, installed
         self._notifier, self._lock = notifier, notifier.lock
         self._open: dict[Fact, DataSource] = {}
+        self._listeners: dict[int, SourceListener] = {}
+        self._keys = count()
+
+    def subscribe(self, listener: SourceListener) -> Callable[[], None]:
+        """Call `listener` after each new value of a source; see `KnowledgeBase.subscribe_to_sources`."""
+        with self._lock:
+            key = next(self._keys)
+            self._listeners[key] = listener
+
+        def unsubscribe() -> None:
+            with self._lock:
+                self._listeners.pop(key, None)
+
+        return unsubscribe
 
     def bind(self, fluent: Fact, reference: str) -> DataSource:
         """Create a source for a fluent without a source; see `KnowledgeBase.bind_source`."""
@@ -128,7 +148,7 @@ class Sources:
             source.take(content)
             self._state.feed(fluent, content)
             self._show(fluent, source.reference, content)
-            self._tell(fluent, before)
+            self._tell(source, before)
         self._notifier.deliver()
 
     def close(self, source: DataSource) -> None:
@@ -138,7 +158,7 @@ class Sources:
                 return
             before = self._value(source.fluent)
             self._drop(source)
-            self._tell(source.fluent, before)
+            self._tell(source, before)
         self._notifier.deliver()
 
     def close_about(self, things: Iterable[str]) -> None:
@@ -158,9 +178,11 @@ class Sources:
         if (graph := self._graph()) is not None:  # otherwise no reader has requested the graph
             graph.feed(fluent, reference, content)
 
-    def _tell(self, fluent: Fact, before: Content) -> None:
-        if self._value(fluent) != before:
-            self._installed.refreshed(fluent)
+    def _tell(self, source: DataSource, before: Content) -> None:
+        if self._value(source.fluent) != before:
+            self._installed.refreshed(source.fluent)
+            for listener in self._listeners.values():
+                self._notifier.queue(partial(listener, source))
 
     def _value(self, fluent: Fact) -> Content:
         return self._state.value(fluent.predicate, fluent.args)

@@ -26,7 +26,7 @@ from knowledge_base.journal.history import History, MemoryHistory, Version, Writ
 from knowledge_base.journal.journal import Journal
 from knowledge_base.language.checking.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.language.syntax.expression import Expression
-from knowledge_base.sources import DataSource, Sources
+from knowledge_base.sources import DataSource, SourceListener, Sources
 from knowledge_base.transaction import GroupCommit, Transaction
 from knowledge_base.view import View
 from knowledge_base.world.overlay import Overlay
@@ -283,6 +283,13 @@ class KnowledgeBase(View):
         called all listeners; the change stays committed.
         """
         return self._notifier.subscribe(listener)
+
+    def subscribe_to_sources(self, listener: SourceListener) -> Callable[[], None]:
+        """Call `listener` with a source after each change of its value; return a function that ends the subscription.
+
+        The calls come in the threads that update the sources. No version and no `Change` contains such a value.
+        """
+        return self._sources.subscribe(listener)
 
     def install(
         self,

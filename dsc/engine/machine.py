@@ -12,6 +12,7 @@ from dsc.engine.reaction import CompiledReaction
 from dsc.engine.reaction_choice import Choice, Question
 from dsc.engine.situation import Chart, Situation
 from dsc.engine.steps import NO_CHANGE, Microstep, SendMessage, Step
+from dsc.errors import RunawayError
 from dsc.events import Event
 from knowledge_base.errors import InputError
 
@@ -113,6 +114,14 @@ class Machine:
         done = step(self.chart, self.state, event, situation)
         self.state = done.state
         return done
+
+    def is_enabled(self, situation: Situation) -> bool:
+        """Return whether a transition without trigger is enabled, or its guard fails; the state is unchanged."""
+        try:
+            done = step(self.chart, self.state, None, situation)
+        except RunawayError:
+            return True
+        return bool(done.microsteps or done.output or done.errors or done.bugs)
 
     def entry_messages(self, situation: Situation) -> tuple[SendMessage, ...]:
         """Return the messages that the entry of the active states would send now, the outer states' first."""

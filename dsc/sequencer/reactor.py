@@ -150,6 +150,10 @@ class Reactor:
             return ()
         return output
 
+    def is_enabled(self) -> bool:
+        """Return whether a transition without trigger could be taken now, or its guard fails."""
+        return self.machine.is_enabled(KnowledgeSituation(self.knowledge, self.library))
+
     def observe(self, message: SkillMessage) -> None:
         """Apply the observations of a message that arrives after the last macrostep."""
         self._received(message)

@@ -33,6 +33,7 @@ from dsc.trace import Trace
 from knowledge_base._notebook import table
 from knowledge_base.errors import InputError, StoreError
 from knowledge_base.facts import Change, Delta
+from knowledge_base.sources import DataSource
 from knowledge_base.store import KnowledgeBase
 
 _MOST_GROUPED = 100
@@ -289,11 +290,12 @@ class Sequencer:
         """Receive events and changes of knowledge inside the block."""
         self._over = False
         self._reacts = True  # until the start is complete
-        unsubscribe = self.knowledge.subscribe(self._changed)
+        unsubscribe = self.knowledge.subscribe(self._changed), self.knowledge.subscribe_to_sources(self._fed)
         try:
             yield
         finally:
-            unsubscribe()
+            for end in unsubscribe:
+                end()
             self._over = True
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]], bugs: Iterable[str]) -> RunEnd:
@@ -305,6 +307,7 @@ class Sequencer:
         try:
             await begin()
             self._reacts = False
+            self._wake("another program")  # a resumed run may have missed a change
             while not machine.state.finished and reactor.problem is None:
                 if not inbox.waiting:
                     await self._news()
@@ -432,14 +435,22 @@ class Sequencer:
         """Receive a change of knowledge from any thread."""
         self.clock.calls.call(self._wake, change.author)
 
+    def _fed(self, source: DataSource) -> None:
+        """Receive a new value of a source from any thread."""
+        self.clock.calls.call(self._wake, source.reference)
+
     def _wake(self, author: str) -> None:
-        """Let waiting guards be evaluated after a change of knowledge that is not the run's own."""
+        """Let waiting guards be evaluated after a change of knowledge that is not the run's own.
+
+        Sources may change at high rates, so only a change with an effect causes a macrostep.
+        """
         root = self.machine.state.root
         if self._reacts or root is None or not any(frame.configuration.spontaneous for frame in root.frames()):
             return
-        if not any(one is self._wake_up for one in self._inbox.waiting):
-            self._wake_up = KnowledgeMessage(Delta(), author)
-            self._inbox.put(self._wake_up)
+        if any(one is self._wake_up for one in self._inbox.waiting) or not self._reactor.is_enabled():
+            return
+        self._wake_up = KnowledgeMessage(Delta(), author)
+        self._inbox.put(self._wake_up)
 
     def _take(self, message: Message) -> None:
         if isinstance(message, SkillMessage):

@@ -67,6 +67,24 @@ def test_more_may_be_handed_in_when_it_is_resumed(tmp_path):
     assert run.end.finished
 
 
+def test_a_resumed_run_notices_a_change_between_crash_and_resume(tmp_path):
+    chart = """
+        plot: p
+        states:
+          a: {after: {seconds: 5, to: b}}
+          b: {always: {to: e, when: (q)}, after: {seconds: 50, to: x}}
+          x: {after: {seconds: 9, to: e}}
+          e: {final: true}
+    """
+    crashes = Crashes(tmp_path, chart)
+    folder = crashes.copies[2][2]  # before the commit of the step at 55 s
+    with KnowledgeBase.open(SCHEMA, folder / "run.kb") as kb:
+        kb.apply(Delta(added=(fact("q"),)), "another program")
+    run = Run(folder, [chart], resume=True)
+    assert run.end.finished
+    assert run.at < 10
+
+
 def test_without_a_component_that_it_needs_it_is_not_resumed(tmp_path):
     crashes = Crashes(tmp_path, TWICE)
     _, done, folder = crashes.copies[1]
