@@ -19,6 +19,7 @@ from dsc.components.hooks import GRACE, Classes, can_end, component_at_work, con
 from dsc.components.periodic_steps import StepCounts, step_periodically
 from dsc.errors import NotAliveError, ProgrammingError
 from knowledge_base.errors import InputError
+from knowledge_base.tracebacks import waits_at
 
 _LOG = logging.getLogger(__package__)
 
@@ -135,6 +136,7 @@ class LifeCycle(Announcer):
         self._entered = NEUTRAL  # the mode whose `leave_mode` is due
         self._loop: asyncio.AbstractEventLoop | None = None  # of the last `start`
         self._transition: asyncio.Task[Any] | None = None  # the task that calls hooks at present
+        self._hook = ""  # the last hook
         self._skills: set[asyncio.Task[Any]] = set()
         self._stepping: asyncio.Task[None] | None = None
 
@@ -167,6 +169,14 @@ class LifeCycle(Announcer):
     def is_open(self) -> bool:
         """Whether an exit hook is due, or another hook is being called."""
         return self.started or self.activated or self.in_transition
+
+    @property
+    def hook(self) -> str:
+        """The hook that is being called, with the line at which it waits, as ` and executes arm.start (arm.py:7)`."""
+        if self._transition is None or not self._hook:
+            return ""
+        place = waits_at(self._transition.get_coro())
+        return f" and executes {self._hooks.name}.{self._hook}" + (f" ({place})" if place else "")
 
     def describe(self) -> str:
         """Return the component with its state, as text for a message."""
@@ -377,6 +387,7 @@ class LifeCycle(Announcer):
 
     def _contained(self, hook: str) -> contained:
         component_at_work.set(self._hooks.name)
+        self._hook = hook
         return contained(f"{self._hooks.name}.{hook}", self._hooks.device_errors)
 
     # -- states ------------------------------------------------------------------------------------------------

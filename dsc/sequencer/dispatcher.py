@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from dsc.calls import Clock, Ended, SkillCall, Status
@@ -38,6 +38,7 @@ from dsc.sequencer.inbox import Timers
 from dsc.sequencer.message_checks import encoded, late, validated
 from dsc.sequencer.outbox import CLOSING, Outbox, command, failure, port_of
 from dsc.sequencer.running_skills import InterruptedSkill, PendingCleanups, RunningSkill, WaitObserver
+from dsc.sequencer.undeployed import Undeployed
 from dsc.skills import SkillSignature
 from dsc.supervision.activation import ComponentActivation
 from dsc.supervision.component_registry import ComponentRegistry
@@ -50,6 +51,7 @@ DEFAULT_WITHIN = 300.0
 """Seconds after which a skill without `within` in its trigger is cancelled, so that every wait has a bound."""
 UNKNOWN_SKILL = SkillSignature("", "", {}, {}, {}, after_crash="repeat")
 """The signature of a skill that the component lacks; the skill's execution fails."""
+_FOR_COMPONENTS = (steps.Start, steps.SetParameter, steps.SwitchMode, steps.SendMessage)
 _MOST_FAULTS = 100
 """Upper bound of the number of faults that are reported at the end of a run."""
 
@@ -84,6 +86,7 @@ class Dispatcher:
         self.activation = ComponentActivation(ComponentRegistry(self._components), self._in_use)
         self.outbox = Outbox(self._refused)
         self._lives = ComponentLives(self._components.values(), self._failed, self._recovered)
+        self._undeployed = Undeployed(clock, post, self._components.keys())
         self._wiring = Wiring(self._components)
         self._faults: list[str] = []
         self._failures: dict[str, str] = {}  # reasons of the components that have failed and not recovered
@@ -99,10 +102,17 @@ class Dispatcher:
         clock.attend(self._tasks_of)
 
     def deploy(self, component: Component) -> None:
-        """Add a component, which replaces one with an equal name; skills that wait for it begin."""
+        """Add a component, which replaces one with an equal name; skills and commands that wait for it begin."""
         self._lives.add(component)
         self.activation.deploy(component)
         self._wiring.deployed(component)
+        for held in self._undeployed.release(component.name):
+            if isinstance(held.output, steps.Start):
+                self._start(held.output, InterruptedSkill(held.at, None, 0))
+            else:
+                self._send(held.output)
+        if self._asked:
+            self.give_turns()
 
     @property
     def is_part(self) -> bool:
@@ -128,7 +138,11 @@ class Dispatcher:
 
         Periods do not count, as they are always pending. Skills without a deadline do not count, as they may never end.
         """
-        return self.timers.waiting or any(math.isfinite(one.due) for one in self._running.values())
+        return (
+            self.timers.waiting
+            or self._undeployed.waiting
+            or any(math.isfinite(one.due) for one in self._running.values())
+        )
 
     @property
     def watching(self) -> bool:
@@ -136,11 +150,7 @@ class Dispatcher:
         return any(one.signature.unlimited for one in self._running.values())
 
     def dispatch_all(self, outputs: Iterable[steps.Output]) -> None:
-        """Execute the outputs of a macrostep.
-
-        Raises:
-            UnknownNameError: a component is not deployed; the later outputs are not executed.
-        """
+        """Execute the outputs of a macrostep."""
         self.outbox.begin_step()
         for output in outputs:
             self.dispatch(output)
@@ -148,12 +158,11 @@ class Dispatcher:
             self.give_turns()
 
     def dispatch(self, output: steps.Output) -> None:
-        """Execute one output of the machine.
-
-        Raises:
-            UnknownNameError: no component of that name is deployed.
-        """
-        if isinstance(output, steps.Start):
+        """Execute one output of the machine; an output for a component that is not deployed yet waits."""
+        if isinstance(output, _FOR_COMPONENTS) and output.component not in self._components:
+            within = output.within if isinstance(output, steps.Start) else None
+            self._undeployed.hold(output, within or DEFAULT_WITHIN)
+        elif isinstance(output, steps.Start):
             self._start(output)
         elif isinstance(output, steps.Cancel):
             self._cancel(output.activation)
@@ -163,11 +172,19 @@ class Dispatcher:
             self.timers.schedule(output, self._clock.now() + output.seconds)
         elif isinstance(output, steps.Revoke):
             self.timers.revoke(output)
-        elif isinstance(output, steps.SetParameter | steps.SwitchMode | steps.SendMessage):
-            self.outbox.send(self.component(output.component), output)
-            if isinstance(output, steps.SwitchMode):
-                self.activation.switched(output.component, output.mode)
+        elif isinstance(output, Told):
+            self._send(output)
         # Other outputs are notes, which only the trace records.
+
+    def _send(self, told: Told) -> None:
+        self.outbox.send(self.component(told.component), told)
+        if isinstance(told, steps.SwitchMode):
+            self.activation.switched(told.component, told.mode)
+
+    @property
+    def under_way(self) -> Collection[Told]:
+        """Commands that were neither received nor refused yet."""
+        return [*self.outbox.under_way, *self._undeployed.commands] if self._undeployed else self.outbox.under_way
 
     @property
     def components(self) -> Mapping[str, Component]:
@@ -307,10 +324,15 @@ class Dispatcher:
 
     @property
     def waits(self) -> Iterator[str]:
-        """Each skill that waits for its component, with the skill that the component executes, as text."""
+        """Each skill that waits for its component, with the skill that the component executes, as text.
+
+        Skills and commands whose component is not deployed follow.
+        """
         for running in self._running.values():
             if running.holder is not None:
-                yield f"{running.describe()} waits for {self._missing(running)}"
+                component = self._components[running.start.component]
+                yield f"{running.describe()} waits for {self._missing(running, component)}"
+        yield from self._undeployed.describe()
 
     async def abandon(self, start: steps.Start) -> None:
         """Request that a component stops a skill that was cancelled just before a restart.
@@ -354,7 +376,7 @@ class Dispatcher:
         await self.activation.close()
         self._wiring.close()
         unstopped = await self._lives.close(None if self.is_part else self.activation.needed)
-        problems = [*self.outbox.failures(), *self._faults, *unstopped]
+        problems = [*self.outbox.failures(), *self._undeployed.close(), *self._faults, *unstopped]
         for problem in problems:
             _LOG.warning("%s", problem)  # a cancelled run has no `RunEnd`
         return problems
@@ -383,7 +405,7 @@ class Dispatcher:
     async def _execute(self, component: Component, running: RunningSkill, interrupted: InterruptedSkill | None) -> None:
         component_at_work.set(component.name)
         dependencies = SkillDependencies(self.activation, component)
-        running.missing = lambda: dependencies.missing or self._missing(running)
+        running.missing = lambda: dependencies.missing or self._missing(running, component)
         try:
             outcome = await self._outcome(component, running, dependencies, interrupted)
         except BaseException as error:
@@ -442,13 +464,16 @@ class Dispatcher:
         # The observations are true, also if they arrive late.
         return late(start, running.within, observed=outcome.observed) if running.is_late else outcome
 
-    def _missing(self, running: RunningSkill) -> str:
-        """Return, as text, the component for whose turn or settings a skill waits; empty if it waits for none."""
+    def _missing(self, running: RunningSkill, component: Component) -> str:
+        """Return, as text, the component for whose turn, outputs or start a skill waits; empty if it waits for none."""
         holder = running.holder
         if holder is not None:
             doing = f", which executes {holder}" if holder else ""
             return f"component '{running.start.component}'{doing}"
-        return self.outbox.unconfigured(running.configuring)
+        unconfigured = self.outbox.unconfigured(running.start, running.configuring, self._components)
+        if unconfigured or component.life.state is Life.ALIVE:
+            return unconfigured
+        return component.life.describe() + component.life.hook
 
     def _refused(self, told: Told, error: Exception) -> None:
         """Post an event for the state whose command has failed; at the end of the run, report the failure."""
@@ -508,6 +533,8 @@ class Dispatcher:
             _LOG.info("component '%s' could not forget the action '%s'", component.name, action_id)
 
     def _cancel(self, activation: int) -> None:
+        if self._undeployed:
+            self._undeployed.cancel(activation)
         for running in tuple(self._running.values()):
             if running.start.activation == activation:
                 self.stop(running.start)

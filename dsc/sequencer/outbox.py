@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator
+from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -13,10 +14,11 @@ from typing import Any
 from dsc.components.component import Component
 from dsc.components.hooks import GRACE, contained, reason_of
 from dsc.components.life_cycle import NEUTRAL, Life
-from dsc.engine.steps import SendMessage, SetParameter, SwitchMode
+from dsc.engine.steps import SendMessage, SetParameter, Start, SwitchMode
 from dsc.errors import ProgrammingError
 from dsc.messages import Told
 from dsc.sequencer.message_checks import encoded
+from knowledge_base.tracebacks import waits_at
 
 _LOG = logging.getLogger(__package__)
 CLOSING = GRACE
@@ -57,6 +59,7 @@ class Outbox:
         self._failures: set[tuple[str, int]] = set()  # components and activations of the present macrostep
         self.untaken: dict[str, Delivery] = {}
         self.configuring: Configuring = {}
+        self._calls: dict[str, tuple[str, asyncio.Task[Any]]] = {}  # hooks that deliveries call, by component
         self._under_way: dict[int, Told] = {}
         self._refused: deque[Told] = deque(maxlen=_MOST_REFUSED)
         self._settings: dict[str, _Settings] = {}
@@ -161,7 +164,7 @@ class Outbox:
                 await asyncio.wait([before])
             try:
                 if hook in _LIFE_HOOKS or await _is_ready(component, told):
-                    with contained(f"{component.name}.{hook}", component.device_errors):
+                    with self._calling(component, hook):
                         await take()
                     if setting is not None:
                         self._note(component, setting)
@@ -191,15 +194,42 @@ class Outbox:
             failures.add((component.name, told.activation))
             self._failed(told, error)
 
+    @contextmanager
+    def _calling(self, component: Component, hook: str) -> Iterator[None]:
+        """Return a context manager in which a delivery calls a hook of the component."""
+        task = asyncio.current_task()
+        assert task is not None  # noqa: S101  # a delivery is a task
+        self._calls[component.name] = hook, task
+        try:
+            with contained(f"{component.name}.{hook}", component.device_errors):
+                yield
+        finally:
+            del self._calls[component.name]
+
     async def configured(self, tasks: Configuring) -> None:
         """Wait until the components have received or refused the parameters and modes of a macrostep."""
         # Also for tasks that are done, so that skills begin in the order of the chart.
         await asyncio.wait(tasks.values())
 
-    def unconfigured(self, tasks: Configuring) -> str:
-        """Return a component that has not received its parameters and modes, as text; empty if there is none."""
-        name = next((name for name, task in tasks.items() if not task.done()), None)
-        return "" if name is None else f"component '{name}', which has not received its parameters and modes"
+    def unconfigured(self, start: Start, tasks: Configuring, components: Mapping[str, Component]) -> str:
+        """Return the component whose outputs a skill waits for, as text with its hook; empty if it waits for none.
+
+        Args:
+            start: the start of the skill.
+            tasks: the deliveries of the skill's macrostep.
+            components: the deployed components by name.
+        """
+        name, what = next((name for name, task in tasks.items() if not task.done()), ""), "parameters and modes"
+        if not name and start.component in self.untaken and not self.untaken[start.component].done():
+            name, what = start.component, "messages"
+        if not name:
+            return ""
+        hook, task = self._calls.get(name, ("", None))
+        place = "" if task is None else waits_at(task.get_coro())
+        called = (
+            f" and executes {name}.{hook}" + (f" ({place})" if place else "") if hook else components[name].life.hook
+        )
+        return f"component '{name}', which has not received its {what}{called}"
 
     async def configured_now(self, component: Component, tasks: Configuring) -> None:
         """Wait until the component has taken its outputs, and deliver the settings that it has not taken again.

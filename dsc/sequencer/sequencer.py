@@ -419,7 +419,7 @@ class Sequencer:
         store, reactor = self.store, self._reactor
         if store is None:
             reactor.tracer.world(self.knowledge)
-            self._carry_out(reactor.start(plot, arguments))
+            self.dispatcher.dispatch_all(reactor.start(plot, arguments))
             return
         with store.writing:
             serials = store.begin(plot, arguments, self.library)
@@ -429,7 +429,7 @@ class Sequencer:
                     store.late(late, due)
             output = reactor.start(plot, arguments, serials)
             self._keep_step(None, output)
-        self._carry_out(output)
+        self.dispatcher.dispatch_all(output)
 
     def _changed(self, change: Change) -> None:
         """Receive a change of knowledge from any thread."""
@@ -473,7 +473,7 @@ class Sequencer:
                 self.dispatcher.settle(message.start)
         elif isinstance(message, SkillMessage):
             self.dispatcher.report_taken(message.start)
-        self._carry_out(output)
+        self.dispatcher.dispatch_all(output)
 
     def _validated(self, message: SkillMessage) -> SkillMessage:
         return message_checks.validated_in_world(message, self.knowledge, self.dispatcher.place_of)
@@ -509,7 +509,7 @@ class Sequencer:
             with self.store.writing:
                 output = self._reactor.leave()
                 self._keep_step(None, output)
-        self._carry_out(output)
+        self.dispatcher.dispatch_all(output)
 
     def _suspend(self) -> None:
         """Send the actions of a leave, which stop the components, without a change of the kept configuration.
@@ -520,20 +520,14 @@ class Sequencer:
         if self.store.begun and not self.store.lost:
             with self.store.writing:
                 self.store.suspend(self._reactor.entry_messages(), self.clock.now())
-            self._carry_out(self._reactor.suspend())
+            self.dispatcher.dispatch_all(self._reactor.suspend())
 
     def _keep_step(self, message: Message | None, output: Iterable[Output]) -> None:
         assert self.store is not None  # noqa: S101
-        outbox = self.dispatcher.outbox
-        memories = self.dispatcher.memories()
-        now, refused = self.clock.now(), outbox.refused()
-        self.store.step(now, message, output, self._reactor, outbox.under_way, refused, memories)
-
-    def _carry_out(self, output: Iterable[Output]) -> None:
-        try:
-            self.dispatcher.dispatch_all(output)
-        except InputError as error:
-            self._reactor.problem = str(error)
+        dispatcher = self.dispatcher
+        memories = dispatcher.memories()
+        now, refused = self.clock.now(), dispatcher.outbox.refused()
+        self.store.step(now, message, output, self._reactor, dispatcher.under_way, refused, memories)
 
     # -- from outside ------------------------------------------------------------------------------------
 

@@ -35,7 +35,9 @@ class SkillDependencies:
         if self._waits:
             with suppress(InputError):  # `ready` raises this error
                 name = next((one.name for one in self._activation.supervisors_of(self._component) if not one.on), "")
-                return name and self._activation.registry.state_of(name)
+                known = self._activation.registry.known(name)
+                hook = "" if known is None else known.life.hook
+                return name and self._activation.registry.state_of(name) + hook
         return ""
 
     async def ready(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 
 import pytest
 from dsc_runs import Ran, ran
@@ -246,3 +247,42 @@ def test_plots_hear_that_an_unused_component_fails_and_recovers():
     assert [one.attributes["what"] for one in end.emitted] == ["cable", "recovered"]
     assert {one.attributes["which"] for one in end.emitted} == {"drive"}
     assert drive.log == ["speed 5", "speed 5"]
+
+
+HUNG = """
+    plot: p
+    emits: {late: {why: text}}
+    states:
+      a:
+        entry: [{set: drive.speed, to: 1}, {switch: drive, to: up}, {send: drive.say, with: {text: a}}, {trigger: drive.go, within: 5}]
+        on: {gone: e, timed_out: {to: e, emit: late, with: {why: ?event.reason}}}
+      e: {final: true}
+"""
+
+
+@pytest.mark.parametrize("hook", ["start", "activate", "configure", "switch", "say"])
+def test_the_reason_of_a_skill_names_the_hook_that_it_waited_for(hook):
+    class Hung(Drive):
+        async def hang(self, called):
+            if called == hook:
+                await asyncio.sleep(1e5)
+
+        async def start(self):
+            await self.hang("start")
+
+        async def activate(self, active):
+            await self.hang("activate" if active else "")
+
+        async def configure(self, parameter, value):
+            await self.hang("configure")
+
+        async def switch(self, mode):
+            await self.hang("switch")
+
+        @takes
+        async def say(self, text: str):
+            await self.hang("say")
+
+    end, _ = ran(HUNG, Hung())
+    (late,) = end.emitted
+    assert re.search(rf" and executes drive\.{hook} \(.*test_failed_commands\.py:\d+\)$", late.attributes["why"])

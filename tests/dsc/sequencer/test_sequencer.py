@@ -186,7 +186,7 @@ def test_a_chart_that_goes_round_in_circles_ends_the_run_with_a_problem(states):
 
 @pytest.mark.parametrize("entry", ["{trigger: am.grasp}", "{set: am.x, to: 1}", "{switch: am, to: up}"])
 @pytest.mark.parametrize("at_once", [True, False])
-def test_a_component_that_is_not_there_ends_the_run_with_a_problem(entry, at_once):
+def test_a_component_that_is_never_deployed_is_in_the_end_of_the_run(entry, at_once):
     first = "a: {always: b}" if at_once else "a: {after: {seconds: 1, to: b}}"
     ran = Ran("{plot: p, states: {" + first + ", b: {entry: " + entry + ", on: {grasped: e}}, e: {final: true}}}")
     assert not ran.end.finished
@@ -711,3 +711,39 @@ def test_the_end_of_a_source_wakes_a_waiting_guard():
 
     end, at = run_simulated(main())
     assert (end.finished, at) == (True, 2)
+
+
+LATE = """
+    plot: p
+    emits: {late: {why: text}}
+    states:
+      a:
+        entry: [{set: arm.speed, to: fast}, {trigger: arm.grasp, with: {item: cup1}, within: 60}]
+        on: {grasped: e, timed_out: {to: e, emit: late, with: {why: ?event.reason}}}
+        after: {seconds: LEFT, to: b}
+      b: {after: {seconds: 100, to: e}}
+      e: {final: true}
+"""
+
+
+@pytest.mark.parametrize(("deployed", "left", "at", "log"), [
+    (7, 90, 9, ["speed=fast", "grasp cup1"]), (70, 90, 60, []), (7, 5, 105, ["speed=fast"]), (900, 5, 105, []),
+])  # fmt: skip
+def test_a_skill_waits_for_its_component_within_its_time_limit(deployed, left, at, log):
+    arm = Arm()
+
+    async def main():
+        kb = KnowledgeBase(SCHEMA)
+        kb.apply(Delta(nodes={"cup1": "item"}), "test")
+        sequencer = Sequencer(Library([plot(LATE.replace("LEFT", str(left)))]), kb, [], LoopClock())
+        asyncio.get_running_loop().call_later(deployed, sequencer.dispatcher.deploy, arm)
+        return await sequencer.run("p"), sequencer.clock.now()
+
+    end, ended = run_simulated(main())
+    assert (ended, arm.log) == (at, log)
+    if deployed == 7:
+        assert end.finished
+    elif left == 90:
+        assert "waited for its component: there is no component 'arm'" in end.emitted[0].attributes["why"]
+    if not log:
+        assert end.problem == "set arm.speed: there is no component 'arm'"

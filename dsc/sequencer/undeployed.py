@@ -1,0 +1,105 @@
+"""Outputs for components that are not deployed yet; they wait, as a skill waits for its needs (S2.12)."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+from dsc.engine.steps import Start
+from dsc.messages import SkillMessage, Told
+from dsc.sequencer.clock import LoopClock, ScheduledCall
+from dsc.sequencer.message_checks import late
+from dsc.sequencer.outbox import command
+from knowledge_base.errors import UnknownNameError
+
+_LOG = logging.getLogger(__package__)
+
+
+@dataclass(slots=True)
+class Held:
+    """An output that waits for its component since second `at`; a skill has a timer for its time limit."""
+
+    output: Start | Told
+    at: float
+    timer: ScheduledCall | None = None
+
+
+class Undeployed:
+    """The outputs that wait for their components, in the order of their dispatch.
+
+    Args:
+        clock: run time.
+        post: receives the end of a skill whose component was not deployed within the skill's time limit.
+        deployed: names of the deployed components.
+    """
+
+    def __init__(self, clock: LoopClock, post: Callable[[SkillMessage], None], deployed: Collection[str]) -> None:
+        self._clock = clock
+        self._post = post
+        self._deployed = deployed
+        self._held: list[Held] = []
+
+    def __bool__(self) -> bool:
+        return bool(self._held)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a skill waits, whose time limit will end."""
+        return any(one.timer is not None for one in self._held)
+
+    @property
+    def commands(self) -> list[Told]:
+        """The commands that wait."""
+        return [one.output for one in self._held if not isinstance(one.output, Start)]
+
+    def hold(self, output: Start | Told, within: float) -> None:
+        """Let an output wait for its component; a skill ends with `timed_out` after `within` seconds."""
+        held = Held(output, self._clock.now())
+        self._held.append(held)
+        _LOG.warning("%s", self._described(held))
+        if isinstance(output, Start) and math.isfinite(within):
+            held.timer = self._clock.call_at(held.at + within, partial(self._expire, held, within))
+
+    def describe(self) -> Iterator[str]:
+        """Yield each output with its reason to wait, as text."""
+        return map(self._described, self._held)
+
+    def _described(self, held: Held) -> str:
+        output = held.output
+        what = f"{output.component}.{output.skill}" if isinstance(output, Start) else command(output)
+        return f"{what} waits: {self._reason(output)}"
+
+    def _reason(self, output: Start | Told) -> str:
+        message = f"there is no component '{output.component}'"
+        return str(UnknownNameError(message, found=output.component, valid=self._deployed))
+
+    def _expire(self, held: Held, within: float) -> None:
+        self._held.remove(held)
+        assert isinstance(held.output, Start)  # noqa: S101  # only skills have timers
+        waited = f"for its component: {self._reason(held.output)}"
+        self._post(SkillMessage(held.output, late(held.output, within, waited), final=True))
+
+    def cancel(self, activation: int) -> None:
+        """Drop the skills of a state that was left."""
+        self._drop(lambda one: isinstance(one, Start) and one.activation == activation)
+
+    def release(self, component: str) -> Iterator[Held]:
+        """Yield the outputs for a component that is deployed now, which no longer wait."""
+        yield from self._drop(lambda one: one.component == component)
+
+    def close(self) -> Iterator[str]:
+        """Yield the reasons of the commands that no component has received, and drop all outputs."""
+        for one in self._drop(lambda _: True):
+            if not isinstance(one.output, Start):
+                yield f"{command(one.output)}: {self._reason(one.output)}"
+
+    def _drop(self, concerns: Callable[[Start | Told], bool]) -> list[Held]:
+        dropped = [one for one in self._held if concerns(one.output)]
+        self._held = [one for one in self._held if not concerns(one.output)]
+        for one in dropped:
+            if one.timer is not None:
+                one.timer.cancel()
+        return dropped
