@@ -288,7 +288,7 @@ def shipped_by(components: Iterable[Component]) -> list[DomainText]:
     Raises:
         InputError: a file cannot be read, or does not contain a planning domain.
     """
-    fragments = dict.fromkeys((component.domain, type(component).__name__) for component in components)
+    fragments = dict.fromkeys((component.domain_fragment(), type(component).__name__) for component in components)
     return [_read(domain, owner) for domain, owner in fragments if domain is not None]
 
 

@@ -46,7 +46,7 @@ class ComponentHooks:
     """
 
     name: str = ""
-    domain: Path | str | None = None
+    domain: ClassVar[Path | str | None] = None
     concurrent: bool = False
     modes: ClassVar[tuple[str, ...] | Mapping[str, tuple[str, ...]]] = ()
     device_errors: ClassVar[tuple[type[BaseException], ...]] = ()
@@ -206,6 +206,10 @@ class Component(ComponentHooks, RestartHooks):
         """
         never: asyncio.Future[Component] = asyncio.get_running_loop().create_future()
         return await never
+
+    def domain_fragment(self) -> Path | str | None:
+        """Return the component's part of the planning domain, see `ComponentHooks.domain`."""
+        return type(self).domain
 
     def skills(self) -> dict[str, SkillSignature]:
         """Return the signatures of all decorated methods, by skill name."""

@@ -167,7 +167,7 @@ def parameters_form(configuration: Configuration) -> dict[str, Any]:
 
 def _domain_of(component: Component) -> str | None:
     """Return the text of the component's part of the planning domain."""
-    domain = component.domain
+    domain = component.domain_fragment()
     return domain.read_text(encoding="utf-8") if isinstance(domain, Path) else domain
 
 

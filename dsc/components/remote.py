@@ -50,6 +50,7 @@ class RemoteComponent(Component):
         self._run = endpoint.life
         self._condition = Subscription(endpoint, name, CONDITION, self._changed)
         self._heart = Heartbeat(endpoint, lambda: [name], _ignore, root=True)
+        self._domain: str | None = None
         self._values_there: dict[str, Any] = {}
         self._profile: dict[str, Any] | None = None  # values of this program's profile; `None` before the first start
         self._is_silent = False
@@ -92,7 +93,7 @@ class RemoteComponent(Component):
             remote._take_parameters(said["parameters"])
             if said["domain"] is not None:
                 require_text(said["domain"], "the part of the planning domain")
-                remote.domain = said["domain"]
+                remote._domain = said["domain"]
             remote._condition.take(said["condition"])
         except Exception as error:
             await endpoint.close()
@@ -107,6 +108,10 @@ class RemoteComponent(Component):
         self.configuration.replace(form["values"])
         self.parameters = self.configuration.parameters
         self._values_there = dict(form["values"])
+
+    def domain_fragment(self) -> str | None:
+        """Return the text of the component's part of the planning domain at its host."""
+        return self._domain
 
     def skills(self) -> dict[str, SkillSignature]:
         """Return the signatures at the time of the connection."""

@@ -29,7 +29,7 @@ class ObedientRobot(Component):
 
     def __init__(self, domain, script=None, failing_calls=(), seconds=1.0, until=None):
         super().__init__()
-        self.domain = domain
+        self.domain = domain  # type: ignore[misc]
         self.script = {step: list(answers) for step, answers in (script or {}).items()}
         self.failing_calls = failing_calls
         self.seconds = seconds
