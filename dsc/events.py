@@ -89,6 +89,8 @@ class Event(NamedTuple):
         exact: with `to`: only that state may handle the event.
         frame: the plot instance in which the event is visible. Without `to` and `frame`, it is visible everywhere.
         number: the index of the state's timeout or period.
+        inside: with `to`: states inside that state see the event too, and so do those around the plot if the plot
+            declares the event under `emits`.
     """
 
     name: str
@@ -97,6 +99,7 @@ class Event(NamedTuple):
     exact: bool = False
     frame: int | None = None
     number: int | None = None
+    inside: bool = False
 
     def bindings(self) -> dict[str, Any]:
         """Return the attributes by their name in charts, `event.attribute`."""

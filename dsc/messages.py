@@ -22,6 +22,7 @@ class SkillMessage:
         goes_on: whether the skill still executes although it counts as ended; the sequencer then cancels the skill.
         conflated: number of older reports of an equal event that this message replaces, see `dsc.calls`.
         declared: the declared types of the outcome's attributes; `None` if there are no types to validate.
+        activated: whether the message is a component event, which the state has activated, see `Event.inside`.
     """
 
     start: Start
@@ -30,6 +31,7 @@ class SkillMessage:
     goes_on: bool = False
     conflated: int = 0
     declared: Mapping[str, str | None] | None = None
+    activated: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from dsc.drawing.layout import TextStyle, pack
@@ -183,10 +183,24 @@ def _rule_guard(guard: Expression | None) -> str:
     return f"[{', '.join(words)}]" if words else ""
 
 
-def block_texts(state: State) -> list[str]:
-    """Return a line for each action of a state, e.g. `entry / arm.grasp(?item)`."""
+def block_texts(state: State, emits: Container[str] = ()) -> list[str]:
+    """Return a line for each action of a state, e.g. `entry / arm.grasp(?item)`.
+
+    The new name of an event follows, as in `as name`. For one of the outcomes `emits` of the plot it is `as ^name`,
+    since the states around the plot may see it (S0.6).
+    """
     words = {"entry": "entry", "exit": "exit", "on_break": "break"}
-    return [f"{words[key]} / {action_text(action)}" for key, actions in state.blocks() for action in actions]
+    return [
+        f"{words[key]} / {action_text(action)}{_renamed(action, emits)}"
+        for key, actions in state.blocks()
+        for action in actions
+    ]
+
+
+def _renamed(action: Internal | ExternalAction, emits: Container[str]) -> str:
+    if not isinstance(action, Trigger) or not action.names:
+        return ""
+    return " as " + ", ".join(f"^{name}" if name in emits else name for name in action.names.values())
 
 
 def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> str:  # noqa: PLR0911  # a table by kind

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from dsc.drawing.captions import (
@@ -160,7 +160,9 @@ def name_beside(final: Box) -> Box:
     return replace(final, width=width, height=height, texts=texts, boxes=(eye,))
 
 
-def leaf_card(name: str, state: State, library: Library | None, *, rule: bool, told: bool) -> Box:
+def leaf_card(
+    name: str, state: State, library: Library | None, *, rule: bool, told: bool, emits: Container[str]
+) -> Box:
     """Return the box of a state without inner states: simple, submachine or dynamic.
 
     Args:
@@ -169,6 +171,7 @@ def leaf_card(name: str, state: State, library: Library | None, *, rule: bool, t
         library: provider of the plots that the state uses, for details of their interface; may be `None`.
         rule: whether a rule added the state.
         told: whether the box contains the state's purpose; otherwise only the tooltip does.
+        emits: the outcomes of the plot, see `block_texts`.
     """
     rows = [_row(state.about, TextStyle.ABOUT)] if told and state.about and not rule else []
     kind, about = BoxKind.SIMPLE, [state.about or ""]
@@ -179,15 +182,18 @@ def leaf_card(name: str, state: State, library: Library | None, *, rule: bool, t
     elif isinstance(state, DynamicState):
         kind = BoxKind.DYNAMIC
         rows += _choices(state, library)
-    rows += action_rows(state)
+    rows += action_rows(state, emits)
     mark = kind is not BoxKind.SIMPLE
     return card(kind, name, rows, about="\n".join(filter(None, about)), rule=rule, mark=mark)
 
 
-def action_rows(state: State) -> list[CardRow]:
-    """Return rows with a state's least duration, its actions, and its reactions that do not exit the state."""
+def action_rows(state: State, emits: Container[str]) -> list[CardRow]:
+    """Return rows with a state's least duration, its actions, and its reactions that do not exit the state.
+
+    `emits` contains the outcomes of the plot, see `block_texts`.
+    """
     rows = [] if state.at_least is None else [_row(f"≥ {seconds_text(state.at_least)}")]
-    rows += [_row(text) for text in block_texts(state)]
+    rows += [_row(text) for text in block_texts(state, emits)]
     for caption in captions(one for one in labelled(state) if one.transition.target is None):
         rows += [CardRow(line, caption.style, caption.full) for line in caption.lines[:1]]
         rows += [CardRow(line, caption.style) for line in caption.lines[1:]]

@@ -119,12 +119,14 @@ class _Builder:
             return replace(hull, edges=tuple(joins))
         if isinstance(state, Connector):
             return diamond(name, state)
-        return leaf_card(name, state, self._library, rule=name in self._added, told=self._plot.generated)
+        return leaf_card(
+            name, state, self._library, rule=name in self._added, told=self._plot.generated, emits=self._plot.emits
+        )
 
     def _hull(self, kind: BoxKind, name: str, state: State, inside: Box) -> Box:
         """Return a state's box around its content; regions touch the box's border, states have a margin."""
         pad = 0.0 if kind is BoxKind.ORTHOGONAL else PAD
-        head = card(kind, name, action_rows(state), about=state.about or "")
+        head = card(kind, name, action_rows(state, self._plot.emits), about=state.about or "")
         width = max(head.width, inside.width + 2 * pad)
         moved = inside.moved((width - inside.width) / 2, head.height + pad)
         return replace(

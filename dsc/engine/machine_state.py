@@ -144,6 +144,7 @@ class _EventForm(_Form):
     exact: bool
     frame: int | None
     number: int | None
+    inside: bool
 
 
 class _FrameForm(_Form):

@@ -163,8 +163,11 @@ class Macrostep:
         frame, state = found
         if event.name == AT_LEAST:
             return self._least_time_passed(frame, state)
-        trigger = Addressed(event.name, frame.compiled.index[state], event.exact, event.number)
+        trigger = Addressed(event.name, frame.compiled.index[state], event.exact, event.number, event.inside)
         if self._take_alone(frame, trigger, event):
+            return True
+        if event.inside and event.name in frame.compiled.plot.emits:
+            self._performer.emit(frame, event.name, event.attributes)
             return True
         return goes_outwards(event.name) and self._take_around(frame, event)
 

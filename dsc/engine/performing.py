@@ -186,7 +186,7 @@ class Performer:
             case Emit():
                 attributes = self.values(frame, action.arguments)
                 if action.delay is None:
-                    self._emit(frame, action.emit, attributes)
+                    self.emit(frame, action.emit, attributes)
                 else:
                     self._emit_later(frame, action, action.delay, attributes)
             case Withdraw(withdraw=term):
@@ -216,7 +216,8 @@ class Performer:
         event = Event(action.emit, attributes, frame=frame.serial)
         self.output.append(steps.SendLater(event, _delay_of(self.value(frame, delay)), name))
 
-    def _emit(self, frame: Frame, name: str, attributes: Mapping[str, Any]) -> None:
+    def emit(self, frame: Frame, name: str, attributes: Mapping[str, Any]) -> None:
+        """Fire an event in a plot; an outcome of the plot is an event of its host, or of the run."""
         if name not in frame.compiled.plot.emits:
             self.internal.append(Event(name, attributes, frame=frame.serial))
         elif frame.parent is None:

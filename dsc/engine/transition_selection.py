@@ -29,12 +29,14 @@ class Addressed(NamedTuple):
         node: index of the addressed state.
         exact: whether only transitions of this state are considered, and not those of outer states.
         number: position of the timer among the state's timers of this event; `None` for any other event.
+        inside: whether transitions of the states inside are considered, too.
     """
 
     event: str
     node: int
     exact: bool
     number: int | None
+    inside: bool = False
 
 
 Trigger = str | Addressed | None
@@ -146,8 +148,7 @@ def edges_of(compiled: CompiledPlot, index: int, trigger: Trigger) -> tuple[Tran
 
 
 def _addressed_edges(compiled: CompiledPlot, index: int, trigger: Addressed) -> tuple[TransitionEdge, ...]:
-    is_seen = index == trigger.node if trigger.exact else index in (trigger.node, *compiled.nodes[trigger.node].around)
-    if not is_seen:
+    if index != trigger.node and (trigger.exact or not _sees(compiled, index, trigger)):
         return ()
     if trigger.number is None:
         edges = edges_of(compiled, index, trigger.event)
@@ -155,6 +156,13 @@ def _addressed_edges(compiled: CompiledPlot, index: int, trigger: Addressed) -> 
         return _entering_again(compiled, index) if is_lost else edges
     timed = {AFTER: compiled.nodes[index].timeouts, EVERY: compiled.nodes[index].cycles}[trigger.event]
     return (timed[trigger.number].edge,)
+
+
+def _sees(compiled: CompiledPlot, index: int, trigger: Addressed) -> bool:
+    """Return whether a node is around the addressed one, or inside it if the trigger permits that."""
+    if index in compiled.nodes[trigger.node].around:
+        return True
+    return trigger.inside and trigger.node in compiled.nodes[index].around
 
 
 def _entering_again(compiled: CompiledPlot, index: int) -> tuple[TransitionEdge, ...]:

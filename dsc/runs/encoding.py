@@ -91,6 +91,8 @@ def message_form(message: Message, short: Shortener) -> Form:
             form = {"action": message.start.action_id, "outcome": outcome.event, "final": message.final}
             if message.conflated:
                 form["conflated"] = message.conflated
+            if message.activated:
+                form["activated"] = True
             return form | {"attributes": short(outcome.attributes), "observed": delta_form(outcome.observed)}
         case TimerMessage():
             return {"timer": _plain(message.timer)}
@@ -104,7 +106,10 @@ def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Ca
     match form:
         case {"action": action_id}:
             outcome = Outcome(form["outcome"], full(form["attributes"], find), delta_of(form["observed"]))
-            return SkillMessage(action(action_id), outcome, form["final"], conflated=form.get("conflated", 0))
+            return SkillMessage(
+                action(action_id), outcome, form["final"], conflated=form.get("conflated", 0),
+                activated=form.get("activated", False),
+            )  # fmt: skip
         case {"timer": timer}:
             return TimerMessage(StartTimer(**timer))
         case {"late": number}:

@@ -230,7 +230,7 @@ class Reactor:
             else:
                 self.caused_by.pop(start.action_id, None)
         name = start.names.get(outcome.event, outcome.event)
-        event = Event(name, outcome.attributes, to=start.activation)
+        event = Event(name, outcome.attributes, to=start.activation, inside=message.activated)
         skill = f"{start.component}.{start.skill}"
         self.trace.cause = self.tracer.event(event, skill, outcome.event, message.conflated)
         if outcome.observed is not NO_CHANGE:

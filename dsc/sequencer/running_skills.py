@@ -157,7 +157,8 @@ class RunningSkill:
     def _post_report(self, report: Outcome, conflated: int) -> None:
         ends = report.event in {SKILL_ERROR, PROGRAMMING_ERROR}
         declared = None if ends else self.signature.outcomes.get(report.event)
-        self._post(SkillMessage(self.start, report, ends, goes_on=ends, conflated=conflated, declared=declared))
+        activated = self.signature.pattern == "event" and not ends
+        self._post(SkillMessage(self.start, report, ends, ends, conflated, declared, activated))
 
     def _post_observed(self, outcome: Outcome) -> None:
         if outcome.observed is not NO_CHANGE and self.credible:

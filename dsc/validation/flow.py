@@ -48,7 +48,7 @@ def check_wiring(subject: Subject) -> Iterator[Finding]:
         if outcomes or state.entry:  # otherwise the state has no outcome that needs a transition
             handled = _handled([wired[name], *subject.around(path)])
             yield from _outcomes(subject, name, outcomes, handled, path)
-            yield from _skills(subject, name, state, path, handled)
+            yield from _skills(subject, name, state, path, handled, traffic)
         if subject.strict:  # SCXML allows events without a transition or without a source
             yield from _known_events(subject, state, path, traffic)
     if subject.strict:
@@ -155,7 +155,9 @@ def _not_always(plot: ActionPlot, event: str) -> tuple[str, str]:
     return f"the rule that answers it with '{then}' does so {often} times", f"add a last rule that does not '{then}'"
 
 
-def _skills(subject: Subject, name: str, state: State, path: Path, handled: Mapping[str, bool]) -> Iterator[Finding]:
+def _skills(
+    subject: Subject, name: str, state: State, path: Path, handled: Mapping[str, bool], traffic: _Traffic
+) -> Iterator[Finding]:
     for position, action in enumerate(state.entry) if subject.skills is not None else ():
         if not isinstance(action, Trigger):
             continue
@@ -170,7 +172,19 @@ def _skills(subject: Subject, name: str, state: State, path: Path, handled: Mapp
                 yield subject.finding((*here, "as", renamed), "known outcome", message, found=renamed, valid=outcomes)
         events = [action.names.get(event, event) for event in outcomes]
         yield from (_reserved(subject, event, (*here, "trigger")) for event in events if event in EXECUTIVES)
+        if (subject.skills or {})[action.trigger].pattern == "event":
+            yield from _visible_outside(subject, action, here)
+            elsewhere = traffic.heard_in(path).union(subject.plot.emits)
+            events = [event for event in events if event not in elsewhere]
         yield from _outcomes(subject, name, [event for event in events if event not in EXECUTIVES], handled, path)
+
+
+def _visible_outside(subject: Subject, action: Trigger, path: Path) -> Iterator[Finding]:
+    """Yield findings about the attributes of a component event that the plot declares under `emits` (S0.6)."""
+    for event, attributes in (subject.skills or {})[action.trigger].outcomes.items():
+        name = action.names.get(event, event)
+        if name in subject.plot.emits:
+            yield from _attributes(subject, name, set(attributes), (*path, "trigger"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,11 +195,23 @@ class _Traffic:
         anywhere: events that every state may receive.
         inside: events of a state's content, its skills and its inner states, by the state's path.
         heard: events for which the plot has a transition.
+        heard_at: events for which the state at a path has a transition.
+        activated: component events by the path of the state that activates them; states inside see them, too.
     """
 
     anywhere: AbstractSet[str]
     inside: Mapping[Path, AbstractSet[str]]
     heard: AbstractSet[str]
+    heard_at: Mapping[Path, AbstractSet[str]]
+    activated: Mapping[Path, AbstractSet[str]]
+
+    def heard_in(self, path: Path) -> set[str]:
+        """Return the events for which a state inside the state at `path` has a transition."""
+        return {event for at, events in self.heard_at.items() if at[: len(path)] == path != at for event in events}
+
+    def activated_around(self, path: Path) -> set[str]:
+        """Return the component events of the states around the state at `path`."""
+        return {event for at, events in self.activated.items() if path[: len(at)] == at != path for event in events}
 
 
 def _traffic(subject: Subject) -> _Traffic:
@@ -193,18 +219,29 @@ def _traffic(subject: Subject) -> _Traffic:
     anywhere.update(event for _, _, way in subject.ways() for event in way.emitted)
     inside: defaultdict[Path, set[str]] = defaultdict(set)
     heard: set[str] = {handler.on for handler in subject.plot.handlers}
+    heard_at: dict[Path, AbstractSet[str]] = {}
+    activated: dict[Path, AbstractSet[str]] = {}
     for _, state, path in subject.states:
         if isinstance(state, State):
             heard.update(state.on)
+            heard_at[path] = state.on.keys()
+            if events := _skill_events(state, subject.skills, "event"):
+                activated[path] = events
             if ends := {*outcomes_of(state, subject.library), *_skill_events(state, subject.skills)}:
                 for place in subject.way_to(path):
                     inside[place] |= ends
-    return _Traffic(anywhere, inside, heard)
+    return _Traffic(anywhere, inside, heard, heard_at, activated)
 
 
-def _skill_events(state: State, skills: Skills) -> set[str]:
+def _skill_events(state: State, skills: Skills, pattern: str | None = None) -> set[str]:
+    """Return the events of the skills that a state triggers, or only of those with a pattern."""
     triggers = [one for one in state.entry if isinstance(one, Trigger) and one.trigger in (skills or ())]
-    return {t.names.get(event, event) for t in triggers for event in (skills or {})[t.trigger].outcomes}
+    return {
+        t.names.get(event, event)
+        for t in triggers
+        if pattern in {None, (skills or {})[t.trigger].pattern}
+        for event in (skills or {})[t.trigger].outcomes
+    }
 
 
 def _known_events(subject: Subject, state: State, path: Path, traffic: _Traffic) -> Iterator[Finding]:
@@ -212,7 +249,7 @@ def _known_events(subject: Subject, state: State, path: Path, traffic: _Traffic)
         return
     if subject.skills is None and any(isinstance(a, Trigger) for a in state.entry):
         return
-    inside = traffic.inside.get(path, frozenset())
+    inside = traffic.inside.get(path, frozenset()) | traffic.activated_around(path)
     for event in state.on:
         if event not in traffic.anywhere and event not in inside:
             valid = (traffic.anywhere | inside) - RESERVED | {DONE}
