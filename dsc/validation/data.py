@@ -333,7 +333,14 @@ class _Data:
     ) -> Iterator[Finding]:
         """Yield a finding about a value whose type does not fit; data in dialect `scxml` have no types."""
         given = None if term is None or wanted is None or not self._subject.strict else self._kind(term, scope)
-        if term is not None and wanted is not None and given is not None and not self._compatible(given, wanted):
+        if term is None or wanted is None or given is None:
+            return
+        named = wanted in (self._schema.types if self._schema is not None else ())
+        if named and isinstance(term, Constant) and isinstance(term.value, str) and term.value != term.value.lower():
+            message = f"'{what or path[-1]}' is of type {wanted}, and the name of an object is in lower case"
+            lower = term.value.lower()
+            yield self._subject.finding(path, "value fits", message, f"write {lower}", found=term.value)
+        if not self._compatible(given, wanted):
             message = f"'{what or path[-1]}' is of type {wanted}, and {to_text(term)} is of type {given}"
             yield self._subject.finding(path, "value fits", message, found=to_text(term))
 

@@ -304,6 +304,10 @@ WRONG = [
         11, "?itm", "",
     ),
     ("rule event", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lots\n    do: {then: e}\n", 10, "mean 'lost'", ""),
+    (
+        "value fits", S + "  a: {entry: {trigger: arm.grasp, with: {item: Cup1}}, on: {grasped: e, slipped: e}}\n" + E,
+        3, "'item' is of type item, and the name of an object is in lower case", "write cup1",
+    ),
     ("value fits", ITEM + "  a:\n    use: grasp\n    with: {item: ?item, speed: fast}\n" + WIRED + E, 6, "'speed' is of type number", ""),
     ("value fits", S + "  a:\n    use: grasp\n    with: {item: table}\n" + WIRED + E, 5, "table is of type place", ""),
     ("value fits", "plot: p\nparameters:\n  n: {type: number, default: x}\nstates: {e: {final: true}}\n", 3, "of type number", ""),
