@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Protocol
 
-from dsc.events import GAVE_UP, NO_CANDIDATE, NO_PLAN, PROGRAMMING_ERROR, SKILL_ERROR, SKILL_FAILURES, TIMED_OUT
+from dsc.events import (
+    COMPONENT_FAILED,
+    COMPONENT_RECOVERED,
+    GAVE_UP,
+    NO_CANDIDATE,
+    NO_PLAN,
+    PROGRAMMING_ERROR,
+    SKILL_ERROR,
+    SKILL_FAILURES,
+    TIMED_OUT,
+)
 from dsc.model.actions import Configure, Send, Switch
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import STEP, Command, Handler, Response, Rule
@@ -22,6 +32,11 @@ _FAILED: Outcomes = {
     PROGRAMMING_ERROR: {"skill": "text", "reason": "text"},
     TIMED_OUT: {"skill": "text", "reason": "text", "seconds": "number"},
 }
+COMPONENT_EVENTS: Outcomes = {
+    COMPONENT_FAILED: {"component": "text", "reason": "text"},
+    COMPONENT_RECOVERED: {"component": "text"},
+}
+"""Events about components, which all plots see."""
 
 
 class Plots(Protocol):

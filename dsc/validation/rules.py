@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import chain
 
-from dsc.dynamic.steps import Outcomes, answerable, answers_in_plans, concerns, contents_of, outcomes_of, outputs_of
+from dsc.dynamic.steps import (
+    COMPONENT_EVENTS,
+    Outcomes,
+    answerable,
+    answers_in_plans,
+    concerns,
+    contents_of,
+    outcomes_of,
+    outputs_of,
+)
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model.actions import Trigger
@@ -91,6 +100,8 @@ def attributes_of(subject: Subject, event: str, state: State) -> Types | None:
         return declared[event] or {}
     if event in subject.plot.receives:
         return subject.plot.receives[event] or {}
+    if event in COMPONENT_EVENTS:
+        return COMPONENT_EVENTS[event] or {}
     if event == DONE:
         return outputs_of(state, subject.library)
     triggers = (action for action in state.entry if isinstance(action, Trigger))
@@ -146,6 +157,8 @@ class RuleScope:
         if handler.on in self._subject.plot.receives:
             return read_as("event.", self._subject.plot.receives[handler.on] or {})
         listen = handler.listen
+        if listen is None and handler.on in COMPONENT_EVENTS:
+            return read_as("event.", COMPONENT_EVENTS[handler.on] or {})
         brought = None if listen is None else _brought_by(self._subject, listen, handler.on)
         return None if brought is None else read_as("event.", brought)
 
@@ -153,7 +166,7 @@ class RuleScope:
         """Yield findings about the source of a handler's event."""
         known, skills, listen = {*self._subject.plot.receives, *self._fired}, self._subject.skills, handler.listen
         if listen is None:
-            if handler.on not in known:
+            if handler.on not in known and handler.on not in COMPONENT_EVENTS:
                 message = f"nothing here fires the event '{handler.on}'"
                 fix = "events from outside are declared under `receives`, those of components come by `listen`"
                 yield self._subject.finding((*path, "on"), "known event", message, fix, found=handler.on, valid=known)

@@ -6,10 +6,13 @@ import asyncio
 import re
 
 import pytest
+from dsc_charts import plot
 from dsc_runs import Ran, ran
 
-from dsc import Component, Outcome, SkillCall, skill, takes
+from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, skill, takes, validate_plot
 from dsc.components.life_cycle import Life
+from dsc.sequencer.clock import run_simulated
+from knowledge_base import KnowledgeBase, Schema
 
 
 class Gone(Outcome): ...
@@ -286,3 +289,44 @@ def test_the_reason_of_a_skill_names_the_hook_that_it_waited_for(hook):
     end, _ = ran(HUNG, Hung())
     (late,) = end.emitted
     assert re.search(rf" and executes drive\.{hook} \(.*test_failed_commands\.py:\d+\)$", late.attributes["why"])
+
+
+HANDLING = """
+    plot: p
+    emits: {heard: {what: text, which: text}}
+    states:
+      a: {entry: {set: drive.speed, to: 5}, after: {seconds: 60, to: e}}
+      e: {final: true}
+    handlers:
+      - on: component_failed
+        do: {use: report, with: {what: ?event.reason, which: ?event.component}, on: {reported: resume}}
+      - on: component_recovered
+        do: {use: report, with: {what: '"recovered"', which: ?event.component}, on: {reported: resume}}
+"""
+REPORT = """
+    plot: report
+    parameters: {what: text, which: text}
+    emits: {reported: }
+    states:
+      s: {entry: {send: drive.say, with: {text: ?what}}, after: {seconds: 1, to: e}}
+      e: {final: true, emit: reported}
+"""
+
+
+def test_a_handler_responds_to_the_events_of_components():
+    plots = [plot(HANDLING), plot(REPORT)]
+    library, drive = Library(plots), Drive()
+    assert [str(one) for each in plots for one in validate_plot(each, library, Schema(), [])] == []
+
+    async def main():
+        asyncio.get_running_loop().call_later(5, drive.life.become, Life.FATAL_ERROR, "cable")
+        return await Sequencer(library, KnowledgeBase(Schema()), [drive], LoopClock()).run("p")
+
+    assert run_simulated(main()).finished
+    assert [one for one in drive.log if "speed" not in one] == ["cable", "recovered"]  # the message starts the drive
+
+
+def test_the_attributes_of_the_events_of_components_are_checked():
+    wrong = plot(HANDLING.replace("?event.component", "?event.componnet", 1))
+    found = [str(one) for one in validate_plot(wrong, Library([wrong, plot(REPORT)]), Schema(), [])]
+    assert any("there is no variable '?event.componnet' here; did you mean 'event.component'?" in one for one in found)
