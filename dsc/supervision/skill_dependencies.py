@@ -27,17 +27,17 @@ class SkillDependencies:
         self._activation = activation
         self._component = component
         self.concerned = component.name in activation.concerned
-        self._waits = False
 
     @property
     def missing(self) -> str:
         """The dependency that the skill waits for, as text; empty if it waits for none."""
-        if self._waits:
-            with suppress(InputError):  # `ready` raises this error
-                name = next((one.name for one in self._activation.supervisors_of(self._component) if not one.on), "")
-                known = self._activation.registry.known(name)
-                hook = "" if known is None else known.life.hook
-                return name and self._activation.registry.state_of(name) + hook
+        if not self.concerned:
+            return ""
+        with suppress(InputError):  # `ready` raises this error
+            for one in self._activation.supervisors_of(self._component):
+                if not one.on:
+                    known = self._activation.registry.known(one.name)
+                    return self._activation.registry.state_of(one.name) + ("" if known is None else known.life.hook)
         return ""
 
     async def ready(self) -> None:
@@ -66,9 +66,7 @@ class SkillDependencies:
             shut_down = self._component.life.state is Life.SHUTDOWN
             return all(one.on for one in supervisors) or supervisor.failures > before or shut_down
 
-        self._waits = True
         await self._activation.until(settled)
-        self._waits = False
 
     async def carrying(self, work: Awaitable[_Result]) -> _Result:
         """Await the skill's work while its component and the dependencies in any mode are alive; return the result.

@@ -11,6 +11,7 @@ import pytest
 from dsc_charts import plot
 from dsc_runs import ran
 
+from dsc.calls import SkillCall
 from dsc.components.component import ALWAYS, Component, ComponentHooks
 from dsc.components.life_cycle import Life
 from dsc.dynamic.library import Library
@@ -332,3 +333,37 @@ def test_who_waits_for_the_same_start_waits_together():
 def test_a_mode_is_checked_by_the_component():
     with pytest.raises(UnknownNameError):
         asyncio.run(Base().change_mode("slow"))
+
+
+@pytest.mark.parametrize("declared", [True, False])
+def test_the_error_of_reach_fails_the_skill_that_needs_the_component(declared):
+    class Far(Component):
+        name = "far"
+        needs = {ALWAYS: ("motor",)}  # noqa: RUF012
+        device_errors = (OSError,) if declared else ()
+
+        async def reach(self, name):
+            raise OSError(f"no network to {name}")
+
+        @skill
+        async def go(self, call: SkillCall) -> Arrived:
+            return Arrived()
+
+    text = """
+        plot: p
+        emits: {heard: {event: text, why: text}}
+        states:
+          a:
+            entry: {trigger: far.go, within: 9}
+            on:
+              arrived: x
+              skill_error: {to: e, emit: heard, with: {event: '"skill_error"', why: ?event.reason}}
+              programming_error: {to: e, emit: heard, with: {event: '"programming_error"', why: ?event.reason}}
+          x:
+          e: {final: true}
+    """
+    end, at = ran(text, Far())
+    (heard,) = end.emitted
+    assert (heard.attributes["event"], at) == ("skill_error" if declared else "programming_error", 0)
+    assert "no network to motor" in heard.attributes["why"]
+    assert ("far.reach: OSError" in heard.attributes["why"]) == (not declared)
