@@ -23,7 +23,7 @@ from dsc.components.life_cycle import Life
 from dsc.components.parameters import Configuration
 from dsc.components.publication import HostedStreams, Publisher
 from dsc.components.turns import turn_of
-from dsc.errors import PreemptedError, ProgrammingError
+from dsc.errors import NotAliveError, PreemptedError, ProgrammingError
 from dsc.outcomes import Outcome
 from dsc.rank import ORDINARY, Rank
 from knowledge_base.errors import InputError
@@ -191,13 +191,14 @@ _ENDS = {"ended", "failed", "bug", "preempted"}
 
 @dataclass(slots=True)
 class _Action:
-    """An action of a client, with the action's reports and end as messages."""
+    """An action of a client, with the action's reports and end as messages; `lost` is its end if the device is lost."""
 
     client: str
     task: asyncio.Task[None] | None = None
     reports: Reports | None = None
     messages: list[dict[str, Any]] = field(default_factory=list)
     received: int = 0
+    lost: dict[str, Any] | None = None
 
     @property
     def over(self) -> bool:
@@ -251,8 +252,12 @@ class HostedActions:
 
     def cancel(self) -> None:
         """Cancel the skills that the component executes, since the component is no longer alive."""
-        for task in self._at_work:
-            cancel_once(task)
+        life = self._component.life
+        lost = {"bug": str(life.bug)} if life.bug is not None else {"failed": reason_of(NotAliveError(life.describe()))}
+        for action in self._actions.values():
+            if action.task in self._at_work:
+                action.lost = lost
+                cancel_once(action.task)
 
     async def _start(self, sender: str, said: dict[str, Any]) -> None:
         action = self._actions.get(_key(said))
@@ -331,7 +336,7 @@ class HostedActions:
             return None
         action.take(said["heard"])
         if action.over and not (action.messages and _ENDS & action.messages[-1].keys()):
-            self._tell(said["id"], action, {"failed": "its task was cancelled"})
+            self._tell(said["id"], action, action.lost or {"failed": "its task was cancelled"})
         return action.messages[said["heard"] :]
 
     async def _stop(self, _: str, said: dict[str, Any]) -> None:

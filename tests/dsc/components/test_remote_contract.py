@@ -117,7 +117,7 @@ PROFILE = Profile.model_validate({"profile": "here", "components": {"arm": {"por
 
 
 def ran(where, text, profile=PROFILE, arm=None):
-    """The end of the plot `p`, and its outcome's attributes."""
+    """How the plot `p` ended, and when."""
     arm = arm or Arm()
 
     async def main():
@@ -225,3 +225,19 @@ def test_the_checks_before_a_run(where):
     for why in ("is from 0.1 to 1.5; found 9", "did you mean 'speed'", "did you mean 'arm.move'"):
         assert why in found
     assert len(fragments) == 1
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_reason_of_a_lost_device_arrives_whichever_frame_is_lost(seed):
+    async def main():
+        arm, transport = Arm(), LossyTransport(seed, loss=0.3, double=0.3, delay=0.3)
+        host = Host(arm, transport, LoopClock())
+        component = await RemoteComponent.connect("arm", transport)
+        configure([component], PROFILE)
+        library = Library([plot(asked("{trigger: arm.move, with: {seconds: 13}}", "moved"))])
+        end = await Sequencer(library, KnowledgeBase(Schema()), [component], LoopClock()).run("p")
+        await host.close()
+        return end
+
+    (said,) = run_simulated(main()).emitted
+    assert "the cable" in said.attributes["why"]
