@@ -198,3 +198,46 @@ def test_the_picture_shows_the_new_name_of_an_event_and_whether_it_is_visible_ou
     inner = plot(INNER.replace("EMITS", "emits: {low_bat: {level: number}}").replace("ON", ""))
     assert "robot.low(20) as ^low_bat" in draw(inner)
     assert "robot.low(20) as low_bat" in draw(plot(here(EVENT)))
+
+
+EMITTING = """
+    plot: inner
+    EMITS
+    states:
+      both:
+        regions:
+          one: {states: {a: {after: {seconds: 1, to: a2, emit: told}}, a2: {final: true}}}
+          two: {states: {b: {on: {told: b2}}, b2: {final: true}}}
+        on: {done: c}
+      c: {final: true}
+"""
+
+
+def test_all_states_of_the_plot_see_an_emitted_event_and_the_host_does_not():
+    by, findings = seen(USING.replace("ON", "told: {emit: seen, with: {by: host}},"), EMITTING.replace("EMITS", ""))
+    assert by == []  # the plot has ended, as its other region has seen the event
+    assert any("nothing here fires the event 'told'" in one for one in findings)
+
+
+def test_only_the_host_sees_an_emitted_outcome():
+    by, _ = seen(
+        USING.replace("ON", "told: {emit: seen, with: {by: host}},"), EMITTING.replace("EMITS", "emits: {told: }")
+    )
+    assert by == ["host"]  # the other region waits until the event `stop`
+
+
+def test_only_the_state_itself_sees_its_timeout():
+    text = """
+        plot: p
+        receives: {stop: }
+        emits: {seen: {by: symbol}}
+        states:
+          outer:
+            after: {seconds: 3, to: e, emit: seen, with: {by: outer}}
+            on: {stop: e}
+            states:
+              in1: {after: {seconds: 1, to: in2, emit: seen, with: {by: inner}}}
+              in2: {}
+          e: {final: true}
+    """
+    assert seen(text) == (["inner", "outer"], [])
