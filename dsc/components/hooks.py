@@ -25,7 +25,7 @@ from weakref import WeakSet
 
 from dsc.errors import ProgrammingError, SkillError
 from knowledge_base.errors import InputError, described
-from knowledge_base.tracebacks import is_users_code, raised_at, whole_traceback
+from knowledge_base.tracebacks import is_users_code, raised_at, waits_at, whole_traceback
 
 _LOG = logging.getLogger(__package__)
 Classes = tuple[type[BaseException], ...]
@@ -172,6 +172,12 @@ def bug_in(error: BaseException) -> ProgrammingError | None:
 def reason_of(error: BaseException) -> str:
     """Return an error of a hook as text, without the class of an error whose message is complete."""
     return described(error, named=not issubclass(type(error), (ProgrammingError, InputError)))
+
+
+def executes(hook: str, task: asyncio.Task[Any]) -> str:
+    """Return the hook that a task calls, with the line at which it waits, as ` and executes arm.start (arm.py:7)`."""
+    place = waits_at(task.get_coro())
+    return f" and executes {hook}" + (f" ({place})" if place else "")
 
 
 def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:

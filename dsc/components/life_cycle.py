@@ -15,11 +15,19 @@ from contextlib import asynccontextmanager, contextmanager
 from enum import StrEnum
 from typing import Any, ClassVar, Protocol
 
-from dsc.components.hooks import GRACE, Classes, can_end, component_at_work, contained, reason_of, running_task
+from dsc.components.hooks import (
+    GRACE,
+    Classes,
+    can_end,
+    component_at_work,
+    contained,
+    executes,
+    reason_of,
+    running_task,
+)
 from dsc.components.periodic_steps import StepCounts, step_periodically
 from dsc.errors import NotAliveError, ProgrammingError
 from knowledge_base.errors import InputError
-from knowledge_base.tracebacks import waits_at
 
 _LOG = logging.getLogger(__package__)
 
@@ -172,11 +180,10 @@ class LifeCycle(Announcer):
 
     @property
     def hook(self) -> str:
-        """The hook that is being called, with the line at which it waits, as ` and executes arm.start (arm.py:7)`."""
+        """The hook that is being called, see `executes`; empty if none is."""
         if self._transition is None or not self._hook:
             return ""
-        place = waits_at(self._transition.get_coro())
-        return f" and executes {self._hooks.name}.{self._hook}" + (f" ({place})" if place else "")
+        return executes(f"{self._hooks.name}.{self._hook}", self._transition)
 
     def describe(self) -> str:
         """Return the component with its state, as text for a message."""

@@ -51,7 +51,7 @@ DEFAULT_WITHIN = 300.0
 """Seconds after which a skill without `within` in its trigger is cancelled, so that every wait has a bound."""
 UNKNOWN_SKILL = SkillSignature("", "", {}, {}, {}, after_crash="repeat")
 """The signature of a skill that the component lacks; the skill's execution fails."""
-_FOR_COMPONENTS = (steps.Start, steps.SetParameter, steps.SwitchMode, steps.SendMessage)
+_FOR_COMPONENTS = steps.Start | Told
 _MOST_FAULTS = 100
 """Upper bound of the number of faults that are reported at the end of a run."""
 
@@ -444,13 +444,10 @@ class Dispatcher:
         call = SkillCall(action_id, clock, report, running.due, self._fault, start.rank, running.held)
         if not running.begun:
             await running.turn()
-        outbox = self.outbox
-        if running.configuring:
-            await outbox.configured(running.configuring)
-        await outbox.configured_now(component, running.configuring)
+        await self.outbox.configured(component, running.configuring)
         if dependencies.concerned or component.life.state is not Life.ALIVE:
             await dependencies.ready()
-            await outbox.configured_now(component, {})  # the component may have started again, without its settings
+            await self.outbox.configured(component, {})  # the component may have started again, without its settings
         if interrupted is not None and began is not None:
             status = await component.status(call.action_id, start.skill, start.arguments)
             if isinstance(status, Ended):

@@ -12,13 +12,12 @@ from functools import partial
 from typing import Any
 
 from dsc.components.component import Component
-from dsc.components.hooks import GRACE, contained, reason_of
+from dsc.components.hooks import GRACE, contained, executes, reason_of
 from dsc.components.life_cycle import NEUTRAL, Life
 from dsc.engine.steps import SendMessage, SetParameter, Start, SwitchMode
 from dsc.errors import ProgrammingError
 from dsc.messages import Told
 from dsc.sequencer.message_checks import encoded
-from knowledge_base.tracebacks import waits_at
 
 _LOG = logging.getLogger(__package__)
 CLOSING = GRACE
@@ -199,17 +198,13 @@ class Outbox:
         """Return a context manager in which a delivery calls a hook of the component."""
         task = asyncio.current_task()
         assert task is not None  # noqa: S101  # a delivery is a task
-        self._calls[component.name] = hook, task
+        called = f"{component.name}.{hook}"
+        self._calls[component.name] = called, task
         try:
-            with contained(f"{component.name}.{hook}", component.device_errors):
+            with contained(called, component.device_errors):
                 yield
         finally:
             del self._calls[component.name]
-
-    async def configured(self, tasks: Configuring) -> None:
-        """Wait until the components have received or refused the parameters and modes of a macrostep."""
-        # Also for tasks that are done, so that skills begin in the order of the chart.
-        await asyncio.wait(tasks.values())
 
     def unconfigured(self, start: Start, tasks: Configuring, components: Mapping[str, Component]) -> str:
         """Return the component whose outputs a skill waits for, as text with its hook; empty if it waits for none.
@@ -224,19 +219,21 @@ class Outbox:
             name, what = start.component, "messages"
         if not name:
             return ""
-        hook, task = self._calls.get(name, ("", None))
-        place = "" if task is None else waits_at(task.get_coro())
-        called = (
-            f" and executes {name}.{hook}" + (f" ({place})" if place else "") if hook else components[name].life.hook
-        )
+        called = executes(*self._calls[name]) if name in self._calls else components[name].life.hook
         return f"component '{name}', which has not received its {what}{called}"
 
-    async def configured_now(self, component: Component, tasks: Configuring) -> None:
-        """Wait until the component has taken its outputs, and deliver the settings that it has not taken again.
+    async def configured(self, component: Component, tasks: Configuring) -> None:
+        """Wait for deliveries, and until the component has taken its outputs; repeat the settings that it lacks.
+
+        Args:
+            component: the component of a skill.
+            tasks: the deliveries of the skill's macrostep; those to other components may have failed.
 
         Raises:
-            Exception: the component has refused a setting of the macrostep of `tasks`, or refuses one again.
+            Exception: the component has refused a setting of the macrostep, or refuses one again.
         """
+        if tasks:  # also if they are done, so that skills begin in the order of the chart
+            await asyncio.wait(tasks.values())
         own = tasks.get(component.name)
         if own is not None and (why := own.result()) is not None:
             raise why
