@@ -106,7 +106,7 @@ lower-bounds: $(LOWER)/.made   ## tests of every room with the oldest packages t
 		tests/knowledge_base/test_kb_store.py tests/knowledge_base/drawing/test_kb_drawing.py tests/knowledge_base/cli/test_kb_cli.py \
 		tests/dsc/text/test_yaml_plots.py tests/dsc/model/test_model.py tests/dsc/text/test_plot_schema.py tests/dsc/cli/test_plot_cli.py \
 		tests/dsc/drawing/test_diagram.py tests/dsc/runs/test_run_store.py tests/dsc/viewer/test_viewer_server.py \
-		tests/planning/engines/test_planner.py tests/planning/test_unified.py tests/planning/cli/test_cli.py
+		tests/planning/engines/test_planner.py tests/planning/engines/test_unified.py tests/planning/cli/test_cli.py
 
 fuzz: $(VENV)/.test   ## mutated inputs for every reader and command: no traceback, no hang, no growth (SECONDS=N SEED=N ONLY=NAMES REPRODUCE=FILE)
 	$(BIN)/python tests/fuzz/fuzz.py --seconds $(or $(SECONDS),60) --seed $(or $(SEED),0) $(if $(ONLY),--only $(ONLY)) $(if $(REPRODUCE),--reproduce $(REPRODUCE))

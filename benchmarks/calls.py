@@ -38,8 +38,8 @@ from knowledge_base.facts import Fact, fact
 from knowledge_base.language.syntax.text import to_text
 from planning import Executive, PlanStep
 from planning.engines.planner import PlannerProcess
-from planning.plan import PlanningOutcome
-from planning.strips import Problem
+from planning.model.plan import PlanningOutcome
+from planning.model.problem import Problem
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = tuple(str(ROOT / room) for room in ("knowledge_base", "dsc", "planning", "domains"))

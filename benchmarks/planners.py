@@ -32,10 +32,10 @@ from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, installed
 from planning.engines.request import written
 from planning.generation.plan_to_plot import plot_from_plan
+from planning.model.plan import Plan, PlanFound
+from planning.model.problem import Problem
 from planning.ordering.causal_tracing import deordered
-from planning.plan import Plan, PlanFound
 from planning.problem.construction import ProblemBuilder, build_problem
-from planning.strips import Problem
 
 PAGE = Path(__file__).parents[1] / "docs" / "engines.md"
 MARK = "<!-- results -->\n"

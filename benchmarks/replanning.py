@@ -21,12 +21,12 @@ from dsc import ActionPlot, Component, Outcome, SkillCall, skill
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.syntax.text import to_text
 from planning import Executive, PlanStep
-from planning.domain import PlanningAction
 from planning.engines import planner as asking
 from planning.engines.race import PlannerRace
 from planning.execution import repair, search
-from planning.plan import PlanFound, PlanningOutcome
-from planning.strips import Problem
+from planning.model.domain import PlanningAction
+from planning.model.plan import PlanFound, PlanningOutcome
+from planning.model.problem import Problem
 
 PARTS = (
     "mend", "pose", "write", "translate", "engine", "validate, de-order", "generate", "bind, dispatch and the rest",

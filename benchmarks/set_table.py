@@ -8,8 +8,8 @@ from domains.clean_up_table import deployment
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
-from planning.domain import PlanningDomain
-from planning.plan import PlanStep
+from planning.model.domain import PlanningDomain
+from planning.model.plan import PlanStep
 
 FILE = Path(deployment.HOME) / "domain.pddl"
 GOAL = parse_condition("(forall (?i - item) (tidy ?i))")

@@ -22,7 +22,7 @@ from dsc.testing.invariants import (
     replays,
 )
 from knowledge_base.facts import Delta, Fact, fact
-from planning.report import Report
+from planning.robot.report import Report
 
 NO_REPORT, TWICE, NOT_SO, FALSE_CLAIM = "no report", "executed twice", "knowledge is not so", "false claim"
 HANGS, HISTORY, AFTER_STOP = "hangs", "another history", "acts after a stop"

@@ -40,7 +40,7 @@ from dsc.testing.invariants import executed_once, kept_run
 from knowledge_base.errors import DamagedStoreError, InputError
 from planning import Deployment, PlannerProcess, resume
 from planning.engines.race import CachingPlanner
-from planning.report import Report
+from planning.robot.report import Report
 from planning.testing import FaultyPlanner
 
 MOST_STEPS = 5_000

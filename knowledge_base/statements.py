@@ -15,7 +15,7 @@ from knowledge_base.language.checking.check import check, check_effect
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import apply_effect
 from knowledge_base.language.evaluation.world_protocol import BoundedWorld, Bounds, Meter, World
-from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, NumericEffect
+from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
 from knowledge_base.language.syntax.expression import Atom, Call, Comparison, Constant, Expression
 from knowledge_base.language.syntax.sexpr import Group, read
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, to_text
@@ -98,6 +98,8 @@ def _literals(effects: Iterable[Effect]) -> Iterator[Add | Delete]:
                 yield effect
             case AllOf(parts):
                 yield from _literals(parts)
+            case NumericEffect() | When() | ForEach():
+                pass
 
 
 def _called(source: str | None, number: int) -> str | None:

@@ -13,8 +13,8 @@ from dataclasses import replace
 from dsc.sequencer.clock import released
 from dsc.testing.faults import Fault, Faults, InjectedError
 from planning.engines.planner import Planner
-from planning.plan import EngineFailed, Plan, PlanFound, PlanningOutcome
-from planning.strips import Problem
+from planning.model.plan import EngineFailed, Plan, PlanFound, PlanningOutcome
+from planning.model.problem import Problem
 
 _ENGINE = "faulty"
 _FAULTS = (Fault.PLANNER_FAILS, Fault.PLANNER_HANGS, Fault.PLANNER_DIES, Fault.PLANNER_LIES)

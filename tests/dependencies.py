@@ -41,7 +41,7 @@ WHY = {
     "typing-extensions": ("defaults of type variables, for Python before 3.13", IN_PROCESS),
     "unified-planning": (
         "other planning engines, and problems in its form (`to_unified`)",
-        "imported by `planning.unified` and in the engines' processes",
+        "imported by `planning.engines.unified` and in the engines' processes",
     ),
     "up-pyperplan": ("pyperplan as an engine of unified-planning", "found by unified-planning; not imported"),
     "up-fast-downward": ("the engine `fast-downward`", APART),

@@ -15,7 +15,7 @@ from typer.main import get_command
 from knowledge_base import Delta, KnowledgeBase, Schema
 from knowledge_base.errors import InputError
 from planning.cli.command import app, main
-from planning.deployment import Deployment
+from planning.robot.deployment import Deployment
 
 TABLE = Path(__file__).parent.parent / "domains" / "clean_up_table"
 

@@ -6,7 +6,7 @@ from dsc import RunEnd, parse_plot
 from dsc.engine.situation import Decision, Verdict
 from knowledge_base import Delta, KnowledgeBase, Schema, fact
 from planning import Plan, PlanStep, Timing
-from planning.plan import PlanFound
+from planning.model.plan import PlanFound
 
 SCHEMA = Schema.parse("(define (domain d) (:types cup) (:predicates (dirty ?c - cup)))")
 

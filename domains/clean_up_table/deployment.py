@@ -24,11 +24,11 @@ from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta
 from knowledge_base.journal.file import Durability
 from knowledge_base.store import KnowledgeBase
-from planning.bundles import Bundle
-from planning.deployment import Deployment
-from planning.deployment import deploy as deploy_bundle
 from planning.engines.planner import Planner
-from planning.simulation import Fault, Left, Setup, Simulation
+from planning.robot.bundles import Bundle
+from planning.robot.deployment import Deployment
+from planning.robot.deployment import deploy as deploy_bundle
+from planning.robot.simulation import Fault, Left, Setup, Simulation
 
 HOME = Path(str(files("domains.clean_up_table")))
 NAME = "clean-up-table"

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 from domains.clean_up_table.items import CRISP_CAN, HAND, KINDS, OPERATOR, ROOMS, SURFACES, Item, new_item
 from domains.clean_up_table.table_world import TableWorld
-from planning.validation import Validation
+from planning.analysis.validation import Validation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from domains.clean_up_table.observations import Result
     from knowledge_base.language.evaluation.world_protocol import World as Belief
-    from planning.plan import Plan, PlanStep
+    from planning.model.plan import Plan, PlanStep
 
 _VERBS: dict[str, Callable[[TableWorld, str, tuple[str, ...]], Result]] = {
     "drive": lambda world, name, args: world.drive(name, args[1]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dsc.sequencer.sequencer import RunEnd
 from knowledge_base.store import KnowledgeBase
-from planning.report import reason_of_end
+from planning.robot.report import reason_of_end
 
 STOPPED = "stopped"
 """The event that the plot emits if the operator stops the run."""

@@ -349,4 +349,5 @@ def _frame(frame: bytes) -> dict[str, Any] | None:
             return said
         case {"what": "call" | "push", "kind": str(kind), "low": int(low)}:
             return said if len(kind) <= _LONGEST and low <= said["n"] else None
-    return None
+        case _:
+            return None

@@ -364,7 +364,8 @@ def _rank_of(said: object) -> Rank:
             return ORDINARY
         case [int() | float() as priority, bool(handles), int(depth), bool(preempts)]:
             return Rank(priority, handles, depth, preempts)
-    raise InputError(f"a rank is a list of priority, handles, depth and preempts, not {shown(said)}")
+        case _:
+            raise InputError(f"a rank is a list of priority, handles, depth and preempts, not {shown(said)}")
 
 
 def _key(said: Mapping[str, Any]) -> tuple[str, str]:

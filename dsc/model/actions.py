@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Annotated
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, model_validator
 
-from dsc.model.language import ConditionField, EffectField, Frozen, TermField, by_key
+from dsc.model.language import ByKey, ConditionField, EffectField, Frozen, TermField
 
 
 class Trigger(Frozen):
@@ -124,31 +124,14 @@ class Block(Frozen):
     block: tuple[InternalAction, ...]
 
 
-_Internal = (
-    Annotated[Assign, Tag("assign")]
-    | Annotated[Tell, Tag("tell")]
-    | Annotated[Emit, Tag("emit")]
-    | Annotated[Withdraw, Tag("withdraw")]
-    | Annotated[Log, Tag("log")]
-    | Annotated[Choose, Tag("if")]
-    | Annotated[Block, Tag("block")]
-)
-InternalAction = Annotated[_Internal, by_key("assign", "tell", "emit", "withdraw", "log", "if", "block")]
+Internal = Assign | Tell | Emit | Withdraw | Log | Choose | Block
+"""The internal actions as a union of types."""
+InternalAction = Annotated[Internal, ByKey()]
 """The internal actions as the field type of a transition's actions."""
 Choose.model_rebuild()
 Block.model_rebuild()
 
-Internal = Assign | Tell | Emit | Withdraw | Log | Choose | Block
-"""The internal actions as a union of types, for `isinstance`."""
-
-Action = Annotated[
-    Annotated[Trigger, Tag("trigger")]
-    | Annotated[Configure, Tag("set")]
-    | Annotated[Switch, Tag("switch")]
-    | Annotated[Send, Tag("send")]
-    | _Internal,
-    by_key("trigger", "set", "switch", "send", "assign", "tell", "emit", "withdraw", "log", "if", "block"),
-]
+Action = Annotated[ExternalAction | Internal, ByKey()]
 """An action in entry or exit; internal actions are allowed there only in dialect `scxml` (SCXML 3.8)."""
 
 
@@ -169,4 +152,5 @@ def component_of(action: ExternalAction | Internal) -> str | None:
             return port.partition(".")[0]
         case Switch(switch=name):
             return name
-    return None
+        case Assign() | Tell() | Emit() | Withdraw() | Log() | Choose() | Block():
+            return None

@@ -11,14 +11,16 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, Generic, Self, TypeVar, cast
+from typing import Annotated, Any, Generic, Self, TypeVar, Union, cast, get_args
 
 from pydantic import (
+    BaseModel,
     ConfigDict,
     Discriminator,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     PrivateAttr,
+    Tag,
 )
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
@@ -66,14 +68,29 @@ class Written(Frozen):
         return self._places.get(known)
 
 
-def by_key(*keys: str) -> Discriminator:
-    """Return a pydantic discriminator for a union in which each member has one of these distinctive keys."""
-    return Discriminator(
-        kind_by_key(*keys),
-        custom_error_type=UNKNOWN_FORM,
-        custom_error_message=f"one of the keys {', '.join(keys)} is needed here",
-        custom_error_context={"keys": " ".join(keys)},
-    )
+class ByKey:
+    """Annotation of a union of models: a mapping is read as the model whose first field is one of its keys.
+
+    The union is thus the only list of its models: `Annotated[Assign | Tell, ByKey()]` reads `{assign: ...}`.
+    """
+
+    def __get_pydantic_core_schema__(self, union: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Return the schema of the union, discriminated by the keys."""
+        models = {first_key(model): model for model in get_args(union)}
+        keys = Discriminator(
+            kind_by_key(*models),
+            custom_error_type=UNKNOWN_FORM,
+            custom_error_message=f"one of the keys {', '.join(models)} is needed here",
+            custom_error_context={"keys": " ".join(models)},
+        )
+        tagged = tuple(Annotated[model, Tag(key)] for key, model in models.items())
+        return handler.generate_schema(Annotated[Union.__getitem__(tagged), keys])
+
+
+def first_key(model: type[BaseModel]) -> str:
+    """Return the key under which the first field of a model is written, e.g. `if` for `Choose`."""
+    name, field = next(iter(model.model_fields.items()))
+    return field.alias or name
 
 
 def kind_by_key(*keys: str) -> Callable[[Any], str | None]:

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Annotated, TypeVar
 
-from pydantic import BeforeValidator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from dsc.events import LED_AWAY
 from dsc.model.actions import Configure, Send, Switch, Trigger
-from dsc.model.language import ConditionField, EffectField, Frozen, TermField, by_key
+from dsc.model.language import ByKey, ConditionField, EffectField, Frozen, TermField
 from dsc.model.transitions import as_tuple
 
 RETRY, CONTINUE, REPLAN, GIVE_UP, ENTER = "retry", "continue", "replan", "give_up", "enter"
@@ -31,10 +31,7 @@ STEP = "step."
 """Prefix with which a rule reads a step's argument, e.g. `?step.item`."""
 
 Names = Annotated[tuple[str, ...], BeforeValidator(as_tuple)]
-Command = Annotated[
-    Annotated[Configure, Tag("set")] | Annotated[Switch, Tag("switch")] | Annotated[Send, Tag("send")],
-    by_key("set", "switch", "send"),
-]
+Command = Annotated[Configure | Switch | Send, ByKey()]
 """A command to a component, without a result."""
 Commands = Annotated[tuple[Command, ...], BeforeValidator(as_tuple)]
 

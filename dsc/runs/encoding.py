@@ -98,7 +98,8 @@ def message_form(message: Message, short: Shortener) -> Form:
             return {"timer": _plain(message.timer)}
         case LateMessage():
             return {"late": message.number, "message": _outside_form(message.message, short)}
-    return {"sent": _later_form(message, short)}
+        case SendLater():
+            return {"sent": _later_form(message, short)}
 
 
 def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Callable[[str], Any]) -> Message:
@@ -116,7 +117,8 @@ def message_of(form: Mapping[str, Any], action: Callable[[str], Start], find: Ca
             return LateMessage(_outside_of(form["message"], find), number)
         case {"sent": later}:
             return _later_of(later, find)
-    return _outside_of(form, find)
+        case _:
+            return _outside_of(form, find)
 
 
 def _outside_form(message: FromOutside, short: Shortener) -> Form:
@@ -125,7 +127,8 @@ def _outside_form(message: FromOutside, short: Shortener) -> Form:
             return {"event": _event_form(message, short)}
         case KnowledgeMessage():
             return {"change": delta_form(message.delta), "author": message.author}
-    return {"set": _plain(message)}
+        case ParameterMessage():
+            return {"set": _plain(message)}
 
 
 def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOutside:
@@ -134,7 +137,8 @@ def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOuts
             return KnowledgeMessage(delta_of(delta), author)
         case {"set": setting}:
             return ParameterMessage(**setting)
-    return _event_of(form["event"], find)
+        case _:
+            return _event_of(form["event"], find)
 
 
 # -- pending items --------------------------------------------------------------------------------------------
@@ -153,10 +157,13 @@ def awaited_form(what: Awaited, short: Shortener) -> Form:
             return _plain(what) | {"value": short.short(what.value)}
         case SendMessage():
             return _plain(what) | {"arguments": short(what.arguments)}
-    return _plain(what)
+        case StartTimer() | SwitchMode():
+            return _plain(what)
 
 
-def awaited_of(kind: str, form: Mapping[str, Any], find: Callable[[str], Any]) -> Awaited:
+def awaited_of(  # noqa: PLR0911  a table by kind
+    kind: str, form: Mapping[str, Any], find: Callable[[str], Any]
+) -> Awaited:
     """Return the pending item of a form from `awaited_form`; `kind` is the name of the item's class."""
     match kind:
         case "Start":
@@ -165,11 +172,16 @@ def awaited_of(kind: str, form: Mapping[str, Any], find: Callable[[str], Any]) -
             return _later_of(form, find)
         case "SetParameter":
             return SetParameter(**{**form, "value": _full(form["value"], find)})
-        case "StartTimer" | "SwitchMode":
-            return StartTimer(**form) if kind == "StartTimer" else SwitchMode(**form)
+        case "StartTimer":
+            return StartTimer(**form)
+        case "SwitchMode":
+            return SwitchMode(**form)
         case "SendMessage":
             return SendMessage(**{**form, "arguments": full(form["arguments"], find)})
-    return LateMessage(_outside_of(form["message"], find), form["late"])
+        case "LateMessage":
+            return LateMessage(_outside_of(form["message"], find), form["late"])
+        case _:
+            raise ValueError(f"there is no pending item of the kind '{kind}'")
 
 
 def _later_form(later: SendLater, short: Shortener) -> Form:

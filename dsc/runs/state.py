@@ -11,6 +11,7 @@ from dsc.engine.machine import Machine
 from dsc.engine.machine_state import FrameState
 from dsc.engine.steps import (
     Cancel,
+    Note,
     Output,
     Revoke,
     SendLater,
@@ -21,7 +22,7 @@ from dsc.engine.steps import (
     SwitchMode,
 )
 from dsc.events import Event
-from dsc.messages import LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage, Told
+from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage, Told
 from dsc.runs.encoding import Awaited, Shortener, awaited_form, events_form, frame_news
 from dsc.runs.kept import Kept
 from dsc.runs.tables import Form, SnapshotRow
@@ -141,7 +142,7 @@ class RunState:
     def take(self, message: Message) -> None:
         """Remove the pending item that the message ends, or count a report of it."""
         match message:
-            case Event():  # no pending item waits for an event
+            case Event() | KnowledgeMessage() | ParameterMessage():  # no pending item waits for them
                 pass
             case SkillMessage(start=start, final=False, conflated=conflated):
                 for place in self._places.get(_key(start), ()):
@@ -193,6 +194,8 @@ class RunState:
                     revoked = f"{one.frame} {one.id!r} "
                     for key in [key for key in self._places if key[0] == "SendLater" and key[1].startswith(revoked)]:
                         self._forget(key)
+                case Note():
+                    pass
 
     def suspend(self, messages: Iterable[SendMessage], step: int, at: float) -> None:
         """Add messages that a resume sends, except those that it sends anyway."""

@@ -147,6 +147,8 @@ class StepTracer:
                 self._trace.record("action", action="send", port=f"{component}.{port}", arguments=dict(arguments))
             case steps.Note(label, text):
                 self._trace.record("log", label=label, text=text)
+            case steps.Start() | steps.Cancel() | steps.StartTimer() | steps.SendLater() | steps.Revoke():
+                pass  # skills and events have separate records
 
     def _changed_variables(self, step: steps.Step) -> dict[str, Any]:
         """Return new and changed values of parameters and variables, by the path of the plot's host state."""

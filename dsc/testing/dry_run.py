@@ -9,7 +9,19 @@ from typing import Any
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
-from dsc.engine.steps import Cancel, Output, Revoke, SendLater, Start, StartTimer, Step
+from dsc.engine.steps import (
+    Cancel,
+    Note,
+    Output,
+    Revoke,
+    SendLater,
+    SendMessage,
+    SetParameter,
+    Start,
+    StartTimer,
+    Step,
+    SwitchMode,
+)
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN
@@ -189,6 +201,8 @@ class DryRun:
             case Cancel(activation):
                 self.running = [start for start in self.running if start.activation != activation]
                 self._due = [due for due in self._due if due.activation != activation]
+            case SetParameter() | SwitchMode() | SendMessage() | Note():
+                pass  # a dry run has no components
 
     def _ended(self, action_id: str) -> None:
         self.running = [start for start in self.running if start.action_id != action_id]

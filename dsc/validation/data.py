@@ -179,6 +179,8 @@ class _Data:
                 yield from self._term(value, scope, (*path, "to"))
             case actions.Send(arguments=values):
                 yield from self._terms(values, scope, (*path, "with"))
+            case actions.Switch():
+                pass
             case actions.Trigger(trigger=skill, arguments=values):
                 signature = self._skills.get(skill)
                 wanted = _ANY if signature is None else signature.parameters

@@ -127,6 +127,8 @@ def _named(parts: Iterable[Expression]) -> Iterator[Term]:
         match part:
             case Comparison("=", Variable() as variable, Constant(str())):
                 yield variable
+            case _:
+                pass
 
 
 def _counts(conditions: Sequence[Expression]) -> Iterator[Expression]:

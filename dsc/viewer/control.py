@@ -224,6 +224,10 @@ class Control:
                 return any(micro.event is not None and micro.event.name == one.text for micro in step.microsteps)
             case "plan_step":
                 return any(self._plan_steps.get(name) == one.text for name in entered)
+            case _:
+                return self._has_become_true(number, one)
+
+    def _has_become_true(self, number: int, one: Breakpoint) -> bool:
         now = one.condition is not None and self._run().knowledge.ask(one.condition, bounds=Bounds(work=MOST_WORK))
         rose = now and number not in self._was_true
         (self._was_true.add if now else self._was_true.discard)(number)

@@ -79,6 +79,8 @@ def take_in(lines: Iterable[str], log: RecordLog, hands: FarHands) -> None:
                 hands.answer(number, told.get("said"), told.get("wrong", ""))
             case {"end": True}:
                 log.end()
+            case _:
+                pass  # of a newer version
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from planning.bundles import Bundle
+    from planning.robot.bundles import Bundle
 
 
 def bundles_command(
@@ -20,7 +20,7 @@ def bundles_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Show the bundles of the installed packages: components, plots and planning actions to build a robot of."""
-    from planning.bundles import GROUP, installed
+    from planning.robot.bundles import GROUP, installed
 
     found = installed()
     shown = list(found.values()) if name is None else [found.require(name)]

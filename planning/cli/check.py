@@ -22,7 +22,7 @@ def check_command(
     import logging
 
     from dsc.cli.plots import BAD_INPUT, print_findings
-    from planning.checking import check_project
+    from planning.robot.checking import check_project
 
     logging.disable()  # each programming error is a finding
     try:

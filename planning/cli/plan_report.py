@@ -11,13 +11,21 @@ from typing import Any, NoReturn
 import typer
 
 from knowledge_base.facts import Fact
-from knowledge_base.language.syntax.effect import AllOf, Effect, NumericEffect, When, effect_conditions
+from knowledge_base.language.syntax.effect import (
+    Add,
+    AllOf,
+    Delete,
+    Effect,
+    ForEach,
+    NumericEffect,
+    When,
+    effect_conditions,
+)
 from knowledge_base.language.syntax.expression import Call, Constant, Expression, Term, parts_of
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.pddl import ProblemText
-from planning.domain import PlanningDomain
-from planning.ordering.partial_order import PartialOrder, chains
-from planning.plan import (
+from planning.model.domain import PlanningDomain
+from planning.model.plan import (
     EngineFailed,
     NobodyCan,
     NoneFound,
@@ -27,6 +35,7 @@ from planning.plan import (
     ProvenUnsolvable,
     TimedOut,
 )
+from planning.ordering.partial_order import PartialOrder, chains
 
 FOUND, UNSOLVABLE, TIMED_OUT, FAILED = 0, 1, 3, 4
 """Exit statuses of `dsc plan`; status 2 is bad input, for every command."""
@@ -150,6 +159,8 @@ def _assigned(effect: Effect) -> Iterator[tuple[Fact, Term]]:
         case NumericEffect(_, call, amount):
             for fluent in _fluents(call):
                 yield fluent, amount
+        case Add() | Delete() | ForEach():
+            pass
 
 
 def _fluents(e: Expression | Term) -> Iterator[Fact]:

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from dsc.sequencer.sequencer import Sequencer
     from knowledge_base.output_files import Output
     from knowledge_base.store import KnowledgeBase
-    from planning.bundles import Bundle
-    from planning.deployment import Deployment, Task
     from planning.engines.planner import Planner
-    from planning.report import Report
+    from planning.robot.bundles import Bundle
+    from planning.robot.deployment import Deployment, Task
+    from planning.robot.report import Report
 
 GOAL_REACHED, SOMETHING_LEFT = 0, 1
 """Exit statuses of `dsc run`, besides those of every command."""
@@ -47,7 +47,7 @@ def robots() -> Iterator[str]:
     from contextlib import suppress
 
     from knowledge_base.errors import InputError
-    from planning.bundles import installed
+    from planning.robot.bundles import installed
 
     with suppress(InputError):  # an unreadable package must not end the completion
         yield from installed()
@@ -153,8 +153,8 @@ def run_command(
 
 def _bundle(target: str | None) -> Bundle:
     from knowledge_base.errors import InputError
-    from planning.bundles import installed
-    from planning.targets import bundle_at
+    from planning.robot.bundles import installed
+    from planning.robot.targets import bundle_at
 
     if target is None:
         raise InputError("a run needs a robot, or a store to --resume", valid=installed())
@@ -163,7 +163,7 @@ def _bundle(target: str | None) -> Bundle:
 
 def _task(bundle: Bundle, goal: str | None, plot: str | None, given: list[str]) -> Task:
     from knowledge_base.errors import InputError
-    from planning.deployment import Task, own_task, plot_task
+    from planning.robot.deployment import Task, own_task, plot_task
 
     arguments: dict[str, str] = {}
     for one in given:
@@ -195,8 +195,8 @@ def _deployed(
     planner: Planner | None,
 ) -> Deployment:
     from dsc.text.profiles import find_profile
-    from planning.deployment import deploy
-    from planning.targets import full_target
+    from planning.robot.deployment import deploy
+    from planning.robot.targets import full_target
 
     settings = None if profile is None else find_profile(profile, bundle.profiles or Path())
     return deploy(
@@ -216,8 +216,8 @@ def _planner(engine: str) -> Planner:
 def _resumed(store: Path, target: str | None, durability: Durability, planner: Planner | None) -> Deployment:
     """Deploy the robot that began the run in a store; `target` replaces the target that the store has kept."""
     from knowledge_base.errors import Place, StoreError
-    from planning.deployment import kept_run, resume
-    from planning.targets import bundle_at
+    from planning.robot.deployment import kept_run, resume
+    from planning.robot.targets import bundle_at
 
     run = kept_run(store)
     wanted = target or run.header.get("target") or run.header.get("run")
@@ -277,7 +277,7 @@ def _followed(
     from rich.console import Console
 
     from dsc.trace import header, write_to
-    from planning.progress import LiveProgress, PlainProgress
+    from planning.robot.progress import LiveProgress, PlainProgress
 
     with ExitStack() as stack:
         if trace is not None:
@@ -317,9 +317,9 @@ def robot_knowledge(source: Path) -> KnowledgeBase | None:
     A scenario (YAML) belongs to the only installed robot whose simulation reads scenarios. The text `TARGET@SCENARIO`
     names both.
     """
-    from planning.bundles import installed
-    from planning.deployment import deploy
-    from planning.targets import bundle_at
+    from planning.robot.bundles import installed
+    from planning.robot.deployment import deploy
+    from planning.robot.targets import bundle_at
 
     target, _, scenario = str(source).partition("@")
     if source.suffix in {".yaml", ".yml"} and not scenario:
@@ -337,9 +337,9 @@ def robot_knowledge(source: Path) -> KnowledgeBase | None:
 def components_of_target(target: str) -> tuple[Component, ...]:
     """Return the components of a robot, or the components that a target names, for `dsc plot check --robot`."""
     from dsc.components.robot import components_in
-    from planning.bundles import Bundle
-    from planning.deployment import components_for
-    from planning.targets import value_at
+    from planning.robot.bundles import Bundle
+    from planning.robot.deployment import components_for
+    from planning.robot.targets import value_at
 
     found = value_at(target)
     return components_for(found) if isinstance(found, Bundle) else components_in(found)

@@ -15,21 +15,21 @@ from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.output_files import Output
 from knowledge_base.pddl import ProblemText, read_problem
 from knowledge_base.store import KnowledgeBase
-from planning.cancellable_work import WorkLimit, WorkLimitError, aside
+from planning.analysis.explanation import why_unsolvable
 from planning.cli.plan_report import TIMED_OUT, answer_of, end, ordered, purposes, valueless, without_derived
-from planning.domain import PlanningDomain
 from planning.engines.planner import PlannerProcess
 from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, able, chosen, timing
-from planning.explanation import why_unsolvable
+from planning.model.cancellable_work import WorkLimit, WorkLimitError, aside
+from planning.model.domain import PlanningDomain
+from planning.model.plan import NobodyCan, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
+from planning.model.problem import Problem
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import PartialOrder, in_sequence
 from planning.ordering.timed_links import linked
-from planning.plan import NobodyCan, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 from planning.problem.axioms import Derivable
 from planning.problem.construction import build_problem
 from planning.problem.relevance import why_no_engine
-from planning.strips import Problem
 
 PLOT_NAME = "plan"
 PATIENCE, PATIENT_SECONDS = 3.0, 2.0

@@ -11,13 +11,13 @@ from contextlib import AbstractContextManager, aclosing, nullcontext
 from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
-from planning.action_elimination import indispensable
-from planning.cancellable_work import aside
+from planning.engines.action_elimination import indispensable
 from planning.engines.process import EngineProcess, EngineStoppedError, OutOfTimeError, answers, worker
 from planning.engines.registry import can_time, cannot, in_concert, nobody
 from planning.engines.request import written
-from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
-from planning.strips import Problem
+from planning.model.cancellable_work import aside
+from planning.model.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
+from planning.model.problem import Problem
 
 
 @runtime_checkable

@@ -16,7 +16,7 @@ from dataclasses import replace
 from knowledge_base.errors import described
 from planning.engines.planner import PlannerProcess
 from planning.engines.registry import Engine, chosen, nobody
-from planning.plan import (
+from planning.model.plan import (
     EngineFailed,
     NobodyCan,
     NoneFound,
@@ -25,7 +25,7 @@ from planning.plan import (
     ProvenUnsolvable,
     TimedOut,
 )
-from planning.strips import Problem
+from planning.model.problem import Problem
 
 _PLAIN = Problem("", {}, (), (), ())
 
@@ -168,14 +168,18 @@ async def _better_and_better(
         match outcome:
             case None:
                 running -= 1
-            case PlanFound() if best is None or outcome.cost < best.cost:
-                best = replace(outcome, failures=tuple(failures))
-                yield best
-            case ProvenUnsolvable() | NoneFound() if best is None:
-                yield replace(outcome, failures=tuple(failures))
-                return
+            case PlanFound():
+                if best is None or outcome.cost < best.cost:
+                    best = replace(outcome, failures=tuple(failures))
+                    yield best
+            case ProvenUnsolvable() | NoneFound():
+                if best is None:
+                    yield replace(outcome, failures=tuple(failures))
+                    return
             case EngineFailed():
                 failures.append(outcome)
+            case NobodyCan():
+                failures.append(EngineFailed(name, outcome.message))
             case TimedOut():
                 late.append(name)
     if best is None and late:

@@ -13,8 +13,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 from knowledge_base.errors import InputError, UnknownNameError
-from planning.plan import NobodyCan
-from planning.strips import Problem
+from planning.model.plan import NobodyCan
+from planning.model.problem import Problem
 
 WISHES = frozenset({"costs"})
 """Features that an engine may ignore; the plan is then still valid, but may be expensive."""
@@ -34,7 +34,7 @@ class Engine:
         package: the distribution that contains the engine.
         at_least: the lower bound of the package's version.
         licence: the licence of the engine, which may differ from the licence of the package.
-        features: the supported features beyond STRIPS, a subset of `planning.strips.FEATURES`.
+        features: the supported features beyond STRIPS, a subset of `planning.model.problem.FEATURES`.
         program: a program that must also be on the path; empty if none is needed.
         optimal: whether plans have the lowest cost.
         anytime: whether the engine continues to search for better plans.

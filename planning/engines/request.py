@@ -10,7 +10,7 @@ Keys of the JSON object:
 - `actions`: arrays of the step or null; fact numbers of precondition, adds and deletes; cost; bounds; assignments; the
   span of a durative action or null.
 - `whole`: whether the problem has an unsliced form, which a later request may contain.
-- Other attributes of `planning.strips.Problem`.
+- Other attributes of `planning.model.problem.Problem`.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from typing import Any
 
 from knowledge_base.facts import Fact
 from knowledge_base.language.syntax.identity_cache import IdentityCache
-from planning.plan import PlanStep
-from planning.quantities import Assignment, NumericBound, from_json, to_json
-from planning.strips import ActionSpan, GroundAction, Problem
+from planning.model.plan import PlanStep
+from planning.model.problem import ActionSpan, GroundAction, Problem
+from planning.model.quantities import Assignment, NumericBound, from_json, to_json
 
 _Row = tuple[str, tuple[Fact, ...]]
 """The text of an action with gaps, and the facts whose numbers fill the gaps."""

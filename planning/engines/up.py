@@ -28,8 +28,8 @@ from knowledge_base.facts import Fact
 from planning.engines.registry import Engine
 from planning.engines.request import read
 from planning.engines.worker import Answers, Request, Search
-from planning.quantities import Assignment, NumericBound, Operation, Quantity
-from planning.strips import ActionSpan, GroundAction, Problem
+from planning.model.problem import ActionSpan, GroundAction, Problem
+from planning.model.quantities import Assignment, NumericBound, Operation, Quantity
 
 
 def translated(problem: Problem, *, costs: bool = False, environment: Environment | None = None) -> UpProblem:

@@ -88,7 +88,7 @@ def _say(out: int, said: dict[str, Any]) -> None:
 def _loaded(name: str) -> Search:
     """Return the engine's search function; if its import fails, a function that raises the error for each problem."""
     try:
-        import planning.strips  # noqa: F401, PLC0415  before the first fork, so that no search imports it
+        import planning.model.problem  # noqa: F401, PLC0415  before the first fork, so that no search imports it
         from planning.engines.registry import engine  # noqa: PLC0415
 
         one = engine(name)

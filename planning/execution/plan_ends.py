@@ -10,10 +10,10 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.world.overlay import Overlay
-from planning.domain import PlanningDomain
+from planning.model.domain import PlanningDomain
+from planning.model.plan import PlanStep
 from planning.ordering.known_steps import KnownStep, changed_names, literal_of
 from planning.ordering.step_dependencies import ground_conjuncts
-from planning.plan import PlanStep
 from planning.problem.conditions import Literal
 
 

@@ -17,17 +17,17 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import And, Atom, Constant, Expression
 from knowledge_base.world.overlay import Overlay
-from planning.cancellable_work import WorkLimit
-from planning.domain import PlanningDomain
+from planning.analysis.validation import validate
 from planning.execution.plan_ends import leads_to, shortest_end
 from planning.execution.regression import CausalNeeds
-from planning.plan import Plan, PlanStep
+from planning.model.cancellable_work import WorkLimit
+from planning.model.domain import PlanningDomain
+from planning.model.plan import Plan, PlanStep
+from planning.model.problem import Problem
+from planning.model.quantities import worth
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation
 from planning.problem.operators import TOTAL_COST
-from planning.quantities import worth
-from planning.strips import Problem
-from planning.validation import validate
 
 _MOST_RUNNING = 3
 """The largest number of running steps for which each subset is tried as done; beyond it, only none and all."""

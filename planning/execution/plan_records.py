@@ -12,10 +12,10 @@ from planning.ordering.partial_order import PRESENT
 
 if TYPE_CHECKING:
     from dsc.trace import Trace
-    from planning.execution.monitor import Broken
+    from planning.execution.link_monitor import Broken
     from planning.execution.plan_progress import PlanProgress
+    from planning.model.plan import PlanFound, PlanStep
     from planning.ordering.partial_order import PartialOrder
-    from planning.plan import PlanFound, PlanStep
 
 _CUT_SHORT = {"reproducible": False}
 """A mark for outcomes that a limit of real time influenced; a repetition with equal seed may have another outcome."""

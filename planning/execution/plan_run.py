@@ -1,36 +1,30 @@
-"""Plan runs: the state of each plan from its plot to its end, and the escalation after failures (S1.4, S4.2).
-
-After the rules of the plot have failed, `Attempt` chooses the next escalation step. An equal failure in an equal
-situation never has the same answer twice. The number of times that each answer is tried is bounded.
-"""
+"""Plan runs: a plan that has a plot, and its state from the plot to its end (S1.4, S4.2)."""
 
 from __future__ import annotations
 
 import asyncio
-from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
-from knowledge_base.errors import UnknownNameError
 from knowledge_base.language.syntax.text import parse_condition, to_text
-from planning.execution.monitor import Broken, GoalReached, News, Shorter, news_form, news_from
+from planning.execution.link_monitor import Broken, GoalReached, News, Shorter, news_form, news_from
 from planning.execution.outcomes import Withdrawn
 from planning.execution.plan_progress import PlanProgress
 from planning.execution.search import Found, NotFound
-from planning.plan import PlanStep
+from planning.model.plan import PlanStep
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from knowledge_base.language.syntax.expression import Expression
+    from planning.execution.attempt import Attempt
     from planning.execution.planner_call import Improvements
-    from planning.plan import PlanFound
+    from planning.model.plan import PlanFound
     from planning.problem.derived import Settled
 
-MOST_UNMONITORED = 64
-"""The maximum number of unmonitored plans that are kept. The chart may abandon a plan without a message."""
 _PLAIN = (
     "name",
     "holder",
@@ -43,127 +37,6 @@ _PLAIN = (
     "overtaken",
     "replaced",
 )
-
-
-MOST_ATTEMPTS = 64
-"""The maximum number of goals whose interrupted attempts are kept; the oldest are dropped."""
-MOST_RESUMED = 3
-"""The maximum number of times that an attempt resumes at one step without a new plan."""
-
-
-class EscalationStep(Enum):
-    """The answers to a failed plan, in the order in which they are tried."""
-
-    RESUME = "the same plan goes on"
-    OTHER_CANDIDATE = "the same plan goes on, the step done in another way"
-    REPLAN = "a new plan"
-    EXCLUDE = "a new plan without the step"
-    GIVE_UP = "giving up"
-
-
-@dataclass(frozen=True, slots=True)
-class Failure:
-    """Failure of a step in a situation.
-
-    Attributes:
-        step: the failed step.
-        why: the outcome event, or the condition that did not hold.
-        situation: a digest of the world at the time of the failure; see `planning.execution.repair.situation`.
-    """
-
-    step: PlanStep
-    why: str
-    situation: str
-
-
-@dataclass(slots=True)
-class Attempt:
-    """History of failures and answers for one goal, over all plans for that goal.
-
-    The history ends when the goal is reached or abandoned. An interruption, e.g. by a handler, does not end it.
-
-    Attributes:
-        unmet: the number of false parts of the goal at the last interruption; `None` without one.
-        replans: the number of plans that replaced a failed plan.
-        failures: the number of occurrences of each failure.
-        resumed: the number of times that a plan resumed at each step.
-        disturbances: the number of plans that an interruption, or changes by another author, ended since a step was
-            last completed.
-        outages: the number of skills that failed with `skill_error` since a step was last completed.
-    """
-
-    unmet: int | None = None
-    replans: int = 0
-    disturbances: int = 0
-    outages: int = 0
-    failures: Counter[Failure] = field(default_factory=Counter)
-    resumed: Counter[PlanStep] = field(default_factory=Counter)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the attempt as plain data."""
-        failures = [[one.step.to_json(), one.why, one.situation, often] for one, often in self.failures.items()]
-        resumed = [[step.to_json(), often] for step, often in self.resumed.items()]
-        return {
-            "unmet": self.unmet,
-            "replans": self.replans,
-            "disturbances": self.disturbances,
-            "outages": self.outages,
-            "failures": failures,
-            "resumed": resumed,
-        }
-
-    @classmethod
-    def from_json(cls, form: Mapping[str, Any]) -> Attempt:
-        """Return the attempt that `to_json` wrote as `form`."""
-        failures = {
-            Failure(PlanStep.from_json(step), why, where): often for step, why, where, often in form["failures"]
-        }
-        resumed = {PlanStep.from_json(step): often for step, often in form["resumed"]}
-        return cls(
-            form["unmet"], form["replans"], form["disturbances"], form["outages"], Counter(failures), Counter(resumed)
-        )
-
-    def completed(self) -> None:
-        """Note that a step was completed."""
-        self.disturbances = self.outages = 0
-
-    def failed(self, failure: Failure, *, stands: bool, others: bool, outage: bool = False) -> EscalationStep:
-        """Count a failure, and return the next escalation step for it.
-
-        Args:
-            failure: the failed step, the reason and the situation.
-            stands: whether the plan, with the failed step, still leads to the goal.
-            others: whether another candidate implements the failed step.
-            outage: whether the device has failed and not the step, so that further plans may succeed later.
-        """
-        self.failures[failure] += 1
-        if stands and self.resumed[failure.step] < MOST_RESUMED:
-            answers = [
-                EscalationStep.RESUME,
-                *([EscalationStep.OTHER_CANDIDATE] if others else []),
-                EscalationStep.EXCLUDE,
-            ]
-        else:
-            answers = [EscalationStep.REPLAN, EscalationStep.EXCLUDE]
-        tried = self.failures[failure] - 1
-        if tried < len(answers):
-            return answers[tried]
-        return EscalationStep.REPLAN if outage else EscalationStep.GIVE_UP
-
-    def interrupted(self, step: PlanStep | None) -> EscalationStep:
-        """Return the escalation step for a plan that its monitor stopped; the plan could resume at `step`, if any."""
-        return (
-            EscalationStep.RESUME if step is not None and self.resumed[step] < MOST_RESUMED else EscalationStep.REPLAN
-        )
-
-    def replan(self, budget: int, *, disturbed: bool) -> bool:
-        """Count a replan, or a disturbance by another author, and return whether `budget` allows it."""
-        count = self.disturbances if disturbed else self.replans
-        if count >= budget:
-            return False
-        self.replans += not disturbed
-        self.disturbances += disturbed
-        return True
 
 
 class PlanState(Enum):
@@ -213,7 +86,7 @@ class Better:
 
 
 Heard = News | Found | NotFound | Better
-"""The news that `Monitoring` handles."""
+"""The news that `MonitorSkill` handles."""
 
 
 @dataclass(slots=True)
@@ -403,100 +276,6 @@ class PlanRun:
             news=deque(map(news_from, form["news"])),
             **{name: form[name] for name in _PLAIN},
         )
-
-
-class PlanRuns:
-    """The plans that have a plot and have not ended, by name."""
-
-    def __init__(self) -> None:
-        self._runs: dict[str, PlanRun] = {}
-        self._attempts: dict[str, Attempt] = {}
-        self._named = 0
-
-    def interrupted(self, task: str) -> Attempt | None:
-        """Return the attempt at a task that has neither reached nor abandoned its goal."""
-        return self._attempts.get(task)
-
-    def attempt(self, task: str, unmet: int | None) -> Attempt:
-        """Begin and return a new attempt at a task, whose goal has `unmet` false parts after an interruption."""
-        self._attempts.pop(task, None)
-        while len(self._attempts) >= MOST_ATTEMPTS:
-            del self._attempts[next(iter(self._attempts))]
-        attempt = self._attempts[task] = Attempt(unmet)
-        return attempt
-
-    def conclude_monitored(self, ended: Collection[int]) -> None:
-        """End the attempts at the tasks whose monitoring activations have ended."""
-        for run in self._runs.values():
-            if run.monitored_for in ended:
-                self.conclude(run.task)
-
-    def conclude(self, task: str) -> None:
-        """End the attempt at a task, since its goal is reached or abandoned."""
-        self._attempts.pop(task, None)
-
-    def new_name(self) -> str:
-        """Return a name that no earlier plan of the program run has."""
-        self._named += 1
-        return f"plan_{self._named}"
-
-    def get(self, name: str) -> PlanRun | None:
-        """Return the plan of that name, or `None`."""
-        return self._runs.get(name)
-
-    def carrying(self, name: str) -> list[PlanRun]:
-        """Return the plans in which running steps of the plan of that name may continue, the latest last."""
-        return [one for one in self._runs.values() if one.carries(name)]
-
-    def required(self, name: str) -> PlanRun:
-        """Return the plan of that name; raise `UnknownNameError` if there is no such plan."""
-        if name not in self._runs:
-            raise UnknownNameError(f"there is no plan '{name}'", found=name, valid=self._runs)
-        return self._runs[name]
-
-    def add(self, run: PlanRun) -> None:
-        """Add a plan, and delete the oldest plans without a monitor beyond `MOST_UNMONITORED`."""
-        unmonitored = [name for name, one in self._runs.items() if one.on_begin is None]
-        for name in unmonitored[:-MOST_UNMONITORED]:
-            del self._runs[name]
-        self._runs[run.name] = run
-
-    def over(self, name: str) -> None:
-        """Delete a plan, the plan that it replaces, and a successor that has not begun."""
-        run = self._runs.pop(name, None)
-        if run is not None and run.replaces is not None:
-            self.over(run.replaces)
-        self.withdraw(name)
-
-    def withdraw(self, name: str) -> None:
-        """Delete a successor of the plan that has not begun, because the chart did not use the successor."""
-        for successor in [one.name for one in self._runs.values() if one.replaces == name]:
-            del self._runs[successor]
-
-    def begin(self, run: PlanRun) -> None:
-        """Begin the monitoring of a plan; this deletes the plan that it replaces."""
-        replaced, run.replaces = run.replaces, None
-        if replaced is not None:
-            self.over(replaced)
-
-    def remember(self) -> dict[str, Any]:
-        """Return all plans as plain data, with their attempts: regions may attempt equal goals at the same time."""
-        runs = self._runs.values()
-        attempts = list({id(one): one for one in (*self._attempts.values(), *(run.attempt for run in runs))}.values())
-        numbers = {id(attempt): number for number, attempt in enumerate(attempts)}
-        return {
-            "plans": self._named,
-            "attempts": [attempt.to_json() for attempt in attempts],
-            "tasks": {task: numbers[id(attempt)] for task, attempt in self._attempts.items()},
-            "runs": [{**run.to_json(), "attempt": numbers[id(run.attempt)]} for run in runs],
-        }
-
-    def recall(self, memory: Mapping[str, Any], now: Settled) -> None:
-        """Restore the plans that `remember` returned, with conditions expanded for the present world."""
-        self._named = memory["plans"]
-        attempts = [Attempt.from_json(form) for form in memory["attempts"]]
-        self._attempts = {task: attempts[number] for task, number in memory["tasks"].items()}
-        self._runs = {form["name"]: PlanRun.from_json(form, now, attempts[form["attempt"]]) for form in memory["runs"]}
 
 
 def task_of(goal: Expression, holder: str) -> str:

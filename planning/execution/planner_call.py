@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from dsc.components.hooks import contained
 from knowledge_base.errors import described, text_of
-from planning.cancellable_work import alarm
 from planning.engines.planner import Improving
-from planning.plan import EngineFailed, PlanFound, PlanningOutcome, TimedOut
+from planning.model.cancellable_work import alarm
+from planning.model.plan import EngineFailed, PlanFound, PlanningOutcome, TimedOut
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Awaitable
 
     from dsc.sequencer.clock import LoopClock
     from planning.engines.planner import Planner
-    from planning.strips import Problem
+    from planning.model.problem import Problem
 
 
 STOPPING = 10.0

@@ -18,7 +18,11 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.syntax.text import parse_condition
-from planning.execution.monitoring import Monitoring
+from planning.analysis.explanation import unmet
+from planning.execution.attempt import Attempt
+from planning.execution.choices import Choices
+from planning.execution.escalation import Escalation
+from planning.execution.monitor_skill import MonitorSkill
 from planning.execution.outages import Outages
 from planning.execution.outcomes import (
     GaveUp,
@@ -32,10 +36,10 @@ from planning.execution.outcomes import (
 )  # fmt: skip
 from planning.execution.plan_progress import PlanProgress
 from planning.execution.plan_records import PlanRecords
-from planning.execution.plan_run import Attempt, PlanRun, PlanRuns, task_of
-from planning.execution.repair import Choices, Escalation, Plotting
+from planning.execution.plan_run import PlanRun, task_of
+from planning.execution.plan_runs import PlanRuns
+from planning.execution.plotting import Plotting
 from planning.execution.search import NotFound, Search
-from planning.explanation import unmet
 from planning.problem.construction import check_goal
 from planning.problem.derived import derivation
 
@@ -46,9 +50,9 @@ if TYPE_CHECKING:
     from dsc.trace import Trace
     from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
-    from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
     from planning.execution.search import Foresight, Found
+    from planning.model.domain import PlanningDomain
 
 
 class PlanningComponent(Component):
@@ -211,7 +215,7 @@ class PlanningComponent(Component):
             return author == CHART or author in self._working_for(call.action_id)
 
         run = self._runs.required(plan)
-        outcome = await Monitoring(run, self._escalation, self._clock, is_own, self._cancelled).outcome()
+        outcome = await MonitorSkill(run, self._escalation, self._clock, is_own, self._cancelled).outcome()
         if outcome.event == "goal_holds":
             self._conclude(plan)
         return outcome
@@ -227,7 +231,7 @@ class PlanningComponent(Component):
 
     @skill(after_crash="repeat")
     async def repair(self, call: SkillCall, plan: str, why: str) -> Repaired:
-        """Return the answer to the failure of a plan, see `planning.execution.plan_run.EscalationStep`.
+        """Return the answer to the failure of a plan, see `planning.execution.attempt.EscalationStep`.
 
         `plan_found` contains a plan that needs no planner call; `replan` requests a planner call. After a failure of a
         device, the answer comes when the device is back, or after a pause.

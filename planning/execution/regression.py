@@ -39,8 +39,8 @@ from knowledge_base.language.syntax.expression import (
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.rewriting import names_of
-from planning.domain import GroundStep, PlanningDomain
-from planning.plan import PlanStep
+from planning.model.domain import GroundStep, PlanningDomain
+from planning.model.plan import PlanStep
 from planning.problem.expressions import changed
 
 _CHANGING = {"increase": "+", "decrease": "-", "scale-up": "*", "scale-down": "/"}

@@ -15,20 +15,29 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from knowledge_base.errors import InputError
 from knowledge_base.world.overlay import Overlay
-from planning.cancellable_work import WorkLimit, WorkLimitError, aside
+from planning.analysis.explanation import why_unsolvable
+from planning.analysis.validation import Validation, validate
 from planning.engines.registry import timing
 from planning.execution.plan_ends import leads_to
 from planning.execution.plan_progress import PlanProgress, cost_of, local_repair
 from planning.execution.planner_call import Answer, Improvements, PlannerCalls
-from planning.explanation import why_unsolvable
+from planning.model.cancellable_work import WorkLimit, WorkLimitError, aside
+from planning.model.plan import (
+    EngineFailed,
+    NobodyCan,
+    NoneFound,
+    Plan,
+    PlanFound,
+    PlanStep,
+    ProvenUnsolvable,
+    TimedOut,
+)
+from planning.model.problem import WrongPlan
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import PartialOrder, in_sequence
-from planning.plan import EngineFailed, NobodyCan, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, TimedOut
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation
 from planning.problem.relevance import why_no_engine
-from planning.strips import WrongPlan
-from planning.validation import Validation, validate
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Collection, Iterable, Sequence
@@ -37,10 +46,10 @@ if TYPE_CHECKING:
     from knowledge_base.language.evaluation.world_protocol import World
     from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
-    from planning.domain import PlanningDomain
     from planning.engines.planner import Planner
     from planning.execution.plan_records import PlanRecords
-    from planning.strips import Problem
+    from planning.model.domain import PlanningDomain
+    from planning.model.problem import Problem
 
 
 class Foresight(Protocol):

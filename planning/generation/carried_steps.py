@@ -30,8 +30,8 @@ from knowledge_base.language.syntax.expression import (
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.rewriting import names_of
-from planning.domain import PlanningAction, PlanningDomain
-from planning.plan import PlanStep
+from planning.model.domain import PlanningAction, PlanningDomain
+from planning.model.plan import PlanStep
 from planning.problem.expressions import changed
 
 

@@ -17,11 +17,11 @@ from dsc.dynamic.library import Library
 from dsc.events import GAVE_UP, SKILL_FAILURES
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import CONTINUE, ENTER, REPLAN, RETRY, Rule
-from planning.domain import PlanningDomain
 from planning.generation.carried_steps import CarriedStep, Carrier, Usage, sketched
 from planning.generation.control_flow import FINISHED, ControlFlow, Writer, passed
+from planning.model.domain import PlanningDomain
+from planning.model.plan import Plan, PlanStep
 from planning.ordering.partial_order import PartialOrder, chains, in_sequence, scheduled
-from planning.plan import Plan, PlanStep
 from planning.problem.derived import derivation
 
 WORK = "work"

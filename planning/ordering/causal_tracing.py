@@ -29,7 +29,8 @@ from knowledge_base.language.syntax.effect import Effect, substitute_effect
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
-from planning.domain import PlanningAction, PlanningDomain
+from planning.model.domain import PlanningAction, PlanningDomain
+from planning.model.plan import Plan, PlanStep
 from planning.ordering.known_steps import KnownStep, changed_names, literal_of
 from planning.ordering.partial_order import PRESENT, CausalLink, PartialOrder, reduction
 from planning.ordering.step_dependencies import (
@@ -43,7 +44,6 @@ from planning.ordering.step_dependencies import (
     ground_conjuncts,
     support,
 )
-from planning.plan import Plan, PlanStep
 from planning.problem.conditions import Literal
 from planning.problem.derived import derivation
 
@@ -55,7 +55,7 @@ def deordered(plan: Plan, domain: PlanningDomain, world: World, goal: Expression
     such order, which is NP-hard to find.
 
     Raises:
-        InputError: the plan does not lead to the goal; `planning.validation.validate` returns the failing step.
+        InputError: the plan does not lead to the goal; `planning.validate` returns the failing step.
     """
     derived = derivation(domain)
     changing = None if derived.recursive else _changing(plan, derived.domain)

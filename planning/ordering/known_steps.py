@@ -11,8 +11,8 @@ from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, NumericEffect, effect_leaves, effect_parts
 from knowledge_base.language.syntax.expression import Atom, Constant, Expression, Not, Variable
 from knowledge_base.language.syntax.identity_cache import IdentityCache
-from planning.domain import GroundStep, PlanningAction
-from planning.plan import PlanStep
+from planning.model.domain import GroundStep, PlanningAction
+from planning.model.plan import PlanStep
 from planning.problem.conditions import Literal
 
 

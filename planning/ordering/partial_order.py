@@ -15,7 +15,7 @@ from functools import cached_property
 
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.text import to_text
-from planning.plan import Plan, PlanStep
+from planning.model.plan import Plan, PlanStep
 
 PRESENT = 0
 """The provider number of facts that hold initially."""

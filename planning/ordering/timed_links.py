@@ -18,7 +18,9 @@ from knowledge_base.language.syntax.effect import AllOf, Effect, substitute_effe
 from knowledge_base.language.syntax.expression import And, Expression, substitute
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.overlay import Overlay
-from planning.domain import PlanningDomain
+from planning.model.domain import PlanningDomain
+from planning.model.plan import Plan, PlanStep, Timing
+from planning.model.timeline import moment
 from planning.ordering.partial_order import PRESENT, CausalLink, PartialOrder, scheduled
 from planning.ordering.step_dependencies import (
     Changes,
@@ -30,10 +32,8 @@ from planning.ordering.step_dependencies import (
     ground_conjuncts,
     support,
 )
-from planning.plan import Plan, PlanStep, Timing
 from planning.problem.conditions import Literal
 from planning.problem.derived import derivation
-from planning.timeline import moment
 
 _NOTHING: Expression = And(())
 

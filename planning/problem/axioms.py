@@ -21,14 +21,14 @@ from knowledge_base.language.syntax.expression import Atom, Exists, Expression, 
 from knowledge_base.language.syntax.rewriting import denied, names_of
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.world.derived import Axiom
-from planning.cancellable_work import WorkLimit
-from planning.domain import PlanningDomain
-from planning.planning_actions import PlanningAction
+from planning.model.actions import PlanningAction
+from planning.model.cancellable_work import WorkLimit
+from planning.model.domain import PlanningDomain
+from planning.model.problem import GroundAction, Problem, UnsupportedActionError, UnsupportedGoalError
 from planning.problem.construction import build_problem
 from planning.problem.derived import Derivation, derivation
 from planning.problem.expressions import name_of
 from planning.problem.relevance import relevant
-from planning.strips import GroundAction, Problem, UnsupportedActionError, UnsupportedGoalError
 
 _DERIVE = "derive "  # the blank distinguishes the name from every declared name
 

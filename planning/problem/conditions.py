@@ -19,9 +19,9 @@ from knowledge_base.language.syntax import expression as ex
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
 from knowledge_base.language.syntax.expression import Atom, Expression, Term
 from knowledge_base.language.syntax.text import to_text
-from planning.cancellable_work import WorkLimit
-from planning.quantities import OPPOSITE, Assignment, NumericBound, Quantity, combined
-from planning.strips import UnsupportedActionError
+from planning.model.cancellable_work import WorkLimit
+from planning.model.problem import UnsupportedActionError
+from planning.model.quantities import OPPOSITE, Assignment, NumericBound, Quantity, combined
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,8 +25,10 @@ from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.rewriting import names_of
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.pddl.problem_text import Metric
-from planning.cancellable_work import WorkLimit
-from planning.domain import PlanningDomain
+from planning.model.cancellable_work import WorkLimit
+from planning.model.domain import PlanningDomain
+from planning.model.problem import Problem, UnsupportedActionError, UnsupportedGoalError
+from planning.model.quantities import NumericBound
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, Some
 from planning.problem.derived import derivation
 from planning.problem.grounding import Variant
@@ -36,8 +38,6 @@ from planning.problem.relaxed_reachability import reachable
 from planning.problem.relevance import Relevant, refuse_unsupported, relevant
 from planning.problem.task import Assembly, Numbering, OperatorIndex, Task
 from planning.problem.temporal import build_temporal_problem, durative
-from planning.quantities import NumericBound
-from planning.strips import Problem, UnsupportedActionError, UnsupportedGoalError
 
 # Names with blanks differ from every declared name.
 _ACTING, _FINISHED = Literal(Fact("still acting")), Literal(Fact("finished acting"))

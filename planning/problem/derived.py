@@ -27,7 +27,7 @@ from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.rewriting import names_of, with_atoms
 from knowledge_base.world.derived import Definitions, type_test
 from knowledge_base.world.overlay import Overlay
-from planning.domain import PlanningDomain
+from planning.model.domain import PlanningDomain
 from planning.problem.expressions import changed, rewritten
 
 _AXIOMS = "planners with axioms of their own, such as Fast Downward run by itself"

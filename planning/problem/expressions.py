@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from knowledge_base.language.syntax import effect as eff
 from knowledge_base.language.syntax.expression import Expression
-from planning.domain import PlanningAction
+from planning.model.domain import PlanningAction
 
 
 def conditions_of(action: PlanningAction) -> tuple[Expression, ...]:

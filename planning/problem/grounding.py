@@ -10,9 +10,11 @@ from knowledge_base.facts import Fact, Value
 from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.expression import Atom, Constant, Variable
-from planning.cancellable_work import WorkLimit
-from planning.domain import PlanningAction
-from planning.plan import PlanStep
+from planning.model.cancellable_work import WorkLimit
+from planning.model.domain import PlanningAction
+from planning.model.plan import PlanStep
+from planning.model.problem import UnsupportedActionError
+from planning.model.quantities import Assignment, combined, fluents
 from planning.problem.conditions import (
     Every,
     GroundEffect,
@@ -24,8 +26,6 @@ from planning.problem.conditions import (
     every,
     negation,
 )
-from planning.quantities import Assignment, combined, fluents
-from planning.strips import UnsupportedActionError
 
 _MOST_CONDITIONS = 6  # conditions of effects of one ground action; each doubles the number of variants
 _MOST_ALTERNATIVES = 64

@@ -23,14 +23,14 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.rewriting import names_of
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.pddl.problem_text import TOTAL_TIME, Metric
-from planning.cancellable_work import WorkLimit
-from planning.domain import PlanningAction
-from planning.plan import PlanStep
+from planning.model.cancellable_work import WorkLimit
+from planning.model.domain import PlanningAction
+from planning.model.plan import PlanStep
+from planning.model.quantities import Assignment, linear
 from planning.problem.conditions import Grounder
 from planning.problem.grounding import JoinRule, ReachedFacts, Variant, joined_atoms, variants
 from planning.problem.relevance import Relevant
 from planning.problem.task import GroundOperator, Numbering, OperatorIndex
-from planning.quantities import Assignment, linear
 
 
 class Consulted:

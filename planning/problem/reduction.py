@@ -17,8 +17,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, filterfalse
 
+from planning.model.quantities import fluents
 from planning.problem.task import GroundOperator, LazyTable, Numbering, OperatorIndex, Task
-from planning.quantities import fluents
 
 
 def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:

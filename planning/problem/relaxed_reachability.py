@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from planning.model.quantities import helps
 from planning.problem.task import GroundOperator, Numbering, Task
-from planning.quantities import helps
 
 _GIVEN = -1  # replaces the position of an operator if the fact holds initially
 _DEEPEST = 50

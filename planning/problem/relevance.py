@@ -10,11 +10,11 @@ from knowledge_base.language.syntax.effect import Add, Delete, NumericEffect, ef
 from knowledge_base.language.syntax.expression import Atom, Comparison, Expression, Term
 from knowledge_base.language.syntax.rewriting import inside, name_in, names_of
 from knowledge_base.language.syntax.text import to_text
-from planning.domain import PlanningAction, PlanningDomain
-from planning.plan import NobodyCan
+from planning.model.domain import PlanningAction, PlanningDomain
+from planning.model.plan import NobodyCan
+from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
 from planning.problem.derived import Derivation, derivation
 from planning.problem.expressions import changed, conditions_of, name_of
-from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple, TypeVar
 
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.evaluation.world_protocol import World
-from planning.plan import PlanStep
+from planning.model.plan import PlanStep
+from planning.model.problem import GroundAction, Problem
+from planning.model.quantities import Assignment, NumericBound, fluents, worth
 from planning.problem.conditions import Leaf, Literal, is_so
-from planning.quantities import Assignment, NumericBound, fluents, worth
-from planning.strips import GroundAction, Problem
 
 NOT = "not "
 """The prefix of the predicate of a complementary fact (positive normal form). No declared name has a blank."""

@@ -17,9 +17,10 @@ from knowledge_base.language.evaluation.terms import as_number
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import AllOf
 from knowledge_base.language.syntax.expression import And, Expression
-from planning.cancellable_work import WorkLimit
-from planning.domain import PlanningAction, PlanningDomain
-from planning.plan import PlanStep
+from planning.model.cancellable_work import WorkLimit
+from planning.model.domain import PlanningAction, PlanningDomain
+from planning.model.plan import PlanStep
+from planning.model.problem import ActionSpan, GroundAction, Problem, UnsupportedActionError
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, alternatives
 from planning.problem.expressions import changed
 from planning.problem.grounding import Variant, variants
@@ -27,7 +28,6 @@ from planning.problem.operators import OperatorCache, things_of
 from planning.problem.relaxed_reachability import reachable
 from planning.problem.relevance import Relevant, relevant
 from planning.problem.task import NOT, GroundOperator, OperatorIndex, Task, as_fact
-from planning.strips import ActionSpan, GroundAction, Problem, UnsupportedActionError
 
 LONGEST = 1e6
 """The upper bound, in seconds, of the duration of an action without an upper bound in the domain."""

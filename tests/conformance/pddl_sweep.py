@@ -30,10 +30,10 @@ from knowledge_base.errors import InputError, UnsupportedConstructError
 from knowledge_base.language.evaluation.evaluator import evaluate_term
 from knowledge_base.pddl import ProblemText, read_problem
 from knowledge_base.store import KnowledgeBase
-from planning.domain import PlanningDomain
 from planning.engines import registry
 from planning.engines.race import PlannerRace
-from planning.plan import (
+from planning.model.domain import PlanningDomain
+from planning.model.plan import (
     EngineFailed,
     NobodyCan,
     NoneFound,
@@ -43,9 +43,9 @@ from planning.plan import (
     ProvenUnsolvable,
     TimedOut,
 )
+from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
 from planning.problem.construction import build_problem
 from planning.problem.relevance import why_no_engine
-from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 PAGE = Path(__file__).parents[2] / "docs" / "pddl.md"
 TEST_FOLDER = Path(unified_planning.test.__path__[0])

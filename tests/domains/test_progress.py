@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from dsc.trace import Record
-from planning.progress import LiveProgress, PlainProgress, Tally
+from planning.robot.progress import LiveProgress, PlainProgress, Tally
 
 
 def record(seq, type_, **data):

@@ -54,10 +54,10 @@ from knowledge_base.language.checking.check import check, check_effect
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text
 from knowledge_base.pddl import read_problem
 from knowledge_base.statements import retracted, told
-from planning.cancellable_work import WorkLimit, WorkLimitError
-from planning.domain import PlanningDomain
-from planning.executive import achieve_plot
+from planning.model.cancellable_work import WorkLimit, WorkLimitError
+from planning.model.domain import PlanningDomain
 from planning.problem.construction import build_problem
+from planning.robot.executive import achieve_plot
 
 HOME = Path(__file__).parent
 ROOT = HOME.parents[1]

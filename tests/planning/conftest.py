@@ -6,7 +6,7 @@ import pytest
 
 from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
-from planning.domain import PlanningDomain
+from planning.model.domain import PlanningDomain
 
 DOMAIN_FILE = Path(__file__).parents[2] / "domains" / "clean_up_table" / "domain.pddl"
 

@@ -1,7 +1,7 @@
 """A planner small enough to be trusted: breadth-first search over the posed problem; the shortest plan, or a proof."""
 
 from knowledge_base import Fact
-from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable
+from planning.model.plan import EngineFailed, PlanFound, ProvenUnsolvable
 
 MOST_STATES = 20_000
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from knowledge_base.facts import Fact
 from planning.engines.planner import PlannerProcess
-from planning.plan import PlanStep
-from planning.strips import GroundAction, Problem
+from planning.model.plan import PlanStep
+from planning.model.problem import GroundAction, Problem
 
 READY = "import json, sys, time, os, signal\nprint('{\"ready\": true}', flush=True)\n"
 HANGING = READY + "time.sleep(600)\n"

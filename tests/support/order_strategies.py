@@ -12,8 +12,8 @@ from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.overlay import Overlay
-from planning.domain import PlanningDomain
-from planning.plan import Plan, PlanStep
+from planning.model.domain import PlanningDomain
+from planning.model.plan import Plan, PlanStep
 
 THINGS = ("a", "b")
 MOST_STEPS = 5

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
-from planning.domain import PlanningDomain
+from planning.model.domain import PlanningDomain
 
 THINGS = "ab"
 FACTS = [fact("p", one) for one in THINGS] + [fact("r")]

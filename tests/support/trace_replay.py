@@ -19,9 +19,9 @@ from knowledge_base.language.syntax.expression import And, Not, substitute
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
 from planning import PlanningDomain
+from planning.model.plan import Plan, PlanStep
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import standing
-from planning.plan import Plan, PlanStep
 
 STATE = re.compile(r"(?:.*/)?(step|after)_(\d+)")
 

@@ -236,6 +236,8 @@ def substitute(e: Expression | Term, bindings: Mapping[str, Value | Term]) -> Ex
         case Exists(variables, body) | Forall(variables, body):
             variables, inner = _entered(variables, body, bindings)
             made = replace(e, variables=variables, body=substitute(body, inner))
+        case Variable() | Constant():
+            pass
     return made
 
 

@@ -33,7 +33,7 @@ from dsc.testing import LossyTransport
 from dsc.validation import validate_library
 from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.errors import InputError
-from planning.bundles import shipped_by
+from planning.robot.bundles import shipped_by
 
 
 class Weighed(Outcome):

@@ -18,7 +18,7 @@ from planning.cli.command import app
 from planning.cli.doctor import doctor_command
 from planning.engines import registry
 from planning.engines.registry import ENGINES
-from planning.plan import EngineFailed, PlanFound
+from planning.model.plan import EngineFailed, PlanFound
 
 DSC = Path(sys.executable).with_name("dsc")
 

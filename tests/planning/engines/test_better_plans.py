@@ -10,7 +10,7 @@ from obedient_robot import ObedientRobot, plots
 from knowledge_base import Delta, KnowledgeBase, fact
 from planning import Executive, Plan, PlanningDomain, PlanStep
 from planning.execution.plan_progress import cost_of
-from planning.plan import EngineFailed, PlanFound
+from planning.model.plan import EngineFailed, PlanFound
 
 TRIP = """(define (domain trip) (:types place) (:predicates (at ?p - place) (packed) (road ?a ?b - place))
   (:functions (total-cost) (toll ?a ?b - place))

@@ -7,8 +7,8 @@ from typing import Any
 from fake_engines import FIRST, GOAL, PROBLEM, SECOND, START
 
 from planning.engines.race import CachingPlanner
-from planning.plan import Plan, PlanFound, ProvenUnsolvable, TimedOut
-from planning.strips import Problem
+from planning.model.plan import Plan, PlanFound, ProvenUnsolvable, TimedOut
+from planning.model.problem import Problem
 
 assert FIRST.step is not None
 assert SECOND.step is not None

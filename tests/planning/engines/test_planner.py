@@ -8,8 +8,8 @@ import pytest
 from fake_engines import FIRST, GOAL, HANGING, LONGER, PROBLEM, READY, SECOND, SOLVED, START, answering, gone, planner
 
 from planning.engines.planner import PlannerProcess
-from planning.plan import EngineFailed, Plan, PlanFound, ProvenUnsolvable, TimedOut
-from planning.strips import Problem
+from planning.model.plan import EngineFailed, Plan, PlanFound, ProvenUnsolvable, TimedOut
+from planning.model.problem import Problem
 
 # Gives all actions in their order; a problem that was sliced is too much for it.
 COUNTING = READY + (

@@ -29,7 +29,7 @@ from hypothesis import strategies as st
 
 from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, able, chosen, engine, repeatable
-from planning.plan import EngineFailed, NobodyCan, PlanFound, ProvenUnsolvable, TimedOut
+from planning.model.plan import EngineFailed, NobodyCan, PlanFound, ProvenUnsolvable, TimedOut
 
 FIRST, SECOND = ENGINES[:2]
 

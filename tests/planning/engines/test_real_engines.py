@@ -11,14 +11,14 @@ from fake_engines import PROBLEM, descendants, gone, lights_out, session
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from knowledge_base.facts import Fact
 from knowledge_base.language.syntax.text import parse_condition
-from planning.domain import PlanningDomain
 from planning.engines.process import Deadline, EngineProcess, OutOfTimeError, worker
 from planning.engines.registry import ENGINES
 from planning.engines.request import written
-from planning.executive import Executive
-from planning.plan import PlanStep
+from planning.model.domain import PlanningDomain
+from planning.model.plan import PlanStep
+from planning.model.problem import GroundAction, Problem
 from planning.problem.construction import build_problem
-from planning.strips import GroundAction, Problem
+from planning.robot.executive import Executive
 
 NAMES = [
     pytest.param(one.name, marks=pytest.mark.skipif(bool(one.lacks()), reason=f"{one.name}: {one.lacks()}"))

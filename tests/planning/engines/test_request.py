@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from knowledge_base.facts import Fact
 from planning.engines.request import read, written
-from planning.plan import PlanStep
-from planning.quantities import Assignment, NumericBound, Operation
-from planning.strips import ActionSpan, GroundAction, Problem
+from planning.model.plan import PlanStep
+from planning.model.problem import ActionSpan, GroundAction, Problem
+from planning.model.quantities import Assignment, NumericBound, Operation
 
 NAMES = st.sampled_from(["cup", "50% full", "%d", 'quoted "name"', "a-b"])
 FACTS = st.builds(Fact, NAMES, st.lists(NAMES | st.integers(-2, 2), max_size=2).map(tuple))

@@ -11,7 +11,7 @@ from obedient_robot import ObedientRobot, plots
 from dsc import Event, parse_plot
 from knowledge_base import Delta, fact
 from planning import Executive, Plan, PlanStep
-from planning.plan import EngineFailed, PlanFound
+from planning.model.plan import EngineFailed, PlanFound
 
 FOUND = PlanFound(Plan((PlanStep("go", ("a", "b")),)), "fake", 0.0, 0.1)
 

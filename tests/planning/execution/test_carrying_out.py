@@ -15,10 +15,10 @@ from dsc import Component, Event, Outcome, parse_plot, skill
 from dsc.trace import Record
 from knowledge_base import Delta, fact
 from planning import Executive, Plan, PlannerProcess, PlanStep
+from planning.analysis.validation import Validation
 from planning.execution.plan_records import why_broken
+from planning.model.plan import EngineFailed, PlanFound
 from planning.ordering.causal_tracing import deordered
-from planning.plan import EngineFailed, PlanFound
-from planning.validation import Validation
 
 
 class Run:
@@ -74,7 +74,7 @@ def test_the_order_of_a_plan_that_continues_is_computed_outside_of_the_event_loo
         threads.append(threading.current_thread())
         return deordered(*given)
 
-    monkeypatch.setattr("planning.execution.repair.deordered", noted)
+    monkeypatch.setattr("planning.execution.plotting.deordered", noted)
     run = Run("(in cup c)", {"(go b c)": [FAILED]})
     assert run.how == "reached"
     assert len(threads) == 1

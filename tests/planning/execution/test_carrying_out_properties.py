@@ -12,7 +12,7 @@ from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
 from planning import Executive, PlanningDomain, PlanStep
-from planning.plan import PlanFound
+from planning.model.plan import PlanFound
 from planning.problem.construction import build_problem
 
 THINGS = ("x", "y", "z")

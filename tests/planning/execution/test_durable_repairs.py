@@ -17,7 +17,7 @@ from dsc.runs.archive import archive
 from dsc.trace import Record
 from knowledge_base import Delta, fact
 from planning import Executive, PlanStep
-from planning.validation import Validation
+from planning.analysis.validation import Validation
 
 
 class Failed(Outcome): ...

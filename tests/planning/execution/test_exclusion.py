@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from knowledge_base.facts import Fact
-from planning.cancellable_work import WorkLimit
-from planning.explanation import goal_mutexes
-from planning.plan import PlanStep
-from planning.strips import GroundAction, Problem
+from planning.analysis.explanation import goal_mutexes
+from planning.model.cancellable_work import WorkLimit
+from planning.model.plan import PlanStep
+from planning.model.problem import GroundAction, Problem
 
 FACTS = tuple(Fact("p", (i,)) for i in range(5))
 HOME, AWAY, TIRED = Fact("home"), Fact("away"), Fact("tired")

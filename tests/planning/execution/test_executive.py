@@ -13,7 +13,7 @@ from dsc.reflection import MODELS, design_facts
 from dsc.trace import Record
 from knowledge_base import Delta, InputError, KnowledgeBase, fact
 from planning import Executive, Plan, PlanningDomain, PlanStep
-from planning.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
+from planning.model.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain lights)

@@ -9,7 +9,7 @@ import pytest
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanningDomain, PlanStep
-from planning.execution.monitor import Broken, GoalReached, Monitor, Shorter
+from planning.execution.link_monitor import Broken, GoalReached, LinkMonitor, Shorter
 from planning.execution.plan_ends import shortest_end
 from planning.execution.plan_progress import PlanProgress, thinned
 
@@ -55,7 +55,7 @@ class Watched:
         self.kb.apply(Delta(nodes={**nodes, "bob": "robot", "eve": "robot"}, added=(*told, *facts)), "test")
         self.progress = PlanProgress(steps, DOMAIN, goal, before)
         self.news: list[Any] = []
-        self.monitor = Monitor(self.progress, DOMAIN, self.kb, lambda author: author == "bob", self.news.append)
+        self.monitor = LinkMonitor(self.progress, DOMAIN, self.kb, lambda author: author == "bob", self.news.append)
         self.monitor.look("earlier")
 
     def begin(self, number):
@@ -131,7 +131,7 @@ def test_what_touches_no_link_is_not_looked_at(monkeypatch):
     plan = Watched()
     plan.begin(1)
     looked = []
-    monkeypatch.setattr("planning.execution.monitor.shortest_end", lambda *args: looked.append(args))
+    monkeypatch.setattr("planning.execution.link_monitor.shortest_end", lambda *args: looked.append(args))
     monkeypatch.setattr(PlanProgress, "stands", lambda *args: looked.append(args))
     plan.change("eve", now="painted hall, painted office, in p3 hall", values={fact("weight", "p1"): 3.0})
     assert looked == []
@@ -295,7 +295,7 @@ def test_news_may_be_answered_with_a_change_before_the_next_is_told():
         told.append(news)
         plan.kb.apply(Delta(added=(fact("painted", "hall"),)), f"who heard news {len(told)}")
 
-    Monitor(plan.progress, DOMAIN, plan.kb, lambda author: author == "bob", answer).look("earlier")
+    LinkMonitor(plan.progress, DOMAIN, plan.kb, lambda author: author == "bob", answer).look("earlier")
     change = plan.change("eve", gone="in p2 store, open office")
     assert [(one.author, one.version) for one in told] == [("eve", change.version)]
 

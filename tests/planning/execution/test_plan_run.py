@@ -10,10 +10,12 @@ from test_carrying_out import Run
 from knowledge_base import Delta, KnowledgeBase, UnknownNameError, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanStep
-from planning.execution.monitor import Broken, GoalReached, Shorter
+from planning.execution.attempt import Attempt
+from planning.execution.link_monitor import Broken, GoalReached, Shorter
 from planning.execution.outcomes import Withdrawn
 from planning.execution.plan_progress import PlanProgress
-from planning.execution.plan_run import Attempt, PlanRun, PlanRuns, PlanState, Successor
+from planning.execution.plan_run import PlanRun, PlanState, Successor
+from planning.execution.plan_runs import PlanRuns
 from planning.problem.derived import derivation
 
 GOAL = parse_condition("(at c)")

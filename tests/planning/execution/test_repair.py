@@ -5,10 +5,10 @@ import pytest
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanningDomain, PlanStep
-from planning.execution.plan_run import MOST_RESUMED, Attempt, EscalationStep, Failure
-from planning.execution.repair import situation
+from planning.execution.attempt import MOST_RESUMED, Attempt, EscalationStep, Failure
+from planning.execution.escalation import situation
 from planning.execution.search import without
-from planning.strips import GroundAction, Problem
+from planning.model.problem import GroundAction, Problem
 
 STEP = PlanStep("go", ("a", "b"))
 HERE = Failure(STEP, "no_path", "here")

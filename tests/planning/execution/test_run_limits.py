@@ -12,7 +12,7 @@ from dsc import Component, Event, Outcome, Sequencer, SkillCall, parse_plot, run
 from dsc.trace import Record
 from knowledge_base import Delta, InputError, fact
 from planning import Executive
-from planning.executive import LONGEST_RUN
+from planning.robot.executive import LONGEST_RUN
 
 DOMAIN = """
 (define (domain office)

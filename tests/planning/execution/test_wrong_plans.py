@@ -11,9 +11,9 @@ from dsc.trace import Record
 from knowledge_base import Delta, fact
 from planning import Executive, Plan, PlanStep
 from planning.execution.search import MAX_REJECTED
-from planning.plan import PlanFound, PlanningOutcome
-from planning.progress import Tally
-from planning.strips import Problem
+from planning.model.plan import PlanFound, PlanningOutcome
+from planning.model.problem import Problem
+from planning.robot.progress import Tally
 
 DOMAIN = """
 (define (domain house)

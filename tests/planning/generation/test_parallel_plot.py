@@ -12,9 +12,9 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning import Executive, Plan, PlanningDomain, PlanStep, plot_from_plan
 from planning.generation.carried_steps import fitting, usage
+from planning.model.plan import PlanFound, Timing
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import PartialOrder
-from planning.plan import PlanFound, Timing
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain lamps)

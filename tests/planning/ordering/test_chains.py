@@ -5,8 +5,8 @@ from itertools import combinations, pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planning.model.plan import PlanStep
 from planning.ordering.partial_order import PartialOrder, chains
-from planning.plan import PlanStep
 
 
 def nobody(_first, _second):

@@ -4,9 +4,9 @@ import pytest
 
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.text import parse_condition
+from planning.model.plan import Plan, PlanStep
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import why
-from planning.plan import Plan, PlanStep
 
 GOAL = parse_condition("(and (tidy cup1) (hand-free))")
 

@@ -12,12 +12,12 @@ from knowledge_base.facts import fact
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
-from planning.domain import PlanningDomain
+from planning.analysis.validation import validate
+from planning.model.domain import PlanningDomain
+from planning.model.plan import Plan, PlanStep
 from planning.ordering import step_dependencies
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import PartialOrder, reduced, standing
-from planning.plan import Plan, PlanStep
-from planning.validation import validate
 
 
 def linearisations(order: PartialOrder):

@@ -5,10 +5,10 @@ import pytest
 from knowledge_base.errors import InputError
 from knowledge_base.facts import fact
 from knowledge_base.language.syntax.text import parse_condition
-from planning.domain import PlanningDomain
+from planning.model.domain import PlanningDomain
+from planning.model.plan import Plan, PlanStep, Timing
 from planning.ordering.partial_order import why
 from planning.ordering.timed_links import linked
-from planning.plan import Plan, PlanStep, Timing
 
 CELLAR = PlanningDomain.parse("""
 (define (domain cellar) (:types match fuse)

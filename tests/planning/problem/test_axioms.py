@@ -14,13 +14,13 @@ from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.overlay import Overlay
-from planning.domain import PlanningDomain
-from planning.explanation import why_unsolvable
-from planning.plan import PlanStep
+from planning.analysis.explanation import why_unsolvable
+from planning.analysis.validation import validate
+from planning.model.domain import PlanningDomain
+from planning.model.plan import PlanStep
+from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
 from planning.problem.axioms import Derivable
 from planning.problem.derived import derivation
-from planning.strips import UnsupportedActionError, UnsupportedGoalError
-from planning.validation import validate
 
 ROOMS, DOORS = "abc", (("a", "b"), ("b", "c"))
 BASE = ("open", "stuck", "at", "lit")

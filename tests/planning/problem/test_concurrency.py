@@ -16,14 +16,14 @@ from knowledge_base.facts import Delta, fact
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning import Executive, PlanningDomain
+from planning.analysis.validation import validate
 from planning.engines import planner as planner_module
 from planning.engines.planner import PlannerProcess
 from planning.engines.race import PlannerRace
 from planning.engines.registry import engine
 from planning.engines.request import read, written
-from planning.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, Timing
+from planning.model.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, Timing
 from planning.problem.construction import build_problem
-from planning.validation import validate
 
 CELLAR = """(define (domain cellar) (:types match fuse)
   (:predicates (free) (unused ?m - match) (mended ?f - fuse) (light ?m - match) (counted) (looked) (sound ?f - fuse))

@@ -5,9 +5,9 @@ import pytest
 from knowledge_base.facts import fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import Executive
-from planning.domain import PlanningDomain
 from planning.engines.registry import Engine
-from planning.plan import NobodyCan
+from planning.model.domain import PlanningDomain
+from planning.model.plan import NobodyCan
 from planning.problem.relevance import numeric_constructs, why_no_engine
 
 JARS = """(define (domain jars) (:types jar)

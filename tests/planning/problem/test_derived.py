@@ -12,13 +12,13 @@ from knowledge_base.facts import Delta, fact
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
-from planning.domain import PlanningDomain
-from planning.explanation import why_unsolvable
-from planning.plan import Plan, PlanStep
+from planning.analysis.explanation import why_unsolvable
+from planning.analysis.validation import validate
+from planning.model.domain import PlanningDomain
+from planning.model.plan import Plan, PlanStep
+from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation
-from planning.strips import UnsupportedActionError, UnsupportedGoalError
-from planning.validation import validate
 
 ROOMS = """(define (domain rooms) (:types room robot thing)
   (:predicates (door ?a ?b - room) (connected ?a ?b - room) (near ?a ?b - room) (at ?r - robot ?p - room)

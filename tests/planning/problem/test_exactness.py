@@ -14,9 +14,9 @@ from searching import cheapest, solution
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.world.overlay import Overlay
-from planning.plan import Plan, PlanStep
+from planning.analysis.validation import validate
+from planning.model.plan import Plan, PlanStep
 from planning.problem.construction import ProblemBuilder, build_problem
-from planning.validation import validate
 
 
 def least_cost(domain, start, limit, goal):

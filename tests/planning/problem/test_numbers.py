@@ -12,14 +12,14 @@ from knowledge_base.facts import Delta, fact
 from knowledge_base.language.syntax.text import parse_condition, parse_term
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.store import KnowledgeBase
-from planning.domain import PlanningDomain
+from planning.analysis.explanation import why_unsolvable
+from planning.analysis.validation import validate
 from planning.engines.request import read, written
-from planning.explanation import why_unsolvable
-from planning.plan import Plan, PlanStep
+from planning.model.domain import PlanningDomain
+from planning.model.plan import Plan, PlanStep
+from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
+from planning.model.quantities import Assignment, NumericBound, Operation, linear, text
 from planning.problem.construction import build_problem
-from planning.quantities import Assignment, NumericBound, Operation, linear, text
-from planning.strips import UnsupportedActionError, UnsupportedGoalError
-from planning.validation import validate
 
 JARS = """(define (domain jars)
   (:types jar)

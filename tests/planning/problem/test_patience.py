@@ -9,7 +9,7 @@ from dsc import Component, Event, Outcome, SkillCall, parse_plot, skill
 from knowledge_base import Delta, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import Executive, PlanningDomain
-from planning.cancellable_work import WorkLimit, WorkLimitError, aside
+from planning.model.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.problem.construction import build_problem
 
 # Nothing needs the parameters, so that any choice will do, of which there are 30 ** 7.

@@ -4,9 +4,9 @@ import pytest
 
 from knowledge_base import fact
 from knowledge_base.language.syntax.text import parse_condition
-from planning.domain import PlanningDomain
+from planning.model.domain import PlanningDomain
+from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
 from planning.problem.construction import build_problem
-from planning.strips import UnsupportedActionError, UnsupportedGoalError
 
 PAINTING = """(define (domain painting) (:types thing place)
   (:predicates (at ?p - place) (touched ?t - thing) (known ?l - text) (seen ?t - thing))

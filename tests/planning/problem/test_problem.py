@@ -16,15 +16,15 @@ from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.computation import computed
 from knowledge_base.world.overlay import Overlay
-from planning.domain import PlanningDomain
+from planning.analysis.explanation import why_unsolvable
+from planning.analysis.validation import validate
 from planning.engines.request import read, written
-from planning.explanation import why_unsolvable
-from planning.plan import PlanStep
+from planning.model.domain import PlanningDomain
+from planning.model.plan import PlanStep
+from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
 from planning.problem.conditions import Grounder
 from planning.problem.construction import ProblemBuilder, build_problem
 from planning.problem.grounding import variants
-from planning.strips import UnsupportedActionError, UnsupportedGoalError
-from planning.validation import validate
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
-from planning.domain import PlanningDomain
+from planning.model.domain import PlanningDomain
 from planning.problem.construction import ProblemBuilder
 from planning.problem.reduction import pruned
 from planning.problem.relaxed_reachability import reachable

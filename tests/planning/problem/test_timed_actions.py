@@ -13,8 +13,8 @@ from knowledge_base.language.syntax.expression import Constant
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.pddl import read_problem
 from knowledge_base.store import KnowledgeBase
-from planning.domain import PlanningDomain
-from planning.plan import PlanStep
+from planning.model.domain import PlanningDomain
+from planning.model.plan import PlanStep
 
 MATCHES = """(define (domain matchcellar)
   (:requirements :durative-actions :derived-predicates)

@@ -1,0 +1,387 @@
+"""All static checks of a robot project together: PDDL, plots, profiles, components, and their agreement."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from dsc.components.component import Component
+from dsc.components.declarations import Parameter
+from dsc.components.hooks import contained
+from dsc.components.robot import require_deployed, require_instances, require_whole, require_wired
+from dsc.dynamic.library import Library
+from dsc.errors import Finding, ProgrammingError
+from dsc.model.plot import ActionPlot, initial_of
+from dsc.model.states import DynamicState
+from dsc.profiles import adapted, configure
+from dsc.skills import SkillSignature, signatures
+from dsc.text.plot_files import load_plot
+from dsc.text.profiles import Profile, load_profile
+from dsc.validation import review_plot, validate_plot
+from knowledge_base.errors import InputError, Place, UnknownNameError, collecting, tolerated
+from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.expression import Expression, free_variables
+from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.pddl.domain_text import read_domain
+from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
+from planning.analysis.explanation import why_unsolvable
+from planning.engines.registry import able, installed, nobody
+from planning.execution.planning_component import PlanningComponent
+from planning.model.cancellable_work import WorkLimit, WorkLimitError
+from planning.model.domain import PlanningDomain
+from planning.problem.construction import build_problem, check_goal
+from planning.problem.derived import derivation
+from planning.problem.relevance import numeric_constructs
+from planning.robot.bundles import Bundle, components_of, gathered, plots_of, shipped_by
+from planning.robot.deployment import begin, simulated
+from planning.robot.executive import achieve_plot
+from planning.robot.simulation import Setup, Simulation
+from planning.robot.soundness import IMPLEMENTED, check_implementations
+from planning.robot.targets import bundle_at
+
+READABLE = "readable"
+"""The rule of findings about files and parts that cannot be read."""
+_KNOWN_PLOT = "known plot"
+_PATIENT_SECONDS = 5.0
+"""Time limit, in seconds, of the check whether the first goal can be reached."""
+_SKIPPED = frozenset({"build", "dist", "node_modules", "site-packages", "__pycache__"})
+_NAMES_PLOT = re.compile(r"^plot:\s*[\"']?([\w.-]+)", re.MULTILINE)
+_IMPLEMENTS = re.compile(r"^implements:\s*[\"']?([\w.-]+)", re.MULTILINE)
+_NAMES_PROFILE = re.compile(r"^profile:", re.MULTILINE)
+_DEFINES_DOMAIN = re.compile(r"\(\s*define\s*\(\s*domain\b", re.IGNORECASE)
+
+
+def check_project(target: str) -> list[Finding]:
+    """Return all findings about a target: a project folder, a Python file, a plot file, a bundle's name, MODULE:NAME.
+
+    A mistake prevents no other check: a file that cannot be read is one finding, and the other files are checked. In a
+    folder, the files that no bundle uses are checked too.
+    """
+    path = Path(target)
+    if path.is_file() and path.suffix != ".py":
+        return _sorted(_files([path]))
+    with collecting() as errors:
+        bundle = _bundle(target) if not path.is_dir() or _has_robot(path) else None
+        unread = any(str(one.place.source).endswith(".pddl") for one in errors if one.place is not None)
+        whole = bundle is not None and (bundle.domain is not None or not unread)
+        robot = None if bundle is None else _Robot(bundle, whole=whole)
+        findings = [] if robot is None else robot.findings()
+        if robot is not None and not errors and not findings:
+            findings += robot.pointless()
+    findings += [Finding(error, READABLE) for error in errors]
+    if path.is_dir():
+        read = {Path(one.place.source or "").resolve() for one in findings if one.place is not None}
+        if bundle is not None:
+            read |= {Path(_source(plot) or "").resolve() for plot in bundle.plots}
+        findings += _files(file for file in _sources(path) if file.resolve() not in read)
+    return _sorted(findings)
+
+
+def _bundle(target: str) -> Bundle | None:
+    with tolerated():
+        return bundle_at(target)
+    return None
+
+
+def _has_robot(folder: Path) -> bool:
+    return (folder / "pyproject.toml").is_file() or (folder / "robot.py").is_file()
+
+
+def _sources(folder: Path) -> Iterator[Path]:
+    """Yield the sources of a folder; hidden folders and installed packages are skipped."""
+    for file in sorted(folder.rglob("*")):
+        inside = file.relative_to(folder).parts
+        hidden = any(part.startswith(".") for part in inside) or _SKIPPED.intersection(inside)
+        if file.suffix in {".yaml", ".yml", ".pddl", ".py"} and file.is_file() and not hidden:
+            yield file
+
+
+def _source(plot: ActionPlot) -> str | None:
+    place = plot.place(("plot",))
+    return None if place is None else place.source
+
+
+def _sorted(findings: Sequence[Finding]) -> list[Finding]:
+    """Return the findings without repetition, in the order of their places."""
+    for one in findings:
+        one.error.place = _seen_from_here(one.error.place)
+    unique = {(str(one.place), one.error.message): one for one in findings}
+    places = {key: one.place or Place() for key, one in unique.items()}
+    return [unique[key] for key in sorted(unique, key=lambda key: (
+        places[key].source or "~", places[key].line or 0, places[key].column or 0, key[1],
+    ))]  # fmt: skip
+
+
+def _seen_from_here(place: Place | None) -> Place | None:
+    """Return a place with the path of its file relative to the present folder, if the file is inside it."""
+    here = Path.cwd()
+    if place is None or place.source is None or not Path(place.source).is_relative_to(here):
+        return place
+    return replace(place, source=str(Path(place.source).relative_to(here)))
+
+
+# -- a robot -------------------------------------------------------------------------------------------------
+
+
+class _Robot:
+    """The parts of a bundle that could be made, for the checks of their agreement; used inside `collecting`.
+
+    Args:
+        bundle: the bundle.
+        whole: whether its domain could be read, so that plots and skills can be compared with it.
+    """
+
+    def __init__(self, bundle: Bundle, *, whole: bool = True) -> None:
+        self._bundle = bundle
+        self._whole = whole
+        self._bundles: tuple[Bundle, ...] = (bundle,)
+        with tolerated():
+            self._bundles = gathered([bundle])
+        self._plots: list[ActionPlot] = [*bundle.plots]
+        with tolerated():
+            self._plots = plots_of(self._bundles)
+        self._simulation: Simulation | None = None
+        self._components = self._made()
+        self._domain = self._merged()
+
+    def _made(self, profile: Profile | None = None) -> list[Component] | None:
+        """Return the components; `None` if their code fails, so that their absence is not reported again."""
+        with tolerated():
+            try:
+                self._simulation = simulated(self._bundle, Setup(profile=profile))
+                with contained(f"the components of '{self._bundle.name}'", (InputError,)):
+                    own = () if self._simulation is None else self._simulation.components()
+                    found = [*components_of(self._bundles), *own]
+                if not all(isinstance(one, Component) for one in found):
+                    require_instances(found)
+                for one in found:
+                    require_whole(one)
+            except ProgrammingError as error:
+                raise InputError(f"programming error in {error}") from error
+            return found
+        return None
+
+    def _merged(self) -> PlanningDomain | None:
+        if not self._whole:
+            return None
+        with tolerated():
+            parts = [one.domain for one in self._bundles if one.domain is not None]
+            return PlanningDomain.from_fragments([*parts, *shipped_by(self._components or ())] or [_EMPTY])
+        return None
+
+    def findings(self) -> list[Finding]:
+        """Return the findings of the validator; other errors go to the list of `collecting`."""
+        library = Library([*self._plots, achieve_plot()])
+        skills, declared, exclusive = self._skills(), self._declared(), self._exclusive()
+        schema = None if self._domain is None else self._domain.schema
+        found: list[Finding] = []
+        for plot in self._plots:
+            mistakes = validate_plot(plot, library, schema, skills, declared, thorough=True)
+            found += mistakes or review_plot(plot, library, exclusive)
+        found = without_consequences(found, self._broken_files())
+        if self._domain is not None:
+            found += without_consequences(check_implementations(library, self._domain), self._broken_files())
+            self._check_task(self._domain.schema)
+            found += self._unplannable(self._domain)
+        self._check_components()
+        return found
+
+    def _skills(self) -> list[SkillSignature] | None:
+        if self._components is None:
+            return None
+        own = [skill for component in self._components for skill in component.skills().values()]
+        return [*own, *signatures(PlanningComponent, PlanningComponent.name).values()]
+
+    def _exclusive(self) -> frozenset[str]:
+        """Return the skills of the components that execute one skill at a time, as `component.skill`."""
+        return frozenset(
+            f"{skill.component}.{skill.name}"
+            for component in self._components or ()
+            for skill in component.skills().values()
+            if component.takes_turns(skill)
+        )
+
+    def _declared(self) -> dict[str, Mapping[str, Parameter]] | None:
+        if self._components is None:
+            return None
+        declared = {one.name: one.parameters.declared for one in self._components}
+        return {PlanningComponent.name: {}, **declared}
+
+    def _check_task(self, schema: Schema) -> None:
+        """Check the initial knowledge, the goal and the main plot."""
+        bundle, world = self._bundle, KnowledgeBase(schema)
+        with tolerated():
+            try:
+                begin(world, bundle, self._simulation, "check")
+            except ProgrammingError as error:
+                raise InputError(f"programming error in {error}") from error
+        if bundle.goal is not None:
+            with tolerated():
+                check_goal(parse_condition(bundle.goal, f"goal of '{bundle.name}'"), world)
+        if bundle.main is not None:
+            with tolerated():
+                self._check_main(bundle.main)
+
+    def _unplannable(self, domain: PlanningDomain) -> Iterator[Finding]:
+        """Yield a warning for numbers that actions change, if no installed engine can plan with them."""
+        if any(installed(one) and one.races for one in able({"numeric"})):
+            return
+        goals = [] if self._bundle.goal is None else [parse_condition(self._bundle.goal)]
+        goals += [state.goal for plot in self._plots for _, state, _ in plot.walk() if isinstance(state, DynamicState)
+                  and state.goal is not None]  # fmt: skip
+        constructs = {construct.place: construct for goal in goals for construct in numeric_constructs(domain, goal)}
+        for construct in constructs.values():
+            error = InputError(f"{replace(construct, place=None)}; {nobody({'numeric'}).who}", place=construct.place)
+            yield Finding(error, "engine", level="warning")
+
+    def pointless(self) -> Iterator[Finding]:
+        """Yield a warning if the goal with which a run begins holds already, or cannot be reached.
+
+        The parts of the robot must be without mistakes.
+        """
+        domain, (goal, place) = self._domain, self._first_goal()
+        if domain is None or goal is None or free_variables(goal):
+            return
+        world = KnowledgeBase(domain.schema)
+        begin(world, self._bundle, self._simulation, "check")
+        patience = WorkLimit(_PATIENT_SECONDS)
+        with suppress(InputError, WorkLimitError):  # errors of the goal are findings already
+            if holds(derivation(domain).at(world).condition(goal), world):
+                error = InputError("the goal holds in the initial knowledge, so nothing is planned", place=place)
+                yield Finding(error, "goal", level="warning")
+            elif build_problem(domain, world, goal, patience=patience).unreachable:
+                why = "; ".join(why_unsolvable(domain, world, goal, patience))
+                error = InputError(f"the goal cannot be reached from the initial knowledge: {why}", place=place)
+                yield Finding(error, "goal", level="warning")
+
+    def _first_goal(self) -> tuple[Expression | None, Place | None]:
+        """Return the goal that a run plans for before anything else, and its place; `None` without such a goal."""
+        if self._bundle.main is None:
+            return None if self._bundle.goal is None else parse_condition(self._bundle.goal), None
+        plot = next((one for one in self._plots if one.name == self._bundle.main), None)
+        first = None if plot is None else plot.states.get(initial_of(plot))
+        if plot is None or not isinstance(first, DynamicState) or first.dynamic:
+            return None, None
+        return first.goal, plot.place(("states", initial_of(plot), "goal"))
+
+    def _check_main(self, main: str) -> None:
+        plots = {plot.name: plot for plot in self._plots}
+        if main not in plots:
+            raise UnknownNameError(f"the bundle '{self._bundle.name}' has no plot '{main}'", found=main, valid=plots)
+        for name, parameter in plots[main].parameters.items():
+            if parameter.default is None:
+                place = plots[main].place(("parameters", name))
+                message = f"the main plot '{main}' needs its parameter '{name}', and a run gives it none"
+                raise InputError(message, place=place)
+
+    def _check_components(self) -> None:
+        if self._components is None:
+            return
+        with tolerated():
+            require_instances(self._components)
+            require_deployed(self._components, [PlanningComponent.name])
+        with tolerated():
+            require_wired(self._components)
+        with tolerated():
+            configure(self._components)
+        folder = self._bundle.profiles
+        for file in sorted(folder.glob("*.yaml")) if folder is not None and folder.is_dir() else ():
+            with tolerated():
+                profile = load_profile(file)
+                configure(self._made(profile) or (), profile)
+                adapted(self._plots, profile)
+
+    def _broken_files(self) -> Iterator[Path]:
+        """Yield the plot files that were not read, because they contain an error."""
+        read = {_source(plot) for plot in self._plots}
+        folders = {Path(source).parent for source in read if source is not None}
+        return (file for folder in folders for file in folder.glob("*.yaml") if str(file) not in read)
+
+
+_EMPTY = "(define (domain bundles))"
+
+
+def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) -> list[Finding]:
+    """Return the findings without those about missing plots, or their actions, that are in files with errors."""
+    texts = [_text(file) for file in broken]
+    plots = {name for text in texts for name in _NAMES_PLOT.findall(text)}
+    actions = {name for text in texts for name in _IMPLEMENTS.findall(text)}
+    missing = {(_KNOWN_PLOT, name) for name in plots} | {(IMPLEMENTED, name) for name in actions}
+    return [one for one in findings if (one.rule, one.error.found) not in missing]
+
+
+# -- files ---------------------------------------------------------------------------------------------------
+
+
+def _files(files: Iterable[Path]) -> list[Finding]:
+    """Return the findings about files without a robot: their form, and the agreement of plots with their domain."""
+    files = list(files)
+    texts = {file: _text(file) for file in files}
+    found: list[Finding] = []
+    with collecting() as errors:
+        for file in files:
+            with tolerated():
+                _read(file, texts[file])
+    found += [Finding(error, READABLE) for error in errors]
+    plots = [file for file in files if file.suffix in {".yaml", ".yml"} and _NAMES_PLOT.search(texts[file])]
+    return found + _validated(plots)
+
+
+def _read(file: Path, text: str) -> None:
+    """Raise `InputError` for a file that is not Python, or is a domain with an error."""
+    if file.suffix == ".py":
+        try:
+            compile(text, str(file), "exec")
+        except (SyntaxError, ValueError) as error:
+            line = getattr(error, "lineno", None)
+            raise InputError(str(getattr(error, "msg", error)), place=Place(str(file), line)) from None
+    elif file.suffix == ".pddl" and _DEFINES_DOMAIN.search(text):
+        PlanningDomain.from_pddl(file)
+    elif file.suffix in {".yaml", ".yml"} and _NAMES_PROFILE.search(text):
+        load_profile(file)
+
+
+def _validated(files: Iterable[Path]) -> list[Finding]:
+    """Return the findings about plot files; each plot may use the other plots of its folder."""
+    found: list[Finding] = []
+    folders: dict[Path, list[Path]] = {}
+    for file in files:
+        folders.setdefault(file.parent, []).append(file)
+    for folder, own in folders.items():
+        library, broken, plots = Library(), list[Path](), list[ActionPlot]()
+        for file in sorted(folder.glob("*.yaml")):
+            try:
+                plot = load_plot(file)
+                library.add(plot)
+            except InputError as error:
+                broken.append(file)
+                found += [Finding(error, READABLE)] if file in own else []
+            else:
+                plots += [plot] if file in own else []
+        schema = _schema(folder)
+        for plot in plots:
+            findings = validate_plot(plot, library, schema, thorough=True) or review_plot(plot, library)
+            found += without_consequences(findings, broken)
+    return found
+
+
+def _schema(folder: Path) -> Schema | None:
+    """Return the schema of `domain.pddl` in a folder or the folder above; `None` without a readable one."""
+    for place in (folder / "domain.pddl", folder.parent / "domain.pddl"):
+        if place.is_file():
+            try:
+                return Schema.from_text(read_domain(place))
+            except InputError:  # reported as a finding about this file
+                return None
+    return None
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text("utf-8")
+    except (OSError, UnicodeDecodeError):
+        return ""

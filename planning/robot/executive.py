@@ -1,0 +1,441 @@
+"""The executive: a robot program made of a domain, plots, components, knowledge and a planner."""
+
+from __future__ import annotations
+
+import gc
+import math
+import threading
+from collections.abc import Callable, Collection, Coroutine, Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import ValidationError
+
+from dsc.calls import Outputs, PlotCall
+from dsc.components.component import Component
+from dsc.components.robot import require_deployed, require_instances, require_wired
+from dsc.dynamic.knowledge_situation import ACHIEVE
+from dsc.dynamic.library import Library
+from dsc.events import SKILL_FAILURES
+from dsc.model.plot import ActionPlot
+from dsc.model.states import Budget
+from dsc.profiles import configure
+from dsc.runs.kept import Kept
+from dsc.runs.store import RunStore
+from dsc.sequencer.clock import LoopClock, run_real, run_simulated
+from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.skills import signatures
+from dsc.text.plot_files import parse_plot
+from dsc.trace import Listener, Trace
+from knowledge_base.errors import InputError, SchemaError, StoreError
+from knowledge_base.journal.file import Durability, located
+from knowledge_base.language.checking.inputs import shown
+from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema_compatibility import require_extension
+from planning.engines.planner import Planner
+from planning.engines.race import CachingPlanner, PlannerRace
+from planning.engines.registry import repeatable
+from planning.execution.planning_component import PlanningComponent
+from planning.execution.search import Foresight
+from planning.model.domain import PlanningDomain
+from planning.problem.construction import check_goal
+from planning.robot.bundles import Bundle, components_of, domain_of, gathered, plots_of, shipped_by
+from planning.robot.soundness import require_parts, require_sound
+
+Prepare = Callable[[Sequencer], None]
+"""Callback that is called before a run starts, e.g. to post events or to keep a reference to the sequencer."""
+_BUDGET = Budget()
+LONGEST_RUN = 604_800.0
+"""Seconds of simulated time, one week, after which a run ends with a problem unless `until` is given.
+
+In real time, and for an open-ended run, there is no default limit.
+"""
+
+
+class Executive:
+    """A robot program that can run plots and achieve goals.
+
+    Args:
+        domain: the planning domain, or its PDDL file. Components may add fragments. The schema of the knowledge base
+            must declare the merged domain.
+        plots: the plots; plots with `implements` execute planning actions. Several executives may share one `Library`
+            and its caches. The plot `achieve` is added if the library lacks it.
+        components: the components, with their skills.
+        knowledge: the knowledge base, whose schema the plots may use; by default an empty one with the domain's schema.
+        planner: the planner. The default in simulated time is pyperplan, or an installed deterministic engine for
+            problems that pyperplan cannot solve, so that a run is repeatable. The default in
+            real time is a race of the engines that suit a problem.
+        parallel: whether independent steps of a plan are executed concurrently.
+        foresight: simulates each plan before its execution.
+        store: a file for the knowledge base and the runs, so that a run can be resumed after a crash. A missing file is
+            created. With a store, the argument `knowledge` must be omitted.
+        durability: with a store, "process" survives a crash of the process, and "power" also a power failure.
+        failures: further outcomes with which a plot does not reach its goal, see `failures`.
+
+    Raises:
+        PlotError: a plot does not pass the validator; the error contains all findings.
+        InputError: a domain file contains an error, two fragments contradict each other, or two plots have equal
+            names. A component's parameter lacks a value, or a relation between parameters is violated. Both
+            `knowledge` and `store` are given.
+        SchemaMismatchError: the schema of `knowledge` lacks declarations of the domain.
+        StoreError: the store cannot be opened, or another process has opened it for writing.
+    """
+
+    def __init__(
+        self,
+        domain: PlanningDomain | Path | str,
+        plots: Iterable[ActionPlot],
+        components: Iterable[Component],
+        knowledge: KnowledgeBase | None = None,
+        planner: Planner | None = None,
+        *,
+        parallel: bool = True,
+        foresight: Foresight | None = None,
+        store: Path | str | None = None,
+        durability: Durability = "process",
+        failures: Collection[str] = (),
+    ) -> None:
+        require_parts(knowledge, planner, foresight, store)
+        self.components = require_instances(components)
+        configure(self.components)
+        require_deployed(self.components, [PlanningComponent.name])
+        require_wired(self.components)
+        self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
+        if any(component.name == PlanningComponent.name for component in self.components):
+            raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)
+        if knowledge is not None and store is not None:
+            raise InputError("a store provides the knowledge: give a store or knowledge, not both")
+        if knowledge is not None:
+            require_extension(self.domain.schema, knowledge.schema)
+        self.store = None if store is None else located(store)
+        self.library = plots if isinstance(plots, Library) else Library(plots)
+        if ACHIEVE not in self.library:
+            self.library.add(achieve_plot())
+        self._own_planners: dict[bool, CachingPlanner] = {}
+        self._planner = planner
+        self._parallel = parallel
+        self._foresight = foresight
+        self._failures = failures
+        self._listeners: list[Listener] = []
+        skills = [s for c in self.components for s in c.skills().values()]
+        skills += signatures(PlanningComponent, PlanningComponent.name).values()
+        declared = {
+            PlanningComponent.name: {},
+            **{c.name: c.parameters.declared for c in self.components},
+        }
+        schema = self.domain.schema if knowledge is None else knowledge.schema
+        require_sound(self.library, self.domain, schema, skills, declared)
+        if knowledge is not None:
+            self.knowledge = knowledge
+        else:  # last, since the caller must close an opened knowledge base
+            kept = None if store is None else durability
+            self.knowledge = KnowledgeBase.open(self.domain.schema, self.store, kept)
+
+    @classmethod
+    def of_bundles(
+        cls,
+        bundles: Iterable[Bundle | str],
+        plots: Iterable[ActionPlot] = (),
+        components: Iterable[Component] = (),
+        **how: Any,
+    ) -> Self:
+        """Return an executive for bundles, the bundles that they need, and further plots and components.
+
+        Args:
+            bundles: each a `Bundle`, or the name of an installed bundle.
+            plots: further plots.
+            components: further components.
+            how: the keyword arguments of `Executive` (`knowledge`, `planner`, `store`, ...).
+
+        Raises:
+            UnknownNameError: a bundle is missing.
+            InputError: two bundles contradict each other, or `Executive` raises the error.
+        """
+        found = gathered(bundles)
+        how.setdefault("failures", frozenset[str]().union(*(bundle.failures for bundle in found)))
+        return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
+
+    @property
+    def failures(self) -> frozenset[str]:
+        """The outcomes that report failures: `failure_events` of the plots, and the argument `failures`."""
+        return failure_events(self.library).union(self._failures)
+
+    def listen(self, listener: Listener) -> None:
+        """Call `listener` with every later record of every run."""
+        self._listeners.append(listener)
+
+    def run(
+        self,
+        plot: str | PlotCall[Outputs],
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        simulated: bool = True,
+        speed: float = math.inf,
+        open_ended: bool = False,
+        until: float | None = None,
+        prepare: Prepare | None = None,
+        header: Mapping[str, Any] | None = None,
+    ) -> RunEnd[Outputs]:
+        """Run a plot to its end, and return how the run ended.
+
+        Args:
+            plot: the name of the plot, or a call with its arguments, see `dsc plot types`.
+            arguments: values of the plot's parameters.
+            simulated: whether the run uses simulated time, which jumps from event to event, instead of real time.
+            speed: simulated seconds per real second, for people who watch a run in simulated time.
+            open_ended: whether an idle run waits for events from outside, e.g. from an operator. Otherwise an idle run
+                ends and reports the deadlock.
+            until: second of run time at which a run that has not ended ends with a problem. The default is
+                `LONGEST_RUN` in simulated time unless the run is open-ended, and no limit otherwise.
+            prepare: called before the run starts, see `Prepare`.
+            header: plain data that the store keeps with the run.
+
+        Raises:
+            InputError: the plot is unknown, or a parameter is missing or unknown.
+            StoreError: the store cannot be written, or contains an unfinished run.
+        """
+        running = self.execute(plot, arguments, open_ended=open_ended, until=until, prepare=prepare, header=header)
+        return run_simulated(running, speed=speed) if simulated else run_real(running)
+
+    async def execute(
+        self,
+        plot: str | PlotCall[Outputs],
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        open_ended: bool = False,
+        until: float | None = None,
+        prepare: Prepare | None = None,
+        header: Mapping[str, Any] | None = None,
+    ) -> RunEnd[Outputs]:
+        """Run a plot inside an existing asyncio loop, e.g. with remote components, and return how the run ended.
+
+        The loop determines whether time is real, or simulated by `run_simulated`. For the arguments see `run`.
+        """
+        clock = LoopClock()
+        until = _limit(until, bounded=clock.simulated and not open_ended)
+        how = {"simulated": clock.simulated, "open_ended": open_ended, "until": until}
+        store = self._run_store({**(header or {}), **how})
+        sequencer, planning = self._wired(clock, 0, store, open_ended=open_ended, until=until)
+        if prepare is not None:
+            prepare(sequencer)
+        return await _to_its_end(sequencer.run(plot, arguments), planning, clock)
+
+    def resume(self, *, speed: float = math.inf, prepare: Prepare | None = None) -> RunEnd:
+        """Resume the unfinished run of the store at its last macrostep, and run it to its end; for `speed` see `run`.
+
+        Listeners receive the records of the run from the beginning. `prepare` is called again. Scheduled events that
+        are still pending are kept and need not be posted again.
+
+        Raises:
+            StoreError: there is no store or no unfinished run, or the store cannot be read or written.
+            ChangedError: plots or domain differ from their versions at the start of the run; the message lists the
+                differences.
+        """
+        store, kept = self._taken_up()
+        going_on = self._go_on(store, kept, prepare)
+        return run_simulated(going_on, kept.time, speed) if kept.run.header["simulated"] else run_real(going_on)
+
+    async def go_on(self, *, prepare: Prepare | None = None) -> RunEnd:
+        """Resume the unfinished run inside an existing asyncio loop, see `resume`.
+
+        Raises:
+            InputError: the run uses simulated time and the loop real time, or the run uses real time and the loop
+                simulated time.
+        """
+        store, kept = self._taken_up()
+        simulated = LoopClock().simulated
+        if simulated != kept.run.header["simulated"]:
+            was, now = ("real", "simulated") if simulated else ("simulated", "real")
+            raise InputError(f"the run was begun in {was} time and cannot be resumed in {now} time")
+        return await self._go_on(store, kept, prepare)
+
+    def achieve(
+        self,
+        goal: str,
+        *,
+        seconds: float = _BUDGET.seconds,
+        replans: int = _BUDGET.replans,
+        simulated: bool = True,
+        speed: float = math.inf,
+        open_ended: bool = False,
+        until: float | None = None,
+        prepare: Prepare | None = None,
+        header: Mapping[str, Any] | None = None,
+    ) -> RunEnd:
+        """Plan for a goal, execute the plan, and replan if a change of the world breaks the plan.
+
+        The returned end is `finished`, and contains whether the goal was `reached`. If the goal was not reached, the
+        end contains the event `no_plan` or `gave_up`, with the reason.
+
+        Args:
+            goal: the condition to reach.
+            seconds: real time for each search.
+            replans: the maximum number of plans after the first plan.
+            simulated: see `run`.
+            speed: see `run`.
+            open_ended: see `run`.
+            until: see `run`.
+            prepare: see `run`.
+            header: see `run`.
+
+        Raises:
+            InputError: the goal is not a condition or contains an undeclared name, or a limit is out of range.
+        """
+        check_goal(parse_condition(goal), self.knowledge)
+        budget = _budget(seconds, replans)
+        arguments = {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
+        return self.run(
+            ACHIEVE,
+            arguments,
+            simulated=simulated,
+            speed=speed,
+            open_ended=open_ended,
+            until=until,
+            prepare=prepare,
+            header=header,
+        )
+
+    def _taken_up(self) -> tuple[RunStore, Kept]:
+        store = self._run_store({})
+        if store is None:
+            raise StoreError("only a run with a store can be resumed")
+        return store, store.take_up(self.library)
+
+    async def _go_on(self, store: RunStore, kept: Kept, prepare: Prepare | None) -> RunEnd:
+        for record in kept.records:
+            for listener in self._listeners:
+                listener(record)
+        clock = LoopClock(kept.time)
+        open_ended, until = bool(kept.run.header["open_ended"]), kept.run.header["until"]
+        sequencer, planning = self._wired(clock, kept.last_record, store, open_ended=open_ended, until=until)
+        if prepare is not None:
+            prepare(sequencer)
+        return await _to_its_end(sequencer.resume(kept), planning, clock)
+
+    def _wired(
+        self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool, until: float | None
+    ) -> tuple[Sequencer, PlanningComponent]:
+        trace = Trace(clock.now, last)
+        for listener in self._listeners:
+            trace.listen(listener)
+        components: list[Component] = list(self.components)
+        sequencer = Sequencer(
+            self.library, self.knowledge, components, clock, trace, open_ended=open_ended, store=store,
+            until=math.inf if until is None else until, failures=self.failures,
+        )  # fmt: skip
+        planning = PlanningComponent(
+            self.domain, self.library, self.knowledge, self._planner_for(clock), clock, trace,
+            components=sequencer.dispatcher.components, working_for=sequencer.working_for, parallel=self._parallel,
+            shared=[component.name for component in components if component.concurrent],
+            foresight=self._foresight,
+        )  # fmt: skip
+        sequencer.listen(planning.note)
+        sequencer.dispatcher.deploy(planning)
+        return sequencer, planning
+
+    def _run_store(self, header: Mapping[str, Any]) -> RunStore | None:
+        if self.store is None:
+            return None
+        return RunStore(self.knowledge, self.store, header, self.domain.statements())
+
+    def close(self) -> None:
+        """Close the store, and terminate the processes of the default planners."""
+        if self.store is not None:
+            self.knowledge.close()
+        for planner in self._own_planners.values():
+            planner.kill()
+
+    def _planner_for(self, clock: LoopClock) -> Planner:
+        if self._planner is not None:
+            return self._planner
+        if clock.simulated not in self._own_planners:
+            planner = PlannerRace(choose=repeatable) if clock.simulated else PlannerRace()
+            self._own_planners[clock.simulated] = CachingPlanner(planner)
+        return self._own_planners[clock.simulated]
+
+    def __enter__(self) -> Self:
+        """Return the executive; the end of the `with` block calls `close`."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the executive, see `close`."""
+        self.close()
+
+
+async def _to_its_end(
+    running: Coroutine[Any, Any, RunEnd[Outputs]], planning: PlanningComponent, clock: LoopClock
+) -> RunEnd[Outputs]:
+    with nullcontext() if clock.simulated else settled():
+        try:
+            return await running
+        finally:
+            await planning.over()
+
+
+@cache
+def achieve_plot() -> ActionPlot:
+    """Return the plot that plans for any goal; cached, because plots are immutable."""
+    resource = files("planning") / "plots" / "achieve.yaml"
+    return parse_plot(resource.read_text(encoding="utf-8"), str(resource))
+
+
+def _limit(until: float | None, *, bounded: bool) -> float | None:
+    """Return the second at which a run ends at the latest; `None` without a limit."""
+    if until is None:
+        return LONGEST_RUN if bounded else None
+    if isinstance(until, bool) or not isinstance(until, int | float) or not until > 0:
+        raise InputError(f"`until` is a positive number of seconds, not {shown(until)}")
+    return None if until == math.inf else until
+
+
+def _budget(seconds: float, replans: int) -> Budget:
+    try:
+        return Budget(seconds=seconds, replans=replans)
+    except ValidationError as error:
+        first = error.errors()[0]
+        wrong = f"'{first['loc'][0]}' is {first['input']!r}: {first['msg']}"
+        raise InputError(wrong, found=str(first["input"])) from None
+
+
+_YOUNG = 10_000
+"""The least number of allocations between two collections of the youngest generation.
+
+The interpreter's default of 700 suits programs with few allocations. One new plan allocates 20,000 objects, most of
+them short-lived.
+"""
+
+_lock = threading.Lock()
+_thresholds: list[tuple[int, int, int]] = []
+"""The thresholds of the garbage collector before each run in progress."""
+
+
+@contextmanager
+def settled() -> Iterator[None]:
+    """Exclude the existing objects from garbage collection until the end of all runs in progress.
+
+    A collection of all objects takes a tenth of a second. New objects are also collected less often.
+    """
+    with _lock:
+        gc.freeze()
+        before = gc.get_threshold()
+        _thresholds.append(before)
+        if before[0]:  # 0 means that collection is disabled
+            gc.set_threshold(max(before[0], _YOUNG), *before[1:])
+    try:
+        yield
+    finally:
+        with _lock:
+            gc.set_threshold(*_thresholds.pop())
+            if not _thresholds:
+                gc.unfreeze()
+
+
+def failure_events(library: Library) -> frozenset[str]:
+    """Return the failures of all skills, the outcomes of plots for planning actions, and the events of rules."""
+    emitted = {event for plot in library if plot.implements for event in plot.emits}
+    answered = {rule.on for plot in library for rule in plot.rules if rule.on is not None}
+    return frozenset({*SKILL_FAILURES, *emitted, *answered})

@@ -1,0 +1,113 @@
+"""Soundness of a robot program, checked before a run: types of the parts; agreement of plots, skills and domain."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from itertools import pairwise
+from pathlib import Path
+
+from dsc.components.declarations import Parameter
+from dsc.dynamic.library import Library
+from dsc.errors import Finding
+from dsc.skills import SkillSignature
+from dsc.validation import raise_findings, validate_library
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.checking.inputs import require, shown
+from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
+from planning.model.domain import PlanningDomain
+
+IMPLEMENTED = "every action has a plot"
+"""The rule of a finding about a planning action without a plot."""
+
+
+def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[Finding]:
+    """Yield a finding for each disagreement between plots and planning actions.
+
+    A plot may implement an unknown action or have a parameter that its action lacks. An action may lack a plot.
+
+    All plots of one action must declare equal `effects`, either `observed` or `assumed`. A generated plot exists before
+    one of these plots is chosen. With different effects it might wait for effects that no skill reports.
+
+    A domain without any implemented action is valid, because a program may use the domain without a planner.
+    """
+    implemented = set()
+    for plot in library:
+        if plot.implements is None:
+            continue
+        implemented.add(plot.implements)
+        action = domain.actions.get(plot.implements)
+        if action is None:
+            unknown = UnknownNameError(
+                f"the domain '{domain.name}' has no planning action '{plot.implements}'",
+                place=plot.place(("implements",)), found=plot.implements, valid=domain.actions,
+            )  # fmt: skip
+            yield Finding(unknown, "known planning action")
+            continue
+        names = [parameter.name for parameter in action.parameters]
+        for name, parameter in plot.parameters.items():
+            if name not in names and parameter.default is None:
+                missing = UnknownNameError(
+                    f"planning action '{action.name}' has no parameter '?{name}' to give to the plot",
+                    place=plot.place(("parameters", name)), found=name, valid=names,
+                )  # fmt: skip
+                yield Finding(missing, "parameters of the action")
+    for name, action in domain.actions.items():
+        yield from _mixed_effects(name, library)
+        if implemented and name not in implemented:
+            error = SchemaError(f"no plot implements the planning action '{name}'", place=action.place, found=name)
+            yield Finding(error, IMPLEMENTED, f"add a plot with `implements: {name}`")
+
+
+def _mixed_effects(action: str, library: Library) -> Iterator[Finding]:
+    for first, plot in pairwise(library.implementing(action)):
+        if plot.effects != first.effects:
+            error = SchemaError(
+                f"the plots '{first.name}' and '{plot.name}' implement '{action}', but only one says"
+                " `effects: assumed`",
+                place=plot.place(("effects",)) or plot.place(("implements",)),
+            )
+            yield Finding(error, "effects of the action", "say the same in all plots of an action")
+
+
+_sound: dict[tuple[int, ...], tuple[object, ...]] = {}
+"""Sound combinations, keyed by identity; references to the parts prevent that a new object has a used identity."""
+_MOST_SOUND = 16
+
+
+def require_sound(
+    library: Library,
+    domain: PlanningDomain,
+    schema: Schema,
+    skills: Collection[SkillSignature],
+    declared: Mapping[str, Mapping[str, Parameter]],
+) -> None:
+    """Raise `PlotError` with the findings of the validator; a combination that passed before is not checked again."""
+    parts = (domain, schema, *library, *skills, *declared, *declared.values())
+    key = tuple(map(id, parts))
+    if key in _sound:
+        return
+    findings = validate_library(library, schema, skills, declared)
+    raise_findings([*findings, *check_implementations(library, domain)])
+    if len(_sound) >= _MOST_SOUND:
+        _sound.clear()
+    _sound[key] = parts
+
+
+def require_parts(knowledge: object, planner: object, foresight: object, store: object) -> None:
+    """Raise `InputError` if a part is not `None` and lacks its declared type."""
+    if knowledge is not None:
+        require(knowledge, KnowledgeBase, "the knowledge is a KnowledgeBase")
+    if store is not None:
+        require(store, (str, Path), "a store is named by a text or a Path")
+    _require_able(planner, "solve", "a planner")
+    _require_able(foresight, "foresee", "a foresight")
+
+
+def _require_able(part: object, method: str, what: str) -> None:
+    if part is None:
+        return
+    if isinstance(part, type):
+        raise InputError(f"{what} is an object, not a class; an instance is made by {part.__name__}()")
+    if not callable(getattr(part, method, None)):
+        raise InputError(f"{what} needs a method '{method}', which {shown(part)[:60]} lacks")

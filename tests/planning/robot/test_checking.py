@@ -1,0 +1,177 @@
+"""`dsc check`: every mistake of a project is found at once, and a mistake hides no other."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from planning.engines.registry import Engine
+from planning.robot.checking import check_project
+
+ROOT = Path(__file__).parents[3]
+PROJECT = ROOT / "tests" / "support" / "delivery_project"
+DSC = Path(sys.executable).with_name("dsc")
+
+PLANTED = [
+    ("domain.pddl", "(in ?parcel ?at))\n    :effect", "(inn ?parcel ?at))\n    :effect", "no predicate 'inn'; did you mean 'in'"),
+    ("domain.pddl", "(robot-in ?at) (holding", "(robot-in ?att) (holding", "'?att' is not bound"),
+    ("domain.pddl", "(not (holding ?parcel))", "(not (holds ?parcel))", "no predicate 'holds'; did you mean 'holding'"),
+    ("domain.pddl", "?from ?to - room", "?from ?to - rom", "no type 'rom'; did you mean 'room'"),
+    ("plots/drive.yaml", "wheels.drive", "weels.drive", "no component offers the skill or event 'weels.drive'; did you mean"),
+    ("plots/drive.yaml", "stuck: {final: true}", "stuck: {final: true, emit: blokked}", "'blokked'; did you mean 'blocked'"),
+    ("plots/put.yaml", "parcel: ?parcel", "parcel: ?parsel", "no variable '?parsel' here; did you mean 'parcel'"),
+    ("plots/put.yaml", "implements: put", "implements: putt", "no planning action 'putt'; did you mean 'put'"),
+    ("plots/put.yaml", "put: there", "put: their", "their"),
+    ("plots/take.yaml", "taken: there", "takn: there", "'takn'; did you mean 'taken'"),
+    ("plots/take.yaml", "{parcel: parcel}", "{parcel: parsel}", "parsel"),
+    ("plots/deliver_all.yaml", "gave_up: failed", "gave_upp: failed", "does not handle its outcome 'gave_up'"),
+    ("plots/deliver_all.yaml", "on: blocked", "on: bloked", "can end with 'bloked'; did you mean 'blocked'"),
+    ("plots/deliver_all.yaml", "(exists (?r - room)", "(exists (?r - roomm)", "roomm"),
+    ("profiles/fast.yaml", "speed: 5", "sped: 5", "no parameter 'sped'; did you mean 'speed'"),
+    ("delivery.py", '"wheels"\n', '"wheels"\n    modes = ("fast",)\n    needs = {"fst": ("gripper",)}\n', "'fst'"),
+    ("delivery.py", "to: Room)", "to: Rom)", "the annotation of 'to' names 'Rom', which does not exist when the class is made; did you mean 'Room'"),
+    ("delivery.py", "async def put(", "def put(", "skill 'Gripper.put' is not a coroutine"),
+    ("delivery.py", "def grasp(self, call: SkillCall, parcel", "def grasp(self, parcel", "no parameter for its call"),
+    ("delivery.py", 'main="deliver_all"', 'main="deliver_al"', "no plot 'deliver_al'; did you mean 'deliver_all'"),
+    ("delivery.py", "(in ?p ?r))))\",", "(on ?p ?r))))\",", "no predicate 'on'"),
+    ("delivery.py", 'fact("robot-in", self.robot_at),\n', 'fact("robot-at", self.robot_at),\n', "no predicate 'robot-at'; did you mean 'robot-in'"),
+    ("plots/deliver_all.yaml", "then: retry", "then: retri", "'retri'; did you mean 'retry'"),
+    ("plots/drive.yaml", "{to: room}\nimpl", "{to: rooom}\nimpl", "no type 'rooom'; did you mean 'room'"),
+    ("plots/take.yaml", "  there: {final: true}", "  there: {final: true}\n  rest: {final: true}", "'rest'"),
+]  # fmt: skip
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    home = tmp_path / "house"
+    shutil.copytree(PROJECT, home)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    yield home
+    sys.modules.pop("delivery", None)
+
+
+def planted(home, mistakes):
+    for file, right, wrong, _ in mistakes:
+        text = (home / file).read_text()
+        assert right in text, (file, right)
+        (home / file).write_text(text.replace(right, wrong, 1))
+
+
+def test_a_project_without_mistakes_has_no_findings(project):
+    assert check_project(str(project)) == []
+
+
+@pytest.mark.parametrize("number", range(len(PLANTED)))
+def test_each_mistake_is_found_with_its_file(project, number):
+    planted(project, [PLANTED[number]])
+    file, _, _, said = PLANTED[number]
+    found = [one for one in check_project(str(project)) if said in str(one)]
+    assert found
+    if file != "delivery.py":
+        assert str(found[0]).startswith(str(project / file))
+        assert found[0].place is not None
+        assert found[0].place.line
+
+
+def test_all_mistakes_are_found_at_once(project):
+    planted(project, PLANTED)
+    (project / "plots" / "broken.yaml").write_text("plot: broken\nstates: [\n")
+    (project / "plots" / "other.yaml").write_text(
+        "plot: other\nstates:\n  a: {use: broken, on: {done: e}}\n  e: {final: true}\n"
+    )
+    (project / "unused.py").write_text("def f(:\n")
+    report = "\n".join(map(str, check_project(str(project))))
+    missing = [said for *_, said in PLANTED if said not in report]
+    assert missing == []
+    assert "broken.yaml:3:1" in report
+    assert "unused.py:1" in report
+    assert "no plot 'broken'" not in report  # its file has the mistake
+
+
+def test_a_simulation_with_a_bug_is_a_finding_with_its_line(project):
+    planted(project, [("delivery.py", "[Wheels(self), Gripper(self)]", "[Wheels(self), Griper(self)]", "")])
+    (found,) = check_project(str(project))
+    assert "NameError: name 'Griper' is not defined" in str(found)
+    assert "delivery.py:" in str(found)
+
+
+def test_files_without_a_robot_are_checked_too(project):
+    for name in ("pyproject.toml", "delivery.py"):
+        (project / name).unlink()
+    planted(project, [PLANTED[0], PLANTED[6]])
+    found = check_project(str(project))
+    assert [PLANTED[0][3] in str(found[0]), PLANTED[6][3] in str(found[1])] == [True, True]
+    assert len(found) == 2
+
+
+def test_a_plot_file_is_a_project_too(project):
+    planted(project, [PLANTED[6]])
+    (found,) = check_project(str(project / "plots" / "put.yaml"))
+    assert PLANTED[6][3] in str(found)
+
+
+def test_the_command_prints_the_list_and_has_a_status(project):
+    good = subprocess.run([DSC, "check", project], capture_output=True, text=True, check=False)
+    assert (good.returncode, good.stderr) == (0, "")
+    assert "no mistakes found" in good.stdout
+    planted(project, [PLANTED[0], PLANTED[16]])
+    bad = subprocess.run([DSC, "check"], cwd=project, capture_output=True, text=True, check=False)
+    assert (bad.returncode, bad.stderr) == (2, "")
+    lines = bad.stdout.splitlines()
+    assert [line.split(":")[0] for line in lines] == ["delivery.py", "domain.pddl"]
+    as_json = subprocess.run([DSC, "check", project, "--json"], capture_output=True, text=True, check=False)
+    assert [one["found"] for one in json.loads(as_json.stdout)] == ["Rom", "inn"]
+
+
+@pytest.mark.parametrize("target", ["clean-up-table", "examples/own_domain.py", "tests/support/lasting_robot"])
+def test_our_own_robots_have_no_findings(target, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    assert check_project(target) == []
+
+
+def test_a_programming_error_is_one_line_of_the_list(project):
+    planted(project, [("delivery.py", "[Wheels(self), Gripper(self)]", "[Wheels(self), Griper(self)]", "")])
+    done = subprocess.run([DSC, "check", project], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "")
+    assert len(done.stdout.splitlines()) == 1
+
+
+@pytest.mark.parametrize("has_engine", [True, False])
+def test_numbers_that_no_installed_engine_can_plan_with_are_a_warning_with_the_remedy(project, monkeypatch, has_engine):
+    lacks = "" if has_engine else "pip install 'up-enhsp>=0.1.1'"
+    monkeypatch.setattr(Engine, "lacks", lambda one: lacks if one.name == "enhsp" else "")
+    planted(project, [
+        ("domain.pddl", "(full))\n", "(full)) (:functions (charge))\n", ""),
+        ("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (>= (charge) 0))", ""),
+        ("domain.pddl", "(robot-in ?to))", "(robot-in ?to) (decrease (charge) 1))", ""),
+    ])  # fmt: skip
+    found = [str(one) for one in check_project(str(project))]
+    assert len(found) == (not has_engine)
+    if found:
+        assert found[0].startswith(f"{project / 'domain.pddl'}:7:")
+        assert found[0].endswith("enhsp could (pip install 'up-enhsp>=0.1.1') [warning]")
+
+
+def test_a_first_goal_that_holds_already_is_a_warning(project):
+    planted(project, [("delivery.py", '*(fact("goes-to", parcel', '*(fact("in", parcel', "")])
+    planted(project, [("plots/deliver_all.yaml", "(exists (?r - room) (and (goes-to ?p ?r) (in ?p ?r)))", "(exists (?r - room) (in ?p ?r))", "")])  # fmt: skip
+    (found,) = check_project(str(project))
+    assert "the goal holds in the initial knowledge, so nothing is planned" in str(found)
+    assert (found.level, found.place is not None) == ("warning", True)
+
+
+def test_a_first_goal_that_cannot_be_reached_is_a_warning_with_the_reason(project):
+    planted(
+        project, [("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (full))", "")]
+    )
+    (found,) = check_project(str(project))
+    assert found.level == "warning"
+    assert str(found).startswith(f"{project / 'plots' / 'deliver_all.yaml'}:")
+    assert "the goal cannot be reached from the initial knowledge" in str(found)
+    assert "(full) does not hold, and no planning action makes it true" in str(found)
