@@ -9,7 +9,7 @@ from typing import Any
 
 from dsc.dynamic.steps import Plots, filled
 from dsc.events import DONE, FAILURES, GAVE_UP, SKILL_FAILURES
-from dsc.model.actions import Assign, Emit, Internal, Tell
+from dsc.model.actions import Assign, Block, Choose, Emit, Internal, Log, Tell, Withdraw
 from dsc.model.plot import ActionPlot, PlotVariable
 from dsc.model.rules import CONTINUE, ENTER, GIVE_UP, REPLAN, RETRY, Rule
 from dsc.model.states import AnyState, FinalState, State, SubmachineState
@@ -237,7 +237,7 @@ def _action_because(action: Internal, reason: Terms) -> Internal:
             return Assign(assign=filled(action.assign, reason))
         case Emit():
             return action.model_copy(update={"arguments": filled(action.arguments, reason)})
-        case _:  # actions of dialect scxml stay unchanged, because rules exist only in dialect dsc
+        case Withdraw() | Log() | Choose() | Block():  # of dialect scxml, which has no rules
             return action
 
 

@@ -24,6 +24,7 @@ from dsc.model.actions import (
     Internal,
     Log,
     Send,
+    Switch,
     Tell,
     Trigger,
     Withdraw,
@@ -173,7 +174,7 @@ class Performer:
             case Send():
                 component, port = action.send.split(".")
                 return steps.SendMessage(component, port, self.values(frame, action.arguments), activation)
-            case _:
+            case Switch():
                 return steps.SwitchMode(action.switch, action.to, activation)
 
     def _perform(self, frame: Frame, state: str, action: Internal) -> None:

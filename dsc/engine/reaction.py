@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from dsc.engine.machine_state import Configuration, configuration_of
 from dsc.engine.situation import settle
@@ -17,7 +17,21 @@ from dsc.engine.steps import Taken
 from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
 from dsc.engine.transition_selection import EntrySet, domain, left_by
 from dsc.events import DONE
-from dsc.model.actions import Block, Choose, Emit, ExternalAction, Internal, Trigger
+from dsc.model.actions import (
+    Assign,
+    Block,
+    Choose,
+    Configure,
+    Emit,
+    ExternalAction,
+    Internal,
+    Log,
+    Send,
+    Switch,
+    Tell,
+    Trigger,
+    Withdraw,
+)
 from dsc.model.states import FinalState, HistoryState, State
 
 _AnyAction = TypeVar("_AnyAction", bound=ExternalAction | Internal)
@@ -275,15 +289,15 @@ class _Work:
         return tuple(map(self._settled_action, actions)) if self.compiled.scxml else actions
 
     def _settled_action(self, action: _AnyAction) -> _AnyAction:
-        if isinstance(action, Choose):
-            condition = settle(action.condition, lambda state: self.compiled.index.get(state) in self.present)
-            then, otherwise = self._settled(action.then), self._settled(action.otherwise)
-            update: dict[str, Any] = {"condition": condition, "then": then, "otherwise": otherwise}
-        elif isinstance(action, Block):
-            update = {"block": self._settled(action.block)}
-        else:
-            return action
-        return action.model_copy(update=update)  # type: ignore[return-value]  # the copy has the class of `action`
+        match action:
+            case Choose(condition=condition, then=then, otherwise=otherwise):
+                settled = settle(condition, lambda state: self.compiled.index.get(state) in self.present)
+                branches = {"then": self._settled(then), "otherwise": self._settled(otherwise)}
+                return action.model_copy(update={"condition": settled, **branches})
+            case Block(block=inside):
+                return action.model_copy(update={"block": self._settled(inside)})
+            case Assign() | Tell() | Emit() | Withdraw() | Log() | Trigger() | Configure() | Switch() | Send():
+                return action
 
     def _completed(self, node: StateNode) -> Iterator[int]:
         """Yield indices of nodes whose content this entry completes, if a transition or a parent depends on this."""

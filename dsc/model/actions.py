@@ -139,10 +139,13 @@ def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalActio
     """Yield all actions, including the actions inside branches and blocks."""
     for action in actions:
         yield action
-        if isinstance(action, Choose):
-            yield from flat((*action.then, *action.otherwise))
-        elif isinstance(action, Block):
-            yield from flat(action.block)
+        match action:
+            case Choose(then=then, otherwise=otherwise):
+                yield from flat((*then, *otherwise))
+            case Block(block=inside):
+                yield from flat(inside)
+            case Assign() | Tell() | Emit() | Withdraw() | Log() | Trigger() | Configure() | Switch() | Send():
+                pass
 
 
 def component_of(action: ExternalAction | Internal) -> str | None:

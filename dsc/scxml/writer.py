@@ -8,7 +8,21 @@ from xml.etree import ElementTree as ET
 
 from dsc.engine.situation import asked_states
 from dsc.errors import NotExpressibleError
-from dsc.model.actions import Assign, Block, Choose, Emit, ExternalAction, Internal, Log, Withdraw
+from dsc.model.actions import (
+    Assign,
+    Block,
+    Choose,
+    Configure,
+    Emit,
+    ExternalAction,
+    Internal,
+    Log,
+    Send,
+    Switch,
+    Tell,
+    Trigger,
+    Withdraw,
+)
 from dsc.model.plot import ActionPlot, Scope, initial_of
 from dsc.model.states import (
     AnyState,
@@ -245,7 +259,7 @@ def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -
                 _if(around, action)
             case Block():
                 raise NotExpressibleError("block", "only <onentry> and <onexit> are blocks")
-            case _:
+            case Tell() | Trigger() | Configure() | Switch() | Send():
                 raise NotExpressibleError(type(action).__name__.lower(), "SCXML knows no skills and no knowledge base")
 
 

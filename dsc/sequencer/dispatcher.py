@@ -162,19 +162,22 @@ class Dispatcher:
         if isinstance(output, _FOR_COMPONENTS) and output.component not in self._components:
             within = output.within if isinstance(output, steps.Start) else None
             self._undeployed.hold(output, within or DEFAULT_WITHIN)
-        elif isinstance(output, steps.Start):
-            self._start(output)
-        elif isinstance(output, steps.Cancel):
-            self._cancel(output.activation)
-        elif isinstance(output, steps.StartTimer):
-            self.timers.schedule(TimerMessage(output), self._clock.now() + output.seconds)
-        elif isinstance(output, steps.SendLater):
-            self.timers.schedule(output, self._clock.now() + output.seconds)
-        elif isinstance(output, steps.Revoke):
-            self.timers.revoke(output)
-        elif isinstance(output, Told):
-            self._send(output)
-        # Other outputs are notes, which only the trace records.
+            return
+        match output:
+            case steps.Start():
+                self._start(output)
+            case steps.Cancel():
+                self._cancel(output.activation)
+            case steps.StartTimer():
+                self.timers.schedule(TimerMessage(output), self._clock.now() + output.seconds)
+            case steps.SendLater():
+                self.timers.schedule(output, self._clock.now() + output.seconds)
+            case steps.Revoke():
+                self.timers.revoke(output)
+            case steps.SetParameter() | steps.SwitchMode() | steps.SendMessage():
+                self._send(output)
+            case steps.Note():
+                pass  # the trace records notes
 
     def _send(self, told: Told) -> None:
         self.outbox.send(self.component(told.component), told)

@@ -9,7 +9,22 @@ from dsc.dynamic.steps import answerable
 from dsc.engine.situation import asked_states
 from dsc.engine.tables import compile_plot
 from dsc.errors import Finding
-from dsc.model.actions import Block, Choose, Emit, ExternalAction, Internal, Log, Withdraw, flat
+from dsc.model.actions import (
+    Assign,
+    Block,
+    Choose,
+    Configure,
+    Emit,
+    ExternalAction,
+    Internal,
+    Log,
+    Send,
+    Switch,
+    Tell,
+    Trigger,
+    Withdraw,
+    flat,
+)
 from dsc.model.plot import Path, Scope
 from dsc.model.rules import Rule
 from dsc.model.states import (
@@ -232,5 +247,10 @@ def _foreign_in(transition: Transition, name: str) -> Iterator[tuple[Path, str]]
 
 
 def _is_foreign(action: ExternalAction | Internal) -> bool:
-    sent = isinstance(action, Emit) and (action.delay, action.id, action.into) != (None, None, None)
-    return sent or isinstance(action, Block | Choose | Log | Withdraw)
+    match action:
+        case Emit(delay=delay, id=sent, into=into):
+            return (delay, sent, into) != (None, None, None)
+        case Block() | Choose() | Log() | Withdraw():
+            return True
+        case Assign() | Tell() | Trigger() | Configure() | Switch() | Send():
+            return False

@@ -31,7 +31,21 @@ from typing import Any
 
 from reference_tree import Node, NoValueError, grow, holds, told, value
 
-from dsc.model.actions import Assign, Block, Choose, Emit, Switch, Tell
+from dsc.model.actions import (
+    Assign,
+    Block,
+    Choose,
+    Configure,
+    Emit,
+    ExternalAction,
+    Internal,
+    Log,
+    Send,
+    Switch,
+    Tell,
+    Trigger,
+    Withdraw,
+)
 from dsc.model.states import State, SubmachineState
 
 MOST_MICROSTEPS = 1000
@@ -497,7 +511,7 @@ class Reference:
                 if instance.scxml:
                     return
 
-    def _act(self, instance, action):
+    def _act(self, instance, action: ExternalAction | Internal):
         match action:
             case Switch(to=mode):
                 self.report.modes.append(mode)
@@ -514,6 +528,8 @@ class Reference:
                     self._act(instance, inner)
             case Block(block=inside):
                 self._perform(instance, inside)
+            case Trigger() | Configure() | Send() | Withdraw() | Log():
+                pass  # nothing of a chart without components depends on them
 
     def _chooses(self, instance, action):
         """A condition that cannot be evaluated is false, and an error (SCXML 5.9.1)."""
