@@ -232,7 +232,7 @@ class _Work:
             self.compiled, tuple(sorted(self.present)), frozenset(self.waiting), history
         )  # fmt: skip
         silent = all(one.quiet for one in exits)
-        stays = not keeps and not self.waiting and not following.spontaneous
+        stays = not keeps and not following.spontaneous
         return CompiledReaction(
             parts, exits, following, keeps, taken,
             exited=tuple([one.node.name for one in exits if one.node.state is not None]),

@@ -231,3 +231,9 @@ def test_a_failure_that_nobody_takes_is_not_handled():
     run = layers("stop: broken")
     assert not run.send("skill_error", to="h/m/a").handled
     assert run.machine.state.configuration() == ("h", "h/m", "h/m/a")
+
+
+def test_an_initial_value_that_reads_an_unknown_variable_names_it_and_the_nearest():
+    area = "{plot: p, parameters: {width: number}, variables: {area: {type: number, initial: ?widht}}, states: {s: }}"
+    with pytest.raises(UnknownNameError, match="'\\?widht' has no value here; did you mean 'width'"):
+        Run(plot(area)).start(width=2)

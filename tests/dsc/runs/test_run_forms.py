@@ -11,7 +11,16 @@ from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartT
 from dsc.events import Event
 from dsc.messages import KnowledgeMessage, LateMessage, ParameterMessage, SkillMessage, TimerMessage
 from dsc.outcomes import Outcome
-from dsc.runs.encoding import Shortener, awaited_form, awaited_of, full, message_form, message_of
+from dsc.runs.encoding import (
+    Shortener,
+    awaited_form,
+    awaited_of,
+    events_form,
+    events_of,
+    full,
+    message_form,
+    message_of,
+)
 from knowledge_base.facts import Delta, fact
 
 PLOT = {"plot": "made", "states": {}}
@@ -54,6 +63,7 @@ def test_a_plot_among_values_is_put_away_once_and_found_again(forms, short):
         ParameterMessage("robot", "speed", 2.5, of_plot=False),
         SkillMessage(START, Outcome("did", WITH_PLOT, TOLD), final=True),
         SkillMessage(START, Outcome("progress"), final=False, conflated=4),
+        SkillMessage(START, Outcome("low"), final=False, activated=True),
         TimerMessage(StartTimer(2, 1, 9.0)),
         LateMessage(Event("go", WITH_PLOT), 7),
         LateMessage(KnowledgeMessage(TOLD, "eve"), 8),
@@ -84,3 +94,9 @@ def test_what_is_awaited_comes_back(what, forms, short):
     form = written(awaited_form(what, short))
     assert json.dumps(PLOT) not in json.dumps(form)
     assert awaited_of(type(what).__name__, form, lambda digest: json.loads(forms[digest])) == what
+
+
+def test_events_with_plots_come_back(forms, short):
+    events = (Event("found", WITH_PLOT), Event("over"))
+    form = written(events_form(events, short))
+    assert events_of(form, lambda digest: json.loads(forms[digest])) == events

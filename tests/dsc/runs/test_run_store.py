@@ -17,14 +17,15 @@ from dsc.errors import ChangedError
 from dsc.events import Event
 from dsc.outcomes import Outcome
 from dsc.runs import store as store_module
-from dsc.runs.archive import archive, has_run, records_of
-from dsc.runs.store import RunStore
+from dsc.runs.archive import archive, has_run, is_unfinished, records_of
+from dsc.runs.store import RunStore, RunWriter
 from dsc.sequencer.replay import replay
 from dsc.sequencer.sequencer import RunEnd, Sequencer
 from dsc.skills import skill
 from knowledge_base.errors import Place, StoreError, UnknownNameError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema import Schema
 
 
 @pytest.mark.parametrize("chart", CHARTS.values(), ids=CHARTS)
@@ -374,6 +375,39 @@ def test_a_mistake_in_what_is_to_be_run_leaves_the_store_as_it_was(tmp_path):
         Run(tmp_path, [TWICE], arguments={"nonsense": 1})
     assert not has_run(tmp_path / "run.kb")
     assert Run(tmp_path, [TWICE]).end.finished
+
+
+def test_a_store_without_a_run_is_named(tmp_path):
+    path = tmp_path / "world.kb"
+    KnowledgeBase.open(Schema(), path).close()
+    assert not is_unfinished(path)
+    with pytest.raises(StoreError, match="no run was ever kept in this store") as refused, archive(path):
+        pass
+    assert refused.value.place == Place(str(path))
+
+
+def test_a_run_is_unfinished_until_its_end(tmp_path):
+    crashes = Crashes(tmp_path, TWICE)
+    _, _, folder = crashes.copies[2]
+    assert is_unfinished(folder / "run.kb")
+    Run(folder, [TWICE], resume=True)
+    assert not is_unfinished(folder / "run.kb")
+
+
+def test_a_transaction_that_fails_leaves_neither_rows_nor_knowledge(tmp_path):
+    path = tmp_path / "run.kb"
+    schema = Schema.parse("(define (domain d) (:predicates (p)))")
+    with KnowledgeBase.open(schema, path) as knowledge:
+        writer = RunWriter(knowledge, path)
+        with pytest.raises(StoreError, match="nonsense"), writer:  # noqa: PT012  all of the block is to be undone
+            knowledge.apply(Delta(added=(fact("p"),)), "test")
+            writer.connection.execute("DELETE FROM fence")
+            writer.connection.execute("nonsense")
+        assert writer.lost
+    with KnowledgeBase.open(schema, path) as knowledge:
+        assert not knowledge.ask("(p)")
+        with knowledge.together() as connection:
+            assert connection.execute("SELECT count(*) FROM fence").fetchone() == (1,)
 
 
 # -- changed charts ----------------------------------------------------------------------------------------
