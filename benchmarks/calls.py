@@ -36,7 +36,7 @@ from dsc.sequencer.sequencer import Sequencer
 from knowledge_base import Delta, KnowledgeBase, Schema
 from knowledge_base.facts import Fact, fact
 from knowledge_base.language.syntax.text import to_text
-from planning import Executive, PlanStep
+from planning import PlanStep, Robot
 from planning.engines.planner import PlannerProcess
 from planning.model.plan import PlanningOutcome
 from planning.model.problem import Problem
@@ -324,7 +324,7 @@ class _Table:
         world = set_table.world(ITEMS)
         self._planner.rewind()
         robot = _TableRobot(self._domain, world, counter, disturbed=self._replanned)
-        with Executive(self._domain, self._library, [robot], world, planner=self._planner) as program:
+        with Robot(self._domain, self._library, [robot], world, planner=self._planner) as program:
             end = program.run("clear")
         assert end.finished
         assert robot.counted

@@ -57,7 +57,7 @@ class Did(Outcome):
     """The event `did`."""
 
 
-class Robot(Component):
+class Arm(Component):
     """Records the delays of its calls."""
 
     name = "robot"
@@ -140,7 +140,7 @@ def _fleet(what: str, folder: Path | None, plots: int, seconds: float, rate: flo
     if folder is not None:
         folder.mkdir()
     chance = random.Random(1)  # noqa: S311  no secret depends on it
-    robots = [Robot() for _ in range(plots)]
+    robots = [Arm() for _ in range(plots)]
     gc.collect()
     before = _memory()
     with ExitStack() as opened:
@@ -158,7 +158,7 @@ def _fleet(what: str, folder: Path | None, plots: int, seconds: float, rate: flo
                 for one, robot in zip(runs, robots, strict=True):
                     await _past(one, robot, chance.randrange(PAST) if folder and plots > 1 else 10)
                 gc.collect()
-                gc.freeze()  # as an `Executive` does: long-lived objects need no collection
+                gc.freeze()  # as `dsc run` does: long-lived objects need no collection
                 held = (_memory() - before) / plots
                 group.create_task(_events(runs, robots, clock, round(seconds * rate), rate, chance))
             return held
@@ -173,7 +173,7 @@ def _fleet(what: str, folder: Path | None, plots: int, seconds: float, rate: flo
     return Fleet(what, plots, rate, held, min(handled), max(handled), p50, p99, waits[-1])
 
 
-async def _past(one: Sequencer, robot: Robot, events: int) -> None:
+async def _past(one: Sequencer, robot: Arm, events: int) -> None:
     for _ in range(events):
         begun = len(robot.waits)
         one.post(PING)
@@ -183,7 +183,7 @@ async def _past(one: Sequencer, robot: Robot, events: int) -> None:
 
 
 async def _events(
-    runs: list[Sequencer], robots: list[Robot], clock: LoopClock, events: int, rate: float, chance: random.Random
+    runs: list[Sequencer], robots: list[Arm], clock: LoopClock, events: int, rate: float, chance: random.Random
 ) -> None:
     """Post events to each plot, at a random phase of each period.
 
@@ -191,7 +191,7 @@ async def _events(
     """
     begin = clock.now() + 0.1
 
-    def due(one: Sequencer, robot: Robot, phase: float, turn: int) -> None:
+    def due(one: Sequencer, robot: Arm, phase: float, turn: int) -> None:
         at = phase + turn / rate
         robot.due = at if len(runs) > 1 else clock.now()
         one.post(PING)

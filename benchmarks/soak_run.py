@@ -25,7 +25,7 @@ from soak_judge import (
     wrong_report,
 )
 
-from domains.clean_up_table.deployment import bundle, deploy, world_of
+from domains.clean_up_table.bringup import bundle, deploy, world_of
 from domains.clean_up_table.durable_world import DurableWorld, beside
 from domains.clean_up_table.scenario import Scenario, Table
 from dsc.chance import choose, uniform
@@ -38,7 +38,7 @@ from dsc.testing.crashes import Crashes
 from dsc.testing.faults import USUAL, Fault, Faults, Interleaving
 from dsc.testing.invariants import executed_once, kept_run
 from knowledge_base.errors import DamagedStoreError, InputError
-from planning import Deployment, PlannerProcess, resume
+from planning import PlannerProcess, Robot, resume
 from planning.engines.race import CachingPlanner
 from planning.robot.report import Report
 from planning.testing import FaultyPlanner
@@ -175,12 +175,12 @@ class Trial:
                 self._stop.resumed(run.steps[-1].configuration)
             table = resume(bundle(), store, planner=planner)
         with table:
-            self._library = table.executive.library
-            for component in table.executive.components:
+            self._library = table.library
+            for component in table.components:
                 self._crashes.inject(self._faults.inject(component))
-            return table.run(prepare=lambda sequencer: self._prepare(table, sequencer))
+            return table.report(prepare=lambda sequencer: self._prepare(table, sequencer))
 
-    def _prepare(self, table: Deployment, sequencer: Sequencer) -> None:
+    def _prepare(self, table: Robot, sequencer: Sequencer) -> None:
         steps = 0
 
         def count(_: Step) -> None:
@@ -242,7 +242,7 @@ class ObeyedStop:
         if configuration != STOPPED:
             self._done = None
 
-    def watch(self, sequencer: Sequencer, table: Deployment, *, restarts: bool) -> None:
+    def watch(self, sequencer: Sequencer, table: Robot, *, restarts: bool) -> None:
         """Check each macrostep; an operator who `restarts` lets the robot continue after a while."""
         life = self._life = object()
 

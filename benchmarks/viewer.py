@@ -16,7 +16,7 @@ from typing import Any
 
 from watched import SCENARIO, print_watched
 
-from domains.clean_up_table.deployment import deploy
+from domains.clean_up_table.bringup import deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.trace import header, write_to
 from dsc.viewer.server import STATIC
@@ -64,8 +64,8 @@ def write_long(path: Path, count: int) -> None:
     """Write a real run repeatedly, with consecutive numbers; plots and the initial world appear once."""
     with tempfile.TemporaryFile("w+", encoding="utf-8") as once:
         table = deploy(Scenario.parse(SCENARIO), seed=7, faults=0.2, listener=write_to(once))
-        with table.executive:
-            table.run()
+        with table:
+            table.report()
         once.seek(0)
         real = [json.loads(line) for line in once]
     again = [record for record in real if record["type"] not in {"plot", "world", "end"}]

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 from websockets.sync.client import ClientConnection, connect
 
-from domains.clean_up_table.deployment import deploy
+from domains.clean_up_table.bringup import deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.trace import Listener, header
 from dsc.viewer.access import PageAddress
@@ -107,9 +107,9 @@ def runs(planner: Planner, listener: Listener | None) -> Taken:
     taken = []
     for seed in SEEDS:
         table = deploy(Scenario.parse(SCENARIO), seed, 0.2, planner, listener)
-        with table.executive:
+        with table:
             machine, wall, cpu = busy_seconds(), time.perf_counter(), time.process_time()
-            table.run()
+            table.report()
             own = time.process_time() - cpu
             taken.append(Taken(time.perf_counter() - wall, own, busy_seconds() - machine - own))
     gc.unfreeze()

@@ -4,6 +4,7 @@ from dsc.calls import PlotCall as PlotCall
 from dsc.calls import SkillCall as SkillCall
 from dsc.calls import Status as Status
 from dsc.chance import uniform as uniform
+from dsc.components.assembly import component_of as component_of
 from dsc.components.component import ALWAYS as ALWAYS
 from dsc.components.component import Component as Component
 from dsc.components.endpoint import Endpoint as Endpoint
@@ -17,7 +18,6 @@ from dsc.components.ports import event as event
 from dsc.components.ports import query as query
 from dsc.components.ports import takes as takes
 from dsc.components.remote import RemoteComponent as RemoteComponent
-from dsc.components.robot import component_of as component_of
 from dsc.components.streams import Push as Push
 from dsc.components.streams import Stream as Stream
 from dsc.dynamic.library import Library as Library

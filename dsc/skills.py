@@ -167,7 +167,7 @@ def skill(
     after_crash: AfterCrash = "sense",
     unlimited: bool = False,
 ) -> SkillBody:
-    """Declare a component's method, or a function (see `dsc.components.robot`), as a skill.
+    """Declare a component's method, or a function (see `dsc.components.assembly`), as a skill.
 
     The annotations are the declaration. The returned classes are the outcomes: `-> Grasped | Slipped`. The classes in
     the annotation of the call are events that the skill reports before its end: `call: SkillCall[Progress]`. The

@@ -23,8 +23,8 @@ def main() -> None:
 table: {cups: 3, cans: 2, crisp_cans: [large]}
 """)
     table = deploy(scenario, seed=6, faults=0.1, listener=grasps)
-    with table.executive:
-        report = table.run()
+    with table:
+        report = table.report()
     print("goal reached:", report.goal_reached, "in", report.own["trips"], "trips")
     print("grasps tried:", grasps.tried)
 

@@ -4,7 +4,7 @@ from typing import NewType
 
 from dsc import ActionPlot, Component, Outcome, Record, SkillCall, parse_plot, primitive_plot, skill
 from knowledge_base import Delta, fact
-from planning import Executive, PlanningDomain
+from planning import PlanningDomain, Robot
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain delivery)
@@ -84,7 +84,7 @@ def main() -> None:
         primitive_plot(drive, name="take_the_lift", done="arrived", when="(lift-ready)"),
         primitive_plot(drive, name="move", done="arrived", implements="move"),
     ]
-    with Executive(DOMAIN, plots, [base]) as robot:
+    with Robot(DOMAIN, plots, [base]) as robot:
         robot.listen(show)
         with robot.knowledge.transaction(author="map") as world:
             for room in ("hall", "office", "lab", "archive"):

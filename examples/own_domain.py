@@ -77,7 +77,7 @@ robot = Bundle(
 
 def main() -> None:
     with deploy(robot) as deployed:
-        report = deployed.run()
+        report = deployed.report()
         print(report.lines()[0])
 
 

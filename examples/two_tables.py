@@ -5,7 +5,7 @@ from typing import NewType
 
 from dsc import ActionPlot, Component, Outcome, Record, SkillCall, skill, uniform
 from knowledge_base import Delta, Fact, fact
-from planning import Executive, Planner
+from planning import Planner, Robot
 
 DOMAIN = Path(__file__).with_suffix(".pddl")
 ROBOTS = ("anna", "bert")
@@ -21,7 +21,7 @@ Bin = NewType("Bin", str)
 class Acted(Outcome): ...
 
 
-class Robot(Component):
+class Arm(Component):
     """One robot; `seed` decides how long each of its actions takes."""
 
     def __init__(self, name: str, seed: int = 0) -> None:
@@ -88,11 +88,11 @@ def plots(robot: str) -> list[ActionPlot]:
     ]
 
 
-def team(items: dict[str, int], *, parallel: bool = True, seed: int = 0, planner: Planner | None = None) -> Executive:
+def team(items: dict[str, int], *, parallel: bool = True, seed: int = 0, planner: Planner | None = None) -> Robot:
     """Both robots at the bin; `items` says how many things lie on each robot's table."""
     every_plot = [plot for robot in ROBOTS for plot in plots(robot)]
-    robots = [Robot(name, seed) for name in ROBOTS]
-    executive = Executive(DOMAIN, every_plot, robots, planner=planner, parallel=parallel)
+    robots = [Arm(name, seed) for name in ROBOTS]
+    executive = Robot(DOMAIN, every_plot, robots, planner=planner, parallel=parallel)
     with executive.knowledge.transaction(author="map") as world:
         world.add_node("bin", "bin")
         world.tell("closed", "bin")

@@ -6,6 +6,7 @@ from planning.engines.race import CachingPlanner as CachingPlanner
 from planning.engines.race import PlannerRace as PlannerRace
 from planning.engines.unified import from_unified as from_unified
 from planning.engines.unified import to_unified as to_unified
+from planning.execution.achieve import achieve_plot as achieve_plot
 from planning.execution.plan_records import why_broken as why_broken
 from planning.generation.plan_to_plot import plot_from_plan as plot_from_plan
 from planning.model.domain import PlanningAction as PlanningAction
@@ -23,15 +24,13 @@ from planning.model.problem import UnsupportedGoalError as UnsupportedGoalError
 from planning.ordering.causal_tracing import deordered as deordered
 from planning.ordering.partial_order import why as why
 from planning.problem.construction import build_problem as build_problem
+from planning.robot.bringup import deploy as deploy
+from planning.robot.bringup import resume as resume
 from planning.robot.bundles import Bundle as Bundle
-from planning.robot.deployment import Deployment as Deployment
-from planning.robot.deployment import Task as Task
-from planning.robot.deployment import deploy as deploy
-from planning.robot.deployment import resume as resume
-from planning.robot.executive import Executive as Executive
-from planning.robot.executive import achieve_plot as achieve_plot
 from planning.robot.report import Report as Report
+from planning.robot.robot import Robot as Robot
 from planning.robot.simulation import Fault as Fault
 from planning.robot.simulation import Left as Left
 from planning.robot.simulation import Setup as Setup
 from planning.robot.simulation import Simulation as Simulation
+from planning.robot.task import Task as Task

@@ -15,7 +15,7 @@ from typer.main import get_command
 from knowledge_base import Delta, KnowledgeBase, Schema
 from knowledge_base.errors import InputError
 from planning.cli.command import app, main
-from planning.robot.deployment import Deployment
+from planning.robot.robot import Robot
 
 TABLE = Path(__file__).parent.parent / "domains" / "clean_up_table"
 
@@ -410,7 +410,7 @@ def test_no_kind_of_file_gives_a_traceback_or_a_wait(dsc, tmp_path, store, monke
     monkeypatch.setattr("knowledge_base.pddl.files.WRITER_S", 0.0)
     monkeypatch.setattr("knowledge_base.output_files.PATIENCE_S", 0.0)
     monkeypatch.setattr("dsc.cli.runs.until_interrupt", lambda _: None)
-    monkeypatch.setattr(Deployment, "run", would_run)
+    monkeypatch.setattr(Robot, "report", would_run)
     for path in bad_files(tmp_path / "bad", store):
         before = content(path)
         status, out, err = dsc(*words_with(words, params, swept, path))

@@ -40,10 +40,10 @@ def test_a_program_that_plans_does_not_import_pyperplan():
     """It runs in the worker's process alone."""
     program = (
         "import sys\n"
-        "from domains.clean_up_table.deployment import deploy\n"
+        "from domains.clean_up_table.bringup import deploy\n"
         "from domains.clean_up_table.scenario import Scenario\n"
         "with deploy(Scenario.parse('table: {cups: 1}')) as table:\n"
-        "    assert table.run().goal_reached\n"
+        "    assert table.report().goal_reached\n"
         "assert not [name for name in sys.modules if name.partition('.')[0] == 'pyperplan']\n"
     )
     subprocess.run([sys.executable, "-c", program], check=True)

@@ -144,16 +144,16 @@ states: {e: {final: true}}
 
 CALLS = """
 from dsc import RunEnd
-from planning import Executive
+from planning import Robot
 from plots import Mug, Room, count
 
 
-def counted(robot: Executive) -> float:
+def counted(robot: Robot) -> float:
     end = robot.run(count(mug=Mug("m1"), room=Room("hall"), floor=2.0))
     return end.outputs["mugs"]
 
 
-def any_run(robot: Executive) -> RunEnd:
+def any_run(robot: Robot) -> RunEnd:
     return robot.run("count", {"mug": "m1"})
 """
 

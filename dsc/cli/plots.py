@@ -41,7 +41,7 @@ PIPE_WIDTH = 160
 
 def components_of_robot(target: str) -> tuple[Component, ...]:
     """Return the components at `MODULE:NAME`; packages that know more kinds of targets replace this function."""
-    from dsc.components.robot import robot_of
+    from dsc.components.assembly import robot_of
 
     return robot_of(target)
 

@@ -15,10 +15,10 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from typing import Any
 
 from dsc.calls import Clock, Ended, SkillCall, Status
+from dsc.components.assembly import Wiring, require_instances
 from dsc.components.component import Component
 from dsc.components.hooks import bug_in, cancel_once, component_at_work, contained, give_up, reason_of
 from dsc.components.life_cycle import Life
-from dsc.components.robot import Wiring, require_instances
 from dsc.components.turns import Claim, Turns
 from dsc.engine import steps
 from dsc.errors import UncertainActionError

@@ -21,6 +21,7 @@ from typing import Any, ClassVar, Never
 import pytest
 
 from dsc.calls import SkillCall
+from dsc.components.assembly import Wiring
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError, Transport
 from dsc.components.heartbeat import BEAT, SILENCE, Heartbeat
@@ -29,7 +30,6 @@ from dsc.components.life_cycle import Life
 from dsc.components.ports import event, query, takes
 from dsc.components.publication import Publisher, Subscription
 from dsc.components.remote import RemoteComponent
-from dsc.components.robot import Wiring
 from dsc.components.streams import Push, Stream
 from dsc.errors import NotAliveError, ProgrammingError
 from dsc.outcomes import Outcome

@@ -6,7 +6,7 @@ from step1_skill import Base, Room
 
 from dsc import Component, Outcome, SkillCall, parse_plot, primitive_plot, skill
 from knowledge_base import Delta, fact
-from planning import Executive
+from planning import Robot
 
 DOMAIN = """(define (domain house) (:types room parcel)
   (:predicates (robot-in ?r - room) (lies-in ?p - parcel ?r - room) (carries ?p - parcel)))"""
@@ -65,7 +65,7 @@ KNOWN = Delta(
 def main() -> None:
     base = Base()
     drive = primitive_plot(base.skills()["drive"], done="arrived")
-    with Executive(DOMAIN, [FETCH, drive], [base, Gripper("letter")]) as robot:
+    with Robot(DOMAIN, [FETCH, drive], [base, Gripper("letter")]) as robot:
         robot.knowledge.apply(KNOWN, "map")
         for parcel, start, to in (("letter", "hall", "office"), ("book", "office", "hall")):
             end = robot.run("fetch", {"parcel": parcel, "from": start, "to": to})

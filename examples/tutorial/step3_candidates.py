@@ -4,7 +4,7 @@ from step1_skill import Base
 
 from dsc import Record, parse_plot, primitive_plot
 from knowledge_base import Delta, fact
-from planning import Executive
+from planning import Robot
 
 DOMAIN = """(define (domain house) (:types room)
   (:predicates (robot-in ?r - room) (door-open ?r - room) (lift-works)))"""
@@ -37,7 +37,7 @@ def main() -> None:
         primitive_plot(drive, name="through_the_door", done="arrived", when="(door-open ?to)"),
         primitive_plot(drive, name="by_lift", done="arrived", when="(lift-works)"),
     ]
-    with Executive(DOMAIN, plots, [base]) as robot:
+    with Robot(DOMAIN, plots, [base]) as robot:
         robot.listen(show)
         rooms = {"hall": "room", "office": "room", "lab": "room"}
         robot.knowledge.apply(Delta(nodes=rooms, added=(fact("robot-in", "hall"), fact("door-open", "office"))), "map")

@@ -5,7 +5,7 @@ from step2_plot import Gripper
 
 from dsc import Record, primitive_plot
 from knowledge_base import Delta, fact
-from planning import Executive
+from planning import Robot
 
 DOMAIN = """(define (domain house) (:types room parcel)
   (:predicates (robot-in ?r - room) (lies-in ?p - parcel ?r - room) (carries ?p - parcel) (connected ?a ?b - room))
@@ -38,7 +38,7 @@ def main() -> None:
         primitive_plot(base.skills()["drive"], done="arrived", implements="drive"),
         primitive_plot(gripper.skills()["pick_up"], done="picked_up", implements="pick-up"),
     ]
-    with Executive(DOMAIN, plots, [base, gripper]) as robot:
+    with Robot(DOMAIN, plots, [base, gripper]) as robot:
         robot.listen(show)
         robot.knowledge.apply(KNOWN, "map")
         end = robot.achieve("(and (carries letter) (robot-in hall))")

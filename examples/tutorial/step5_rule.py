@@ -6,7 +6,7 @@ from step4_goal import DOMAIN, KNOWN
 
 from dsc import Component, Outcome, SkillCall, parse_plot, primitive_plot, skill
 from knowledge_base import Delta, fact
-from planning import Executive
+from planning import Robot
 
 BRING = parse_plot("""
 plot: bring
@@ -69,7 +69,7 @@ def main() -> None:
         primitive_plot(base.skills()["drive"], done="arrived", implements="drive"),
         primitive_plot(gripper.skills()["pick_up"], done="picked_up", implements="pick-up"),
     ]
-    with Executive(DOMAIN, plots, [base, gripper]) as robot:
+    with Robot(DOMAIN, plots, [base, gripper]) as robot:
         robot.knowledge.apply(KNOWN, "map")
         print(robot.run("bring").reason)
 

@@ -4,7 +4,7 @@ from step1_skill import Base
 
 from dsc import Component, Event, Outcome, Sequencer, SkillCall, parse_plot, primitive_plot, skill
 from knowledge_base import Delta, fact
-from planning import Executive
+from planning import Robot
 
 DOMAIN = """(define (domain house) (:types room)
   (:predicates (robot-in ?r - room)))"""
@@ -48,7 +48,7 @@ class Battery(Component):
 def main() -> None:
     base = Base()
     plots = [PATROL, CHARGE, primitive_plot(base.skills()["drive"], done="arrived")]
-    with Executive(DOMAIN, plots, [base, Battery()]) as robot:
+    with Robot(DOMAIN, plots, [base, Battery()]) as robot:
         robot.knowledge.apply(Delta(nodes={"hall": "room", "office": "room"}, added=(fact("robot-in", "hall"),)), "map")
 
         def battery_falls(sequencer: Sequencer) -> None:

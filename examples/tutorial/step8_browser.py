@@ -26,7 +26,7 @@ robot = Bundle(
 
 def main() -> None:
     with deploy(robot) as deployed:
-        print("\n".join(deployed.run().lines()))
+        print("\n".join(deployed.report().lines()))
 
 
 if __name__ == "__main__":

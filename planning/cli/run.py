@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from knowledge_base.store import KnowledgeBase
     from planning.engines.planner import Planner
     from planning.robot.bundles import Bundle
-    from planning.robot.deployment import Deployment, Task
     from planning.robot.report import Report
+    from planning.robot.robot import Robot
+    from planning.robot.task import Task
 
 GOAL_REACHED, SOMETHING_LEFT = 0, 1
 """Exit statuses of `dsc run`, besides those of every command."""
@@ -131,20 +132,20 @@ def run_command(
         given = [name for name, value in beginning.items() if value is not None] + ["--real-time"] * real_time
         if given:
             raise InputError(f"--resume continues a run as it began, without {', '.join(given)}")
-        deployed = _resumed(resume, target, durability, planner)
+        robot = _resumed(resume, target, durability, planner)
     else:
         bundle = _bundle(target)
-        deployed = _deployed(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
+        robot = _robot(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
                              durability, target, planner)  # fmt: skip
-    follow = partial(_followed, deployed, simulated=not real_time, speed=inf if speed is None else speed, until=until,
+    follow = partial(_followed, robot, simulated=not real_time, speed=inf if speed is None else speed, until=until,
                      on_signal=on_signal, quiet=json or quiet, trace=output)  # fmt: skip
-    with deployed:
+    with robot:
         if not view:
             report = follow()
             _print(report, as_json=json)
         else:
             report = _viewed(
-                deployed, follow, port, opens=not no_open, control=allow_control, wait=not no_wait, as_json=json
+                robot, follow, port, opens=not no_open, control=allow_control, wait=not no_wait, as_json=json
             )
     if report.programming_error is not None:
         raise typer.Exit(PROGRAMMING_ERROR)
@@ -163,7 +164,7 @@ def _bundle(target: str | None) -> Bundle:
 
 def _task(bundle: Bundle, goal: str | None, plot: str | None, given: list[str]) -> Task:
     from knowledge_base.errors import InputError
-    from planning.robot.deployment import Task, own_task, plot_task
+    from planning.robot.task import Task, own_task, plot_task
 
     arguments: dict[str, str] = {}
     for one in given:
@@ -182,7 +183,7 @@ def _task(bundle: Bundle, goal: str | None, plot: str | None, given: list[str]) 
     return plot_task(bundle, plot or str(bundle.main), arguments)
 
 
-def _deployed(
+def _robot(
     bundle: Bundle,
     task: Task,
     scenario: Path | None,
@@ -193,9 +194,9 @@ def _deployed(
     durability: Durability,
     target: str | None,
     planner: Planner | None,
-) -> Deployment:
+) -> Robot:
     from dsc.text.profiles import find_profile
-    from planning.robot.deployment import deploy
+    from planning.robot.bringup import deploy
     from planning.robot.targets import full_target
 
     settings = None if profile is None else find_profile(profile, bundle.profiles or Path())
@@ -213,22 +214,22 @@ def _planner(engine: str) -> Planner:
     return CachingPlanner(PlannerRace(choose=only(engine)))
 
 
-def _resumed(store: Path, target: str | None, durability: Durability, planner: Planner | None) -> Deployment:
+def _resumed(store: Path, target: str | None, durability: Durability, planner: Planner | None) -> Robot:
     """Deploy the robot that began the run in a store; `target` replaces the target that the store has kept."""
     from knowledge_base.errors import Place, StoreError
-    from planning.robot.deployment import kept_run, resume
+    from planning.robot.bringup import kept_run, resume
     from planning.robot.targets import bundle_at
 
     run = kept_run(store)
     wanted = target or run.header.get("target") or run.header.get("run")
     if wanted is None:
-        whose = f"the run of '{run.plot}' in this store is another program's, which resumes it: Executive.resume()"
+        whose = f"the run of '{run.plot}' in this store is another program's, which resumes it: Robot.resume()"
         raise StoreError(whose, place=Place(str(store)))
     return resume(bundle_at(str(wanted)), store, durability=durability.value, planner=planner)
 
 
 def _viewed(
-    deployed: Deployment,
+    robot: Robot,
     follow: partial[Report],
     port: int,
     *,
@@ -245,8 +246,8 @@ def _viewed(
     from dsc.viewer.access import PageAddress
     from dsc.viewer.live import LivePage
 
-    live = LivePage(header(**deployed.header()), PageAddress.on(port), control=control)
-    deployed.executive.listen(live.hear)
+    live = LivePage(header(**robot.header()), PageAddress.on(port), control=control)
+    robot.listen(live.hear)
     with page(live, opens=opens) as viewer:
         report = follow(prepare=live.control.attach if live.control else None)
         live.end()
@@ -257,7 +258,7 @@ def _viewed(
 
 
 def _followed(
-    deployed: Deployment,
+    robot: Robot,
     *,
     simulated: bool,
     speed: float,
@@ -277,22 +278,27 @@ def _followed(
     from rich.console import Console
 
     from dsc.trace import header, write_to
-    from planning.robot.progress import LiveProgress, PlainProgress
+    from planning.robot.garbage import settled
+    from planning.robot.progress import LiveProgress, PlainProgress, Tally
 
     with ExitStack() as stack:
         if trace is not None:
             stream = stack.enter_context(trace.stream())
-            stream.write(header(**deployed.header()) + "\n")
-            deployed.executive.listen(write_to(stream))
+            stream.write(header(**robot.header()) + "\n")
+            robot.listen(write_to(stream))
         console = Console()
         if not quiet and console.is_terminal:
-            live = LiveProgress(console, deployed.left, deployed.tally)
-            deployed.executive.listen(stack.enter_context(live))
+            tally = Tally()
+            robot.listen(tally)
+            live = LiveProgress(console, robot.judgement().left, tally)
+            robot.listen(stack.enter_context(live))
         elif not quiet:
-            deployed.executive.listen(PlainProgress(typer.echo))
+            robot.listen(PlainProgress(typer.echo))
         else:
             stack.enter_context(redirect_stdout(sys.stderr))
-        report = deployed.run(simulated=simulated, speed=speed, until=until, on_signal=on_signal.value, prepare=prepare)
+        if not simulated:
+            stack.enter_context(settled())
+        report = robot.report(simulated=simulated, speed=speed, until=until, on_signal=on_signal.value, prepare=prepare)
     if not quiet:
         typer.echo("")  # between the progress and the report
     return report
@@ -317,8 +323,8 @@ def robot_knowledge(source: Path) -> KnowledgeBase | None:
     A scenario (YAML) belongs to the only installed robot whose simulation reads scenarios. The text `TARGET@SCENARIO`
     names both.
     """
+    from planning.robot.bringup import deploy
     from planning.robot.bundles import installed
-    from planning.robot.deployment import deploy
     from planning.robot.targets import bundle_at
 
     target, _, scenario = str(source).partition("@")
@@ -326,19 +332,19 @@ def robot_knowledge(source: Path) -> KnowledgeBase | None:
         able = [one for one in installed().values() if one.simulation and one.simulation.reads_scenarios]
         if len(able) != 1:
             return None
-        return deploy(able[0], scenario=source).executive.knowledge
+        return deploy(able[0], scenario=source).knowledge
     if source.is_file() and source.suffix != ".py":
         return None
     if not (scenario or source.is_dir() or source.suffix == ".py" or ":" in target or target in installed()):
         return None
-    return deploy(bundle_at(target), scenario=Path(scenario) if scenario else None).executive.knowledge
+    return deploy(bundle_at(target), scenario=Path(scenario) if scenario else None).knowledge
 
 
 def components_of_target(target: str) -> tuple[Component, ...]:
     """Return the components of a robot, or the components that a target names, for `dsc plot check --robot`."""
-    from dsc.components.robot import components_in
+    from dsc.components.assembly import components_in
+    from planning.robot.bringup import components_for
     from planning.robot.bundles import Bundle
-    from planning.robot.deployment import components_for
     from planning.robot.targets import value_at
 
     found = value_at(target)

@@ -1,1 +1,1 @@
-"""Robots: published bundles, their deployment with a simulated world, their static checks and reports."""
+"""Robots: published bundles, deployed robots with their simulated worlds, static checks and reports."""

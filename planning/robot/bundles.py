@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
 from dsc.components.component import Component
 from dsc.components.hooks import contained
+from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.text.plot_files import load_library
 from dsc.validation.subject import addressed_by
@@ -22,6 +24,7 @@ from knowledge_base.errors import InputError, Place, UnknownNameError, described
 from knowledge_base.facts import Delta
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
+from planning.execution.achieve import achieve_plot
 from planning.execution.search import Foresight
 from planning.model.domain import PlanningDomain
 from planning.robot.simulation import Simulation
@@ -51,7 +54,7 @@ class BundleParts(TypedDict, total=False):
     profiles: Path | None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots, for the cached properties
 class Bundle:
     """Components, plots and a domain fragment, distributed together.
 
@@ -120,6 +123,16 @@ class Bundle:
             found["profiles"] = profiles
         found.update(parts)
         return cls(name or folder.resolve().name, **found)
+
+    @cached_property
+    def planning_domain(self) -> PlanningDomain:
+        """The merged planning domain of the bundle and the bundles that it needs; errors as for `domain_of`."""
+        return domain_of(gathered([self]))
+
+    @cached_property
+    def library(self) -> Library:
+        """The plots of the bundle and the bundles that it needs, with all derived tables; errors as for `plots_of`."""
+        return Library([*plots_of(gathered([self])), achieve_plot()])
 
     @property
     def primitive(self) -> tuple[str, ...]:

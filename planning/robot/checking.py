@@ -8,10 +8,10 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from dsc.components.assembly import require_deployed, require_instances, require_whole, require_wired
 from dsc.components.component import Component
 from dsc.components.declarations import Parameter
 from dsc.components.hooks import contained
-from dsc.components.robot import require_deployed, require_instances, require_whole, require_wired
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, ProgrammingError
 from dsc.model.plot import ActionPlot, initial_of
@@ -30,15 +30,15 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.analysis.explanation import why_unsolvable
 from planning.engines.registry import able, installed, nobody
+from planning.execution.achieve import achieve_plot
 from planning.execution.planning_component import PlanningComponent
 from planning.model.cancellable_work import WorkLimit, WorkLimitError
 from planning.model.domain import PlanningDomain
 from planning.problem.construction import build_problem, check_goal
 from planning.problem.derived import derivation
 from planning.problem.relevance import numeric_constructs
+from planning.robot.bringup import begin, simulated
 from planning.robot.bundles import Bundle, components_of, gathered, plots_of, shipped_by
-from planning.robot.deployment import begin, simulated
-from planning.robot.executive import achieve_plot
 from planning.robot.simulation import Setup, Simulation
 from planning.robot.soundness import IMPLEMENTED, check_implementations
 from planning.robot.targets import bundle_at

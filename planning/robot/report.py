@@ -125,7 +125,7 @@ def summarise(
         left: the parts of the goal that are not reached; empty for `outcome`.
         tally: the counts of the run.
         end: the end of the run.
-        failures: the outcomes of skills that count as failures, see `Executive.failures`.
+        failures: the outcomes of skills that count as failures, see `Robot.failures`.
         wall_s: the duration in real time, in seconds.
     """
     reached = end.reached if judge == "outcome" else end.finished and end.failure is None and not left

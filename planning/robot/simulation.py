@@ -16,6 +16,7 @@ from knowledge_base.facts import Delta
 
 if TYPE_CHECKING:
     from dsc.sequencer.sequencer import RunEnd
+    from dsc.trace import Record, Trace
     from knowledge_base.store import KnowledgeBase
 
 
@@ -148,3 +149,21 @@ class Simulation(ABC):
 
     def close(self) -> None:  # noqa: B027  # most simulations have nothing to close
         """Close files and devices of the world; called once, after the run."""
+
+
+class SceneWriter:
+    """A trace listener that writes a record `scene` after each event that changed the scene."""
+
+    def __init__(self, world: Simulation, trace: Trace) -> None:
+        self._world = world
+        self._trace = trace
+        self._drawn: list[dict[str, Any]] | None = None
+
+    def __call__(self, record: Record) -> None:
+        """Write the scene after a record that may have changed it."""
+        if record.type not in {"plot", "event"}:
+            return
+        scene = self._world.scene()
+        if scene is not None and scene != self._drawn:
+            self._drawn = scene
+            self._trace.record("scene", things=scene)

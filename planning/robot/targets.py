@@ -15,8 +15,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from dsc.components.assembly import made, named_part
 from dsc.components.hooks import contained
-from dsc.components.robot import made, named_part
 from knowledge_base.errors import InputError, Place, UnknownNameError, described
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.tracebacks import raised_at

@@ -15,7 +15,7 @@ from knowledge_base import Delta, fact
 
 def run(planner, seed=0, faults=0.0, scenario=None, listener=None, prepare=None):
     table = deploy(scenario, seed, faults, planner, listener)
-    return table, table.run(prepare=prepare)
+    return table, table.report(prepare=prepare)
 
 
 def test_a_table_without_faults_is_cleared_in_the_fewest_trips(planner):
@@ -58,7 +58,7 @@ def test_every_run_ends_with_the_truth(planner, seed):
     if not any(fault.permanent for fault in world_of(table).fired):
         assert report.goal_reached
     disposed = {item.name for item in world_of(table).items if item.disposed}
-    assert {found["item"] for found in table.executive.knowledge.query("(disposed ?item)")} == disposed
+    assert {found["item"] for found in table.knowledge.query("(disposed ?item)")} == disposed
 
 
 @pytest.mark.parametrize("faults", [0.5, 0.9])
@@ -72,7 +72,7 @@ def traced(planner, seed):
     stream = io.StringIO()
     table = deploy(None, seed, 0.2, planner, write_to(stream))
     stream.write(header(**table.header()) + "\n")
-    table.run()
+    table.report()
     return stream.getvalue()
 
 
@@ -147,7 +147,7 @@ def test_through_everything_at_once(planner, monkeypatch):
     table = deploy(None, 0, 0.0, planner, listener)
     script = Script(ITEM_SLIPPED, GRASP_FAILED)
     monkeypatch.setattr(world_of(table).faults, "draw", script)
-    report = table.run(prepare=lambda sequencer: holder.update(sequencer=sequencer))
+    report = table.report(prepare=lambda sequencer: holder.update(sequencer=sequencer))
 
     assert script.left == []
     assert report.goal_reached
@@ -174,7 +174,7 @@ def test_a_stop_is_obeyed_while_the_planner_works(planner):
             holder["sequencer"].post(Event("restart"), after=60.0)
 
     table = deploy(None, 0, 0.0, planner, listener)
-    report = table.run(prepare=lambda sequencer: holder.update(sequencer=sequencer))
+    report = table.report(prepare=lambda sequencer: holder.update(sequencer=sequencer))
     stops = [r for r in seen if r.type == "event" and r.data["name"] == "stop"]
     assert stops[0].t == holder["stopped"]
     found = [r.t for r in seen if r.type == "plan.found"]

@@ -4,7 +4,7 @@ import pytest
 from small_table import make_world
 
 from domains.clean_up_table import Scenario, deploy
-from domains.clean_up_table.deployment import HOME
+from domains.clean_up_table.bringup import HOME
 from domains.clean_up_table.observations import initial_knowledge, learned
 from domains.clean_up_table.physics import Physics, believed
 from dsc.trace import Record
@@ -77,10 +77,8 @@ def test_a_plan_that_physics_refuses_is_not_carried_out(planner):
     records: list[Record] = []
     table = deploy(Scenario.parse("table: {cups: 2, cans: 1}"), 0, 0.0, planner, records.append)
     wrong = tuple(fact("fits", "can1", cup) for cup in ("cup1", "cup2"))
-    table.executive.knowledge.apply(
-        Delta(nodes={"can1": "can", "cup1": "cup", "cup2": "cup"}, added=wrong), "bystander"
-    )
-    report = table.run()
+    table.knowledge.apply(Delta(nodes={"can1": "can", "cup1": "cup", "cup2": "cup"}, added=wrong), "bystander")
+    report = table.report()
     assert report.goal_reached
     assert not report.skill_failures
     rejected = [record.data for record in records if record.type == "plan.rejected"]

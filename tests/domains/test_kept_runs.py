@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from kept_lives import SCENARIO, told
 
-from domains.clean_up_table.deployment import HOME, bundle, deploy, world_of
+from domains.clean_up_table.bringup import HOME, bundle, deploy, world_of
 from domains.clean_up_table.durable_world import KIND, DurableWorld
 from domains.clean_up_table.scenario import Scenario
 from dsc.dynamic.library import Library
@@ -59,7 +59,7 @@ def whole(planner, tmp_path_factory):
 
     with deploy(Scenario.parse(SCENARIO), 3, 0.2, planner, store=alive / "run.kb") as table:
         world_of(table).__class__ = CopiedWorld
-        report = table.run(prepare=lambda run: run.listen(boundary))
+        report = table.report(prepare=lambda run: run.listen(boundary))
         return alive / "run.kb", replace(report, wall_s=0), world_of(table).state(), copies
 
 
@@ -69,7 +69,7 @@ def test_wherever_it_is_broken_off_it_ends_with_the_same_report(whole, planner, 
     for number, kept in enumerate(copies):
         copy = copied(kept.parent, tmp_path / str(number))
         with resume(bundle(), copy, planner=planner) as table:
-            assert replace(table.run(), wall_s=0) == report
+            assert replace(table.report(), wall_s=0) == report
             assert world_of(table).state() == world
         assert told(copy) == told(path)
 
@@ -77,7 +77,7 @@ def test_wherever_it_is_broken_off_it_ends_with_the_same_report(whole, planner, 
 def test_a_store_changes_nothing_about_the_run(whole, planner):
     _, report, world, _ = whole
     table = deploy(Scenario.parse(SCENARIO), 3, 0.2, planner)
-    assert replace(table.run(), wall_s=0) == report
+    assert replace(table.report(), wall_s=0) == report
     assert world_of(table).state() == world
 
 
@@ -228,11 +228,11 @@ def test_another_robot_is_the_same_one_after_the_crash(planner, tmp_path):
             copies.append(copied(alive, tmp_path / f"copy{len(copies)}") if len(copies) in (15, 29) else None)
 
     with deploy(Scenario.parse(SCENARIO), 3, 0.2, planner, store=alive / "run.kb", profile=profile) as table:
-        report = replace(table.run(prepare=lambda run: run.listen(boundary)), wall_s=0)
+        report = replace(table.report(prepare=lambda run: run.listen(boundary)), wall_s=0)
         world = world_of(table).state()
     for path in filter(None, copies):
         with resume(bundle(), path, planner=planner) as table:
-            assert table.profile.digest == profile.digest
-            assert replace(table.run(), wall_s=0) == report
+            assert table.header()["profile"] == profile.digest
+            assert replace(table.report(), wall_s=0) == report
             assert world_of(table).state() == world
         assert told(path) == told(alive / "run.kb")

@@ -13,7 +13,7 @@ from random import Random
 import kept_lives
 import pytest
 
-from domains.clean_up_table.deployment import deploy, world_of
+from domains.clean_up_table.bringup import deploy, world_of
 from domains.clean_up_table.durable_world import DurableWorld, beside
 from domains.clean_up_table.scenario import Scenario
 
@@ -56,7 +56,7 @@ def test_a_run_that_is_killed_again_and_again_ends_like_one_that_never_was(proce
     while kills < KILLS:
         whole, killed = tmp_path / f"whole{seed}.kb", tmp_path / f"killed{seed}.kb"
         with deploy(Scenario.parse(kept_lives.SCENARIO), seed, FAULTS, planner, store=whole) as table:
-            table.run()
+            table.report()
             world = world_of(table).state()
         while not lived(processes, killed, seed, random.randrange(1, A_LIFE) if kills < KILLS else A_LIFE * 100):
             kills += 1

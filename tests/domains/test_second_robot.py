@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from domains.clean_up_table import deploy, world_of
-from domains.clean_up_table.deployment import HOME, ROBOTS, bundle
+from domains.clean_up_table.bringup import HOME, ROBOTS, bundle
 from domains.clean_up_table.scenario import Scenario
 from dsc.text.profiles import load_profile, parse_profile
 from knowledge_base import InputError
@@ -19,7 +19,7 @@ SHIPPED = {file.stem: load_profile(file) for file in sorted((HOME / "profiles").
 
 def run(planner, name, seed=0, faults=0.0, scenario=None):
     table = deploy(scenario, seed, faults, planner, profile=SHIPPED[name])
-    return table, table.run()
+    return table, table.report()
 
 
 def test_every_robot_has_a_profile_and_every_profile_a_robot():
@@ -30,9 +30,7 @@ def test_every_robot_has_a_profile_and_every_profile_a_robot():
 @pytest.mark.parametrize("seed", range(4))
 def test_each_robot_clears_the_table_with_the_same_plots(planner, name, seed):
     table, report = run(planner, name, seed, 0.15)
-    assert {plot.name: plot for plot in table.executive.library if plot.name != "achieve"} == {
-        p.name: p for p in bundle().plots
-    }
+    assert {plot.name: plot for plot in table.library if plot.name != "achieve"} == {p.name: p for p in bundle().plots}
     assert report.problem is None
     assert report.goal_reached == (not report.left) == world_of(table).goal_reached
     assert {one.what for one in report.left} == world_of(table).touched()
@@ -47,16 +45,16 @@ def test_the_robots_are_different_ones(planner):
     )
     assert first.goal_reached and second.goal_reached and third.goal_reached  # noqa: PT018
     assert third.simulated_s < first.simulated_s < second.simulated_s
-    kinds = [{type(component).__name__ for component in table.executive.components} for table in (usual, other)]
+    kinds = [{type(component).__name__ for component in table.components} for table in (usual, other)]
     assert not kinds[0] & kinds[1] - {"Voice"}
-    skills = [{s for c in table.executive.components for s in c.skills()} for table in (usual, other)]
+    skills = [{s for c in table.components for s in c.skills()} for table in (usual, other)]
     assert skills[1] - skills[0] == {"vent"}
 
 
 def test_the_usual_profile_changes_nothing(planner):
     scenario = Scenario.parse("table: {cups: 2, cans: 1}")
     table = deploy(scenario, 3, 0.2, planner)
-    without = table.run()
+    without = table.report()
     _, with_it = run(planner, "on_wheels", 3, 0.2, scenario)
     assert with_it.simulated_s == without.simulated_s
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from small_table import make_world
 
+from domains.clean_up_table.bringup import HOME, bundle
 from domains.clean_up_table.components import Arm, Base, Camera, Voice
-from domains.clean_up_table.deployment import HOME, bundle
 from dsc import Event, Library
 from dsc.testing import (
     Answer,

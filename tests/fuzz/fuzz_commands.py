@@ -45,7 +45,7 @@ ENDINGS = {
 WORDS = (
     "clean-up-table", "hurried", "on_wheels", "(on ?x ?y)", "(clean mug)", "(forall (?x) (clean ?x))", "(not (clean mug))",
     "mug", "table", "scxml", "mermaid", "plantuml", "svg", "json", "pddl", "pyperplan", "process", "power", "dsc:nothing",
-    "domains.clean_up_table.deployment:bundle", "os:getcwd", "sys:exit", "-h", "--help", "--", "=", "@x",
+    "domains.clean_up_table.bringup:bundle", "os:getcwd", "sys:exit", "-h", "--help", "--", "=", "@x",
 )  # fmt: skip
 MADE = (
     "out.svg",

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from fuzz_mutation import mutated, reset
 
-from domains.clean_up_table.deployment import bundle, deploy
+from domains.clean_up_table.bringup import bundle, deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.calls import SkillCall
 from dsc.components.component import Component
@@ -54,10 +54,10 @@ from knowledge_base.language.checking.check import check, check_effect
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text
 from knowledge_base.pddl import read_problem
 from knowledge_base.statements import retracted, told
+from planning.execution.achieve import achieve_plot
 from planning.model.cancellable_work import WorkLimit, WorkLimitError
 from planning.model.domain import PlanningDomain
 from planning.problem.construction import build_problem
-from planning.robot.executive import achieve_plot
 
 HOME = Path(__file__).parent
 ROOT = HOME.parents[1]
@@ -175,7 +175,7 @@ def read_scenario(data: bytes, folder: Path) -> None:
     """A scenario: what stands on the table, up to the robot's knowledge of it."""
     scenario = Scenario.load(_written(data, folder, "scenario.yaml"))
     with deploy(scenario) as table:
-        table.executive.knowledge.to_json()
+        table.knowledge.to_json()
 
 
 def read_state(data: bytes, folder: Path) -> None:
@@ -499,7 +499,7 @@ def _kitchen_planning() -> PlanningDomain:
 
 @cache
 def _table() -> KnowledgeBase:
-    return deploy(Scenario.default()).executive.knowledge
+    return deploy(Scenario.default()).knowledge
 
 
 @cache
@@ -529,7 +529,7 @@ def stores() -> dict[str, bytes]:
         made["knowledge"] = file.read_bytes()
         file = Path(folder) / "run.db"
         with deploy(Scenario.parse("table: {cups: 1}"), store=file) as table:
-            table.run()
+            table.report()
         made["run"] = file.read_bytes()
     return made
 

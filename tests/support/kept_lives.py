@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from domains.clean_up_table.deployment import bundle, deploy
+from domains.clean_up_table.bringup import bundle, deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.runs.archive import archive, has_run
 from planning import resume
@@ -20,7 +20,7 @@ def live(store: str, seed: int, faults: float, say) -> None:
     with (
         resume(bundle(), path) if has_run(path) else deploy(Scenario.parse(SCENARIO), seed, faults, store=path) as table
     ):
-        table.run(prepare=lambda run: run.trace.listen(lambda record: say.send(record.seq)))
+        table.report(prepare=lambda run: run.trace.listen(lambda record: say.send(record.seq)))
     say.send("end")
 
 

@@ -15,7 +15,7 @@ from random import Random
 from dsc import ActionPlot, Component, Outcome, SkillCall, parse_plot, skill
 from dsc.trace import Record
 from knowledge_base import Delta, KnowledgeBase, fact
-from planning import Executive, PlanningDomain, PlanStep
+from planning import PlanningDomain, PlanStep, Robot
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain crew)
@@ -58,7 +58,7 @@ states:
 class Did(Outcome): ...
 
 
-class Robot(Component):
+class Arm(Component):
     """Carries out the steps that name it, and keeps a log of when each began, and how it ended."""
 
     def __init__(self, name: str) -> None:
@@ -126,9 +126,9 @@ class LivelyWorld:
 
     def __post_init__(self) -> None:
         self._random = Random(self.seed)
-        self.crew = [Robot(name) for name in self.robots]
+        self.crew = [Arm(name) for name in self.robots]
         tidy = parse_plot(TIDY.replace("LIMIT", f"{self.seconds}"))
-        program = Executive(DOMAIN, [tidy, *plots(self.robots)], self.crew)
+        program = Robot(DOMAIN, [tidy, *plots(self.robots)], self.crew)
         self.kb = program.knowledge
         for robot in self.crew:
             robot.knowledge = self.kb

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
-from domains.clean_up_table.deployment import bundle
+from domains.clean_up_table.bringup import bundle
 from dsc.dynamic.library import Library
 from dsc.messages import SkillMessage
 from dsc.runs import store
 from dsc.runs.store import RunStore, RunWriter
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.sequencer import Sequencer
-from planning.robot.executive import failure_events
+from planning.robot.robot import failure_events
 
 FAILURES = failure_events(Library(bundle().plots)).union(bundle().failures)
 

@@ -30,7 +30,7 @@ from dsc.runs.archive import archive
 from dsc.trace import Record
 from knowledge_base import Delta, KnowledgeBase, StoreError, fact
 from knowledge_base.language.evaluation.evaluator import holds
-from planning import Executive, PlanningDomain, PlanStep
+from planning import PlanningDomain, PlanStep, Robot
 
 UNARY, NULLARY = ("p0", "p1", "p2"), ("q0", "q1")
 COMPONENTS = ("arm", "hand", "leg")
@@ -298,10 +298,10 @@ class RandomRobot:
         what = self.draw.choice(self._facts())
         return at, Delta(added=(what,)) if self.draw.random() < 0.5 else Delta(removed=(what,))
 
-    def program(self, world: World, store: Path) -> Executive:
+    def program(self, world: World, store: Path) -> Robot:
         """The program of the robot, with its devices."""
         devices = [Device(name, self, world) for name in COMPONENTS]
-        program = Executive(
+        program = Robot(
             self.domain,
             map(parse_plot, self.plots),
             devices,
@@ -321,7 +321,7 @@ class RandomRobot:
             elif self.goal is None:
                 sequencer.post(what, after=at)
 
-    def begin(self, program: Executive) -> Any:
+    def begin(self, program: Robot) -> Any:
         """Run the robot's task from its beginning."""
         nodes = dict.fromkeys(self.things, "thing")
         program.knowledge.apply(Delta(nodes=nodes, added=tuple(self.facts)), "test")
@@ -399,7 +399,7 @@ class Trial:
             self.wrong.append(f"the replay differs: {divergence}")
         return Life(end, facts, steps, records, world)
 
-    def _look(self, record: Record, program: Executive) -> None:
+    def _look(self, record: Record, program: Robot) -> None:
         """No step starts with a broken condition."""
         if record.type != "action" or record.data["action"] != "start" or not record.data["skill"].endswith(".act"):
             return
@@ -417,7 +417,7 @@ class Trial:
         if not end.finished and end.problem is not None and "until" in end.problem:
             self.wrong.append(f"no end: {end.problem}")
         if robot.goal is not None:
-            with_facts = Executive(
+            with_facts = Robot(
                 robot.domain, map(parse_plot, robot.plots), [Device(n, robot, World()) for n in COMPONENTS]
             )
             with with_facts as known:

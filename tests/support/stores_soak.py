@@ -247,7 +247,7 @@ def _small_runs(folder: Path, times: int) -> list[Original]:
 
 def _table_runs(folder: Path) -> list[Original]:
     """Runs of the clean-up table: finished, and interrupted before and after the log was put into the file."""
-    from domains.clean_up_table.deployment import bundle, deploy
+    from domains.clean_up_table.bringup import bundle, deploy
     from domains.clean_up_table.scenario import Scenario
     from planning import resume as deploy_again
 
@@ -266,11 +266,11 @@ def _table_runs(folder: Path) -> list[Original]:
             if what == "after commit" and len(copies) == 80:
                 copied(alive, folder / f"at{len(copies)}")
 
-        report = table.run(prepare=lambda run: run.store.writing.listen(boundary))
+        report = table.report(prepare=lambda run: run.store.writing.listen(boundary))
 
     def resume(home: Path) -> None:
         with deploy_again(bundle(), home / NAME) as table:
-            again = table.run()
+            again = table.report()
         if again.goal_reached != report.goal_reached or replay(home / NAME).divergence:
             raise WrongError("the resumed run ends otherwise")
 

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from dsc.cli.plots import app
-from dsc.components.robot import robot_of
+from dsc.components.assembly import robot_of
 from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
 

@@ -15,8 +15,8 @@ from dsc_runs import Arm, Ran
 
 from dsc import BlockingCall, blocking
 from dsc.calls import SkillCall
+from dsc.components.assembly import component_of
 from dsc.components.component import Component
-from dsc.components.robot import component_of
 from dsc.errors import ProgrammingError, SkillError
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated

@@ -9,11 +9,11 @@ from typing import ClassVar
 import pytest
 from dsc_charts import plot
 
+from dsc.components.assembly import Wiring
 from dsc.components.component import ALWAYS, Component
 from dsc.components.endpoint import LocalTransport, NoAnswerError
 from dsc.components.host import Host
 from dsc.components.life_cycle import Life
-from dsc.components.robot import Wiring
 from dsc.components.streams import Push, Stream
 from dsc.dynamic.library import Library
 from dsc.outcomes import Outcome

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from domains.clean_up_table.deployment import bundle, deploy
+from domains.clean_up_table.bringup import bundle, deploy
 from dsc.dynamic.library import Library
 from dsc.reflection import MODELS, design_facts
 from dsc.text.plot_files import parse_plot
@@ -13,7 +13,7 @@ from knowledge_base import KnowledgeBase
 
 @pytest.fixture(scope="module")
 def kb() -> KnowledgeBase:
-    with deploy().executive as robot:
+    with deploy() as robot:
         skills = [signature for component in robot.components for signature in component.skills().values()]
         kb = KnowledgeBase(robot.domain.schema.merged(MODELS))
         kb.apply(design_facts(robot.library, skills), author="design")

@@ -107,7 +107,7 @@ def test_each_component_whose_needs_have_a_bug_is_named():
             raise KeyError(self.name)
 
     first, second = Unsure("first"), Unsure("second")
-    activation = ComponentActivation(ComponentRegistry({"first": first, "second": second}), ())
+    activation = ComponentActivation(ComponentRegistry({"first": first, "second": second}), tuple)
     for one in (first, second, first):
         with pytest.raises(Exception, match=f"`needed` of component '{one.name}' has failed: .*'{one.name}'"):
             activation.needed(one)
@@ -118,7 +118,7 @@ def test_work_does_not_begin_on_a_component_that_is_lost_before():
         laser = Component("alone")
         await laser.life.come_alive()
         laser.life.become(Life.FATAL_ERROR, "unplugged")
-        activation = ComponentActivation(ComponentRegistry({"alone": laser}), ())
+        activation = ComponentActivation(ComponentRegistry({"alone": laser}), tuple)
         await SkillDependencies(activation, laser).carrying(asyncio.sleep(5))
 
     with pytest.raises(NotAliveError, match="unplugged"):
@@ -145,4 +145,4 @@ def test_a_mode_of_a_state_without_a_skill_keeps_its_needs_active_until_the_comp
           e: {final: true}
     """
     ran(text, Scanner(), Lamp())
-    assert log == [(pytest.approx(0), True), (pytest.approx(2), False)]
+    assert [(round(at, 6), active) for at, active in log] == [(0, True), (2, False)]

@@ -11,7 +11,7 @@ from dsc.sequencer.sequencer import RunEnd
 
 pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 
-from domains.clean_up_table.deployment import deploy
+from domains.clean_up_table.bringup import deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc import parse_plot
 from dsc.dynamic.library import Library
@@ -39,8 +39,8 @@ class Watched:
             self.control._steps = 0
 
         def run() -> None:
-            with table.executive:
-                self.report = table.run(prepare=attach)
+            with table:
+                self.report = table.report(prepare=attach)
             self._change()
 
         self.thread = threading.Thread(target=run, daemon=True)
@@ -75,8 +75,8 @@ def test_a_run_that_is_held_still_and_stepped_ends_like_any_other() -> None:
     report = watched.to_the_end()
     assert report.goal_reached
     undisturbed = deploy(Scenario.parse("table: {cups: 2, cans: 1, crisp_cans: [small]}"), 1, 0.0)
-    with undisturbed.executive:
-        assert undisturbed.run().simulated_s == report.simulated_s  # simulated time stood still, too
+    with undisturbed:
+        assert undisturbed.report().simulated_s == report.simulated_s  # simulated time stood still, too
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ websockets = pytest.importorskip("websockets.sync.client", reason="the extra `vi
 
 from websockets.exceptions import ConnectionClosed  # noqa: E402
 
-from domains.clean_up_table.deployment import deploy  # noqa: E402
+from domains.clean_up_table.bringup import deploy  # noqa: E402
 from domains.clean_up_table.scenario import Scenario  # noqa: E402
 from dsc.trace import Record, header  # noqa: E402
 from dsc.viewer.access import PageAddress  # noqa: E402
@@ -133,8 +133,8 @@ def held():
     page.control._steps = 0
 
     def run() -> None:
-        with table.executive:
-            table.run(prepare=page.control.attach)
+        with table:
+            table.report(prepare=page.control.attach)
         page.end()
 
     thread = threading.Thread(target=run, daemon=True)

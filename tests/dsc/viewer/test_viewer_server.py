@@ -13,7 +13,7 @@ pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 httpx = pytest.importorskip("httpx", reason="the extra `viewer` is not installed")
 websockets = pytest.importorskip("websockets.sync.client", reason="the extra `viewer` is not installed")
 
-from domains.clean_up_table.deployment import deploy  # noqa: E402
+from domains.clean_up_table.bringup import deploy  # noqa: E402
 from domains.clean_up_table.scenario import Scenario  # noqa: E402
 from dsc.trace import header  # noqa: E402
 from dsc.viewer.access import PageAddress  # noqa: E402
@@ -29,8 +29,8 @@ def run():
     """A recorded run, its knowledge at the end, and what the knowledge was at each version."""
     log = RecordLog(header(run="test"), live=True)
     table = deploy(Scenario.parse(SCENARIO), seed=1, faults=0.0, listener=log.hear)
-    with table.executive as robot:
-        table.run()
+    with table as robot:
+        table.report()
     log.end()
     return log, robot.knowledge
 

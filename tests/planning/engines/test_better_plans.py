@@ -8,7 +8,7 @@ import pytest
 from obedient_robot import ObedientRobot, plots
 
 from knowledge_base import Delta, KnowledgeBase, fact
-from planning import Executive, Plan, PlanningDomain, PlanStep
+from planning import Plan, PlanningDomain, PlanStep, Robot
 from planning.execution.plan_progress import cost_of
 from planning.model.plan import EngineFailed, PlanFound
 
@@ -72,7 +72,7 @@ def test_the_cheaper_plan_is_carried_out_and_without_costs_the_shorter_one(text,
     planner = Later(*(PlanFound(Plan(steps(one)), "fake", 0.0, 0.1) for one in (first, second)))
     robot = ObedientRobot(domain, seconds=0.0, until=planner.weighed)
     robot.knowledge = world
-    program = Executive(domain, plots(domain), [robot], world, planner=planner)
+    program = Robot(domain, plots(domain), [robot], world, planner=planner)
     program.listen(planner.hear)
     end = program.achieve("(at c)", simulated=False)
     assert (end.finished, end.emitted) == (True, ())
@@ -92,7 +92,7 @@ def test_who_failed_beside_the_winner_is_told(failures):
     robot = ObedientRobot(domain)
     robot.knowledge = world
     found = PlanFound(Plan(steps(SHORT)), "fake", 0.0, 0.1, failures=failures)
-    program, told = Executive(domain, plots(domain), [robot], world, planner=Later(found, found)), []
+    program, told = Robot(domain, plots(domain), [robot], world, planner=Later(found, found)), []
     program.listen(lambda record: told.append(record.data) if record.type == "plan.found" else None)
     program.achieve("(at c)")
     expected = [[{"engine": "other", "message": "it crashed"}]] if failures else [None]

@@ -18,7 +18,7 @@ from planning.model.domain import PlanningDomain
 from planning.model.plan import PlanStep
 from planning.model.problem import GroundAction, Problem
 from planning.problem.construction import build_problem
-from planning.robot.executive import Executive
+from planning.robot.robot import Robot
 
 NAMES = [
     pytest.param(one.name, marks=pytest.mark.skipif(bool(one.lacks()), reason=f"{one.name}: {one.lacks()}"))
@@ -130,7 +130,7 @@ def test_a_simulated_run_with_numbers_uses_the_installed_engine():
         primitive_plot(counter.skills()["act"], name=name, done="acted", implements=name, effects="assumed")
         for name in ("more", "stop")
     ]
-    with Executive(COUNTING, plots, [counter]) as robot:
+    with Robot(COUNTING, plots, [counter]) as robot:
         with robot.knowledge.transaction(author="test") as world:
             world.set("n", 0)
         assert robot.achieve("(done)").reached

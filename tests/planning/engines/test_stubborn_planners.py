@@ -10,7 +10,7 @@ from obedient_robot import ObedientRobot, plots
 
 from dsc import Event, parse_plot
 from knowledge_base import Delta, fact
-from planning import Executive, Plan, PlanStep
+from planning import Plan, PlanStep, Robot
 from planning.model.plan import EngineFailed, PlanFound
 
 FOUND = PlanFound(Plan((PlanStep("go", ("a", "b")),)), "fake", 0.0, 0.1)
@@ -65,7 +65,7 @@ def run(planner, *, simulated=False, prepare=None):
     """The attributes of how it ended."""
     robot = ObedientRobot(DOMAIN, seconds=1.0 if simulated else 0.02)
     holder = parse_plot(HOLDER.replace("GOAL", "(at b)").replace("REPLANS", "4"))
-    program = Executive(DOMAIN, [holder, *plots(DOMAIN)], [robot], planner=planner)
+    program = Robot(DOMAIN, [holder, *plots(DOMAIN)], [robot], planner=planner)
     robot.knowledge = program.knowledge
     told = (fact("at", "a"), *(fact("way", *one.split()) for one in ROUND))
     program.knowledge.apply(Delta(nodes=dict.fromkeys(ROOMS, "room"), added=told), "test")

@@ -14,7 +14,7 @@ from obedient_robot import FAILED, ObedientRobot, plots
 from dsc import Component, Event, Outcome, parse_plot, skill
 from dsc.trace import Record
 from knowledge_base import Delta, fact
-from planning import Executive, Plan, PlannerProcess, PlanStep
+from planning import Plan, PlannerProcess, PlanStep, Robot
 from planning.analysis.validation import Validation
 from planning.execution.plan_records import why_broken
 from planning.model.plan import EngineFailed, PlanFound
@@ -31,9 +31,7 @@ class Run:
         self.planner = planner or BreadthFirst()
         self.robot = ObedientRobot(DOMAIN, script, seconds=1.0 if simulated else 0.02)
         holder = parse_plot(HOLDER.replace("GOAL", goal).replace("REPLANS", str(replans)))
-        program = Executive(
-            DOMAIN, [holder, *plots(DOMAIN, ways)], [self.robot], planner=self.planner, foresight=foresight
-        )
+        program = Robot(DOMAIN, [holder, *plots(DOMAIN, ways)], [self.robot], planner=self.planner, foresight=foresight)
         self.knowledge = self.robot.knowledge = program.knowledge
         told = [fact("at", "a"), *(fact("in", t, "a") for t in things), *(fact("way", *one.split()) for one in links)]
         nodes = {**dict.fromkeys(ROOMS, "room"), **dict.fromkeys(things, "thing")}
@@ -388,7 +386,7 @@ def test_steps_that_end_at_once_are_each_done_one_time(seconds):
         )
         for name in ("more", "stop")
     ]
-    with Executive(COUNTING, ways, [counter], planner=CountsToThree()) as robot:
+    with Robot(COUNTING, ways, [counter], planner=CountsToThree()) as robot:
         with robot.knowledge.transaction(author="test") as world:
             world.set("n", 0)
         robot.listen(records.append)

@@ -11,7 +11,7 @@ from dsc.trace import Record
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.text import parse_condition
-from planning import Executive, PlanningDomain, PlanStep
+from planning import PlanningDomain, PlanStep, Robot
 from planning.model.plan import PlanFound
 from planning.problem.construction import build_problem
 
@@ -113,7 +113,7 @@ def carry_out(domain, goal, facts, changes, failures):
     knowledge = a_world(domain, facts)
     robot = ObedientRobot(domain, failing_calls=failures)
     robot.knowledge = knowledge
-    program = Executive(domain, plots(domain), [robot], knowledge, planner=BreadthFirst())
+    program = Robot(domain, plots(domain), [robot], knowledge, planner=BreadthFirst())
 
     def prepare(sequencer):
         for seconds, delta in changes:

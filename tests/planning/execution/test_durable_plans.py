@@ -18,7 +18,7 @@ from dsc.sequencer.replay import replay
 from dsc.trace import Record
 from knowledge_base import Delta, InputError, KnowledgeBase, fact
 from knowledge_base.errors import StoreError
-from planning import Executive, PlannerProcess, PlanningDomain
+from planning import PlannerProcess, PlanningDomain, Robot
 
 TEXT = """
 (define (domain lights)
@@ -64,7 +64,7 @@ def executive(planner, store=None, domain=DOMAIN, more=()):
     skills = lamps.skills()
     light = primitive_plot(skills["light"], done="lit", implements="switch-on")
     mend = primitive_plot(skills["mend"], done="mended", implements="mend")
-    return Executive(domain, [light, mend, *more], [lamps], None, planner, store=store)
+    return Robot(domain, [light, mend, *more], [lamps], None, planner, store=store)
 
 
 def copied(folder, to):
@@ -203,7 +203,7 @@ def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, plan
 
 def test_a_store_brings_its_own_knowledge(planner, tmp_path):
     with pytest.raises(InputError, match="a store provides the knowledge"):
-        Executive(DOMAIN, [], [], KnowledgeBase(DOMAIN.schema), planner, store=tmp_path / "run.kb")
+        Robot(DOMAIN, [], [], KnowledgeBase(DOMAIN.schema), planner, store=tmp_path / "run.kb")
 
 
 def test_what_is_known_and_what_was_run_lasts_from_one_program_to_the_next(planner, tmp_path):

@@ -16,7 +16,7 @@ from dsc import Component, Outcome, SkillCall, parse_plot, skill
 from dsc.runs.archive import archive
 from dsc.trace import Record
 from knowledge_base import Delta, fact
-from planning import Executive, PlanStep
+from planning import PlanStep, Robot
 from planning.analysis.validation import Validation
 
 
@@ -77,7 +77,7 @@ class Refuses:
 
 def executive(robot, store, goal, ways=None, foresight=None):
     holder = parse_plot(HOLDER.replace("GOAL", goal).replace("REPLANS", "4"))
-    program = Executive(
+    program = Robot(
         DOMAIN, [holder, *plots(DOMAIN, ways)], [robot], planner=BreadthFirst(), foresight=foresight, store=store
     )
     robot.knowledge = program.knowledge

@@ -7,7 +7,7 @@ import pytest
 from dsc import Component, Event, Outcome, SkillCall, parse_plot, skill
 from dsc.trace import Record
 from knowledge_base import Delta, fact
-from planning import Executive
+from planning import Robot
 
 DOMAIN = """
 (define (domain rover)
@@ -69,7 +69,7 @@ class Base(Component):
 def tour(base, every, count=300, places="abcd"):
     """How a tour ended that an event interrupts again and again, and how many plans it took."""
     records: list[Record] = []
-    with Executive(DOMAIN, [parse_plot(text) for text in (GO, TOUR, CHARGE)], [base]) as robot:
+    with Robot(DOMAIN, [parse_plot(text) for text in (GO, TOUR, CHARGE)], [base]) as robot:
         robot.knowledge.apply(
             Delta(nodes=dict.fromkeys(places, "place"), added=(fact("at", "a"), fact("visited", "a"))), "test"
         )

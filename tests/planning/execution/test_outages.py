@@ -7,7 +7,7 @@ import pytest
 from dsc import Component, Life, LoopClock, Outcome, SkillCall, parse_plot, skill
 from dsc.trace import Record
 from knowledge_base import Delta, fact
-from planning import Executive
+from planning import Robot
 
 DOMAIN = """
 (define (domain rover)
@@ -64,7 +64,7 @@ class Base(Component):
 def visited(base, **how):
     """How the goal to visit three places ended, with the records of the run."""
     records: list[Record] = []
-    with Executive(DOMAIN, [parse_plot(VISIT)], [base]) as robot:
+    with Robot(DOMAIN, [parse_plot(VISIT)], [base]) as robot:
         robot.knowledge.apply(Delta(nodes=dict.fromkeys("abc", "place")), "test")
         robot.listen(records.append)
         return robot.achieve("(forall (?p - place) (visited ?p))", **how), records

@@ -7,7 +7,7 @@ import pytest
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from dsc.trace import Record
 from knowledge_base import Delta, fact
-from planning import Executive
+from planning import Robot
 
 DOMAIN = """
 (define (domain washing)
@@ -45,7 +45,7 @@ def test_a_robot_begins_although_things_come_and_go_all_the_time(every):
             sequencer.change(Delta(nodes={f"n{number}": "item"}), "camera", after=came)
             sequencer.change(Delta(removed_nodes=(f"n{number}",)), "camera", after=gone)
 
-    with Executive(DOMAIN, plots, [arm]) as robot:
+    with Robot(DOMAIN, plots, [arm]) as robot:
         robot.knowledge.apply(Delta(nodes={"a": "item", "b": "item"}), "test")
         robot.listen(records.append)
         end = robot.achieve("(forall (?i - item) (clean ?i))", prepare=prepare)

@@ -11,8 +11,8 @@ from dsc_crashes import copied
 from dsc import Component, Event, Outcome, Sequencer, SkillCall, parse_plot, run_simulated, skill
 from dsc.trace import Record
 from knowledge_base import Delta, InputError, fact
-from planning import Executive
-from planning.robot.executive import LONGEST_RUN
+from planning import Robot
+from planning.robot.robot import LONGEST_RUN
 
 DOMAIN = """
 (define (domain office)
@@ -70,7 +70,7 @@ class Clerk(Component):
 
 
 def office(*plots, clerk=None, **how):
-    return Executive(DOMAIN, [parse_plot(text) for text in plots or (APPROVE, SIGN)], [clerk or Clerk()], **how)
+    return Robot(DOMAIN, [parse_plot(text) for text in plots or (APPROVE, SIGN)], [clerk or Clerk()], **how)
 
 
 def test_a_plan_may_wait_over_a_weekend():

@@ -9,7 +9,7 @@ import pytest
 from dsc import Component, Outcome, RunEnd, SkillCall, primitive_plot, skill
 from dsc.trace import Record
 from knowledge_base import Delta, fact
-from planning import Executive, Plan, PlanStep
+from planning import Plan, PlanStep, Robot
 from planning.execution.search import MAX_REJECTED
 from planning.model.plan import PlanFound, PlanningOutcome
 from planning.model.problem import Problem
@@ -58,7 +58,7 @@ class Guesses:
 def run(planner: Guesses, seconds: float = 60) -> tuple[RunEnd, list[Record], Tally]:
     base, records, tally = Base(), list[Record](), Tally()
     plot = primitive_plot(base.skills()["drive"], done="arrived", implements="go")
-    with Executive(DOMAIN, [plot], [base], planner=planner) as robot:
+    with Robot(DOMAIN, [plot], [base], planner=planner) as robot:
         robot.listen(records.append)
         robot.listen(tally)
         rooms = dict.fromkeys(("hall", "bath", "loft"), "room")

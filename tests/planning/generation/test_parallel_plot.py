@@ -10,7 +10,7 @@ from dsc.trace import Record
 from knowledge_base import Delta, fact
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.text import parse_condition, to_text
-from planning import Executive, Plan, PlanningDomain, PlanStep, plot_from_plan
+from planning import Plan, PlanningDomain, PlanStep, Robot, plot_from_plan
 from planning.generation.carried_steps import fitting, usage
 from planning.model.plan import PlanFound, Timing
 from planning.ordering.causal_tracing import deordered
@@ -241,7 +241,7 @@ def executed(plan, goal, facts, *workers, change=None):
     plots = [*crew(switching=("worker", "worker"))]
     plots = [plot for plot in plots if plot.implements != "plug-in"]
     plots.append(primitive("plug", "plug-in", "worker", parameters=()))
-    robot = Executive(DOMAIN, plots, workers, planner=Answers(plan))
+    robot = Robot(DOMAIN, plots, workers, planner=Answers(plan))
     robot.knowledge.apply(
         Delta(nodes=dict.fromkeys("ab", "lamp"), added=facts, values={fact("slowness", "a"): 1.0}), "me"
     )

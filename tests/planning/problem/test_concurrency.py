@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from knowledge_base.facts import Delta, fact
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
-from planning import Executive, PlanningDomain
+from planning import PlanningDomain, Robot
 from planning.analysis.validation import validate
 from planning.engines import planner as planner_module
 from planning.engines.planner import PlannerProcess
@@ -241,7 +241,7 @@ class Fixed:
 
 def test_a_robot_says_that_it_cannot_carry_out_what_needs_two_at_once():
     domain = PlanningDomain.parse(CELLAR)
-    with Executive(domain, [], [], cellar(1, 1), planner=Fixed(schedule(*MENDED))) as robot:
+    with Robot(domain, [], [], cellar(1, 1), planner=Fixed(schedule(*MENDED))) as robot:
         end = robot.achieve(GOAL)
     [outcome] = end.emitted
     assert outcome.name == "no_plan"

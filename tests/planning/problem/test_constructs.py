@@ -4,7 +4,7 @@ import pytest
 
 from knowledge_base.facts import fact
 from knowledge_base.language.syntax.text import parse_condition
-from planning import Executive
+from planning import Robot
 from planning.engines.registry import Engine
 from planning.model.domain import PlanningDomain
 from planning.model.plan import NobodyCan
@@ -65,7 +65,7 @@ def test_without_such_a_construct_it_is_said_what_is_needed(jars):
 
 def test_a_robot_says_which_condition_no_installed_engine_can_do(jars, world_of, monkeypatch):
     monkeypatch.setattr(Engine, "lacks", lambda one: "" if one.name == "pyperplan" else f"install {one.name}")
-    robot = Executive(jars, [], [], world_of(jars.schema, {"a": "jar"}, values={fact("size", "a"): 2}))
+    robot = Robot(jars, [], [], world_of(jars.schema, {"a": "jar"}, values={fact("size", "a"): 2}))
     with robot:
         [outcome] = robot.achieve("(sealed a)").emitted
     reason = outcome.attributes["reason"]

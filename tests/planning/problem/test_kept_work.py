@@ -11,7 +11,7 @@ from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.text import parse_condition, parse_term
 from knowledge_base.pddl.problem_text import Metric
-from planning import Executive, Plan, PlanningDomain, PlanStep, build_problem, plot_from_plan
+from planning import Plan, PlanningDomain, PlanStep, Robot, build_problem, plot_from_plan
 from planning.execution.regression import CausalNeeds, leaves, regressed
 
 TEXT = """
@@ -118,7 +118,7 @@ def test_a_slice_of_a_problem_whose_metric_is_ignored_costs_the_same_everywhere(
 class Finished(Outcome): ...
 
 
-class Robot(Component):
+class Arm(Component):
     """Says how much the collector leaves alone while it works, and how often it looks."""
 
     name = "robot"
@@ -131,10 +131,10 @@ class Robot(Component):
 
 @pytest.mark.parametrize("simulated", [True, False])
 def test_in_real_time_the_collector_leaves_alone_what_was_there_before(simulated):
-    world, robot, before = KnowledgeBase(DOMAIN.schema), Robot(), gc.get_freeze_count()
+    world, robot, before = KnowledgeBase(DOMAIN.schema), Arm(), gc.get_freeze_count()
     threshold = gc.get_threshold()
     world.apply(Delta(nodes=dict.fromkeys(SHELVES, "shelf"), added=(fact("at", "s1"),)), "test")
-    Executive(DOMAIN, plots(), [robot], world).run("do-go", {"from": "s1", "to": "s2"}, simulated=simulated)
+    Robot(DOMAIN, plots(), [robot], world).run("do-go", {"from": "s1", "to": "s2"}, simulated=simulated)
     assert (robot.left_alone > before) is not simulated
     assert (robot.patience > threshold) is not simulated
     assert gc.get_threshold() == threshold

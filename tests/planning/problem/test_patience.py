@@ -8,7 +8,7 @@ import pytest
 from dsc import Component, Event, Outcome, SkillCall, parse_plot, skill
 from knowledge_base import Delta, fact
 from knowledge_base.language.syntax.text import parse_condition
-from planning import Executive, PlanningDomain
+from planning import PlanningDomain, Robot
 from planning.model.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.problem.construction import build_problem
 
@@ -112,7 +112,7 @@ states:
 
 
 def run(seconds, prepare=None, *, simulated):
-    program = Executive(many(), [parse_plot(WORKING.replace("SECONDS", str(seconds)))], [Idle()])
+    program = Robot(many(), [parse_plot(WORKING.replace("SECONDS", str(seconds)))], [Idle()])
     program.knowledge.apply(THINGS, "test")
     end = program.run("top", prepare=prepare, simulated=simulated)
     return end.emitted[-1].attributes["how"]

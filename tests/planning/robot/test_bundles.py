@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from dsc import Component, Outcome, SkillCall, parse_plot, primitive_plot, skill
 from knowledge_base import Delta, InputError, UnknownNameError, fact
-from planning import Bundle, Executive, PlanningDomain
+from planning import Bundle, PlanningDomain, Robot
 from planning.cli.command import app
 from planning.robot import bundles
 from planning.robot.bundles import gathered, installed
@@ -62,14 +62,14 @@ def points(monkeypatch, **found):
 
 def test_a_program_of_bundles_has_what_they_need(monkeypatch):
     points(monkeypatch, handling=HANDLING, tasks=lambda: TASKS)
-    with Executive.of_bundles(["tasks"]) as robot:
+    with Robot.of_bundles(["tasks"]) as robot:
         robot.knowledge.apply(Delta(nodes={"cup": "item"}), "me")
         assert robot.run("fetch", {"item": "cup"}).reached
         assert robot.knowledge.ask("(holding cup)")
 
 
 def test_each_program_has_components_of_its_own():
-    programs = [Executive.of_bundles([HANDLING]) for _ in range(2)]
+    programs = [Robot.of_bundles([HANDLING]) for _ in range(2)]
     assert programs[0].components[0] is not programs[1].components[0]
 
 
@@ -105,9 +105,9 @@ def test_what_is_no_bundle_is_refused():
 def test_bundles_that_contradict_each_other_are_named():
     other = Bundle("other", (parse_plot(FETCH.replace("item: item", "item: object")),), lambda: [Arm()])
     with pytest.raises(InputError, match="the bundles 'tasks' and 'other' have different plots 'fetch'"):
-        Executive.of_bundles([TASKS, HANDLING, other])
+        Robot.of_bundles([TASKS, HANDLING, other])
     with pytest.raises(InputError, match="the bundles 'handling' and 'more' both have a component 'arm'"):
-        Executive.of_bundles([HANDLING, Bundle("more", components=lambda: [Arm()])])
+        Robot.of_bundles([HANDLING, Bundle("more", components=lambda: [Arm()])])
     with pytest.raises(InputError, match="two bundles are named 'handling'"):
         gathered([HANDLING, Bundle("handling")])
 

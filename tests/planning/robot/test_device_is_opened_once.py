@@ -14,7 +14,7 @@ import pytest
 from dsc import Component, Outcome, SkillCall, parse_plot, skill
 from dsc.sequencer.clock import SimulatedEventLoop, run_simulated
 from planning import Bundle, deploy
-from planning.robot.deployment import resume
+from planning.robot.bringup import resume
 
 PLOT = parse_plot("""
 plot: turn
@@ -93,14 +93,14 @@ def robot(gripper: Gripper) -> Bundle:
 @pytest.mark.parametrize("simulated", [True, False])
 def test_in_a_good_run(port: Port, *, simulated: bool) -> None:
     with deploy(robot(Gripper(port))) as deployed:
-        assert deployed.run(simulated=simulated).problem is None
+        assert deployed.report(simulated=simulated).problem is None
     assert port.take() == GOOD
 
 
 @pytest.mark.parametrize("error", [OSError("no power"), ValueError("a bug")])
 def test_in_a_failed_run(port: Port, error: Exception) -> None:
     with deploy(robot(Gripper(port, fails=error))) as deployed:
-        report = deployed.run()
+        report = deployed.report()
     assert str(error) in str(report.problem) + str(report.programming_error)
     assert port.take() == GOOD
 
@@ -109,15 +109,15 @@ def test_in_a_killed_and_resumed_run(port: Port, tmp_path: Path) -> None:
     killed = deploy(robot(Gripper(port)), store=tmp_path / "run.kb")
 
     async def begin() -> None:
-        kept.append(asyncio.ensure_future(killed.executive.execute("turn", header=killed.header())))
+        kept.append(asyncio.ensure_future(killed.execute("turn", header=killed.header())))
         await asyncio.sleep(0.6)
 
     kept: list[asyncio.Future[object]] = []  # a killed program cleans nothing up
     SimulatedEventLoop().run_until_complete(begin())
-    killed.executive.knowledge.close()
+    killed.knowledge.close()
     assert port.take() == ["on", "turn -90", "turn 90"]
     with resume(robot(Gripper(port)), tmp_path / "run.kb") as deployed:
-        assert deployed.run().problem is None
+        assert deployed.report().problem is None
     assert port.take() == ["on", "turn 90", "off"]
 
 
@@ -125,7 +125,7 @@ def test_in_two_runs_in_a_row(port: Port) -> None:
     gripper = Gripper(port)
     for _ in range(2):
         with deploy(robot(gripper)) as deployed:
-            assert deployed.run().problem is None
+            assert deployed.report().problem is None
         assert port.take() == GOOD
 
 
@@ -134,15 +134,15 @@ def test_in_a_notebook(port: Port) -> None:
 
     async def cells() -> None:
         with deploy(robot(Gripper(port))) as deployed:
-            await deployed.executive.execute("turn")
+            await deployed.execute("turn")
             assert port.take() == GOOD
-            interrupted = asyncio.ensure_future(deployed.executive.execute("turn"))
+            interrupted = asyncio.ensure_future(deployed.execute("turn"))
             await asyncio.sleep(0.2)
             interrupted.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await interrupted
             assert port.take() == ["on", "turn -90", "off"]
-            await deployed.executive.execute("turn")
+            await deployed.execute("turn")
             assert port.take() == GOOD
 
     run_simulated(cells())

@@ -37,5 +37,5 @@ class Tidy(Simulation):
 def test_a_failure_of_the_main_plot_is_no_success_even_if_nothing_is_left(end: str, headline: str) -> None:
     main = parse_plot(MAIN.replace("END", end))
     with deploy(Bundle("r", plots=(main,), main="tidy_up", simulation=Tidy, failures={"stuck"})) as deployed:
-        report = deployed.run()
+        report = deployed.report()
     assert (report.headline, report.goal_reached, report.left) == (headline, end == "tidied", ())

@@ -15,7 +15,7 @@ from dsc import Component, Outcome, SkillCall, parse_plot, skill, takes
 from dsc.sequencer.clock import run_real
 from knowledge_base import StoreError
 from planning import Bundle, deploy
-from planning.robot.deployment import resume
+from planning.robot.bringup import resume
 
 
 @pytest.fixture(autouse=True)
@@ -92,7 +92,7 @@ def robot(base: Base) -> Bundle:
 def test_a_signal_ends_a_run_without_a_store(number: signal.Signals, *, simulated: bool) -> None:
     base = Base(number)
     with deploy(robot(base)) as deployed:
-        report = deployed.run(simulated=simulated)
+        report = deployed.report(simulated=simulated)
     assert report.problem == f"{SIGNALS[number]} ended the run"
     assert sorted(base.log[3:-1]) == ["brake", "off"]
     assert (base.log[:3], base.log[-1]) == (["speed 2", "release", "on"], "stop")
@@ -104,14 +104,14 @@ def test_a_signal_ends_a_run_without_a_store(number: signal.Signals, *, simulate
 def test_a_signal_suspends_a_run_with_a_store(tmp_path, number: signal.Signals, *, simulated: bool) -> None:
     base = Base(number)
     with deploy(robot(base), store=tmp_path / "run.kb") as deployed:
-        report = deployed.run(simulated=simulated)
+        report = deployed.report(simulated=simulated)
     assert report.problem == f"{SIGNALS[number]} suspended the run, which can be resumed"
     assert sorted(base.log[3:-1]) == ["brake", "off"]
     assert base.log[-1] == "stop"
 
     again = Base()
     with resume(robot(again), tmp_path / "run.kb") as deployed:
-        report = deployed.run()
+        report = deployed.report()
     assert report.problem is None
     assert again.log == ["speed 2", "release", "on", "off", "brake", "stop"]
 
@@ -138,15 +138,15 @@ def test_a_resume_sends_the_messages_of_the_active_states_again(tmp_path) -> Non
 
     base = Base(signal.SIGTERM)
     with deploy(bundle(base), store=tmp_path / "run.kb") as deployed:
-        deployed.run()
+        deployed.report()
     assert base.log.count("release") == 2
     again = Base(signal.SIGTERM)
     with resume(bundle(again), tmp_path / "run.kb") as deployed:
-        deployed.run()
+        deployed.report()
     assert again.log[:3] == ["speed 2", "release", "on"]
     last = Base()
     with resume(bundle(last), tmp_path / "run.kb") as deployed:
-        assert deployed.run().problem is None
+        assert deployed.report().problem is None
     assert last.log == ["speed 2", "release", "on", "off", "brake", "brake", "stop"]
 
 
@@ -154,10 +154,10 @@ def test_a_resume_sends_the_messages_of_the_active_states_again(tmp_path) -> Non
 def test_a_signal_ends_a_run_with_a_store_on_request(tmp_path, number: signal.Signals) -> None:
     base = Base(number)
     with deploy(robot(base), store=tmp_path / "run.kb") as deployed:
-        assert deployed.run(on_signal="end").problem == f"{SIGNALS[number]} ended the run"
+        assert deployed.report(on_signal="end").problem == f"{SIGNALS[number]} ended the run"
     assert "brake" in base.log
     with pytest.raises(StoreError), resume(robot(base), tmp_path / "run.kb") as deployed:
-        deployed.run()
+        deployed.report()
 
 
 def test_a_signal_that_the_program_handles_remains_its_own() -> None:
@@ -166,7 +166,7 @@ def test_a_signal_that_the_program_handles_remains_its_own() -> None:
     try:
         base = Base(signal.SIGTERM)
         with deploy(robot(base)) as deployed:
-            assert deployed.run().problem is None
+            assert deployed.report().problem is None
     finally:
         signal.signal(signal.SIGTERM, before)
     assert received == [signal.SIGTERM]
@@ -174,7 +174,7 @@ def test_a_signal_that_the_program_handles_remains_its_own() -> None:
 
 def test_another_cancellation_is_no_signal() -> None:
     async def main() -> None:
-        running = asyncio.ensure_future(deployed.executive.execute("go"))
+        running = asyncio.ensure_future(deployed.execute("go"))
         await asyncio.sleep(0)
         running.cancel()
         await running

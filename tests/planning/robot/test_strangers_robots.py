@@ -15,8 +15,8 @@ import pytest
 from dsc import ProgrammingError
 from knowledge_base import Delta, InputError, UnknownNameError, fact
 from planning import Bundle, Simulation, Task, deploy
-from planning.robot.deployment import own_task, plot_task
 from planning.robot.targets import bundle_at
+from planning.robot.task import own_task, plot_task
 
 PROJECT = Path(__file__).parents[2] / "support" / "delivery_project"
 DSC = Path(sys.executable).with_name("dsc")
@@ -300,7 +300,7 @@ def test_a_simulation_without_components_cannot_be_made():
 def test_the_parts_of_a_goal_that_are_left_are_named_one_by_one(project):
     robot = bundle_at(str(project))
     with deploy(robot, Task(goal="(and (full) (forall (?p - parcel) (imply (in ?p hall) (holding ?p))))")) as deployed:
-        deployed.executive.knowledge.apply(Delta(added=(fact("holding", "parcel1"),)), "test")
-        report = deployed.run()
+        deployed.knowledge.apply(Delta(added=(fact("holding", "parcel1"),)), "test")
+        report = deployed.report()
     assert [one.what for one in report.left] == ["(full)", "(holding parcel2)"]
     assert not report.goal_reached

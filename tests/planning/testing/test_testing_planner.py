@@ -9,7 +9,7 @@ from test_testing_with_plans import DOMAIN, LIGHT_UP, PLOTS, Lamps, OnePlan
 
 from dsc.testing import Answer, Fault, Faults, ScriptedSkills, world
 from dsc.trace import Record
-from planning import Executive
+from planning import Robot
 from planning.execution.planner_call import PATIENCE
 from planning.testing import FaultyPlanner
 
@@ -20,7 +20,7 @@ def run(faults, *reached):
     knowledge = world(DOMAIN.schema, "a b - lamp")
     records: list[Record] = []
     skills = ScriptedSkills(knowledge, {"lamps.light": Answer("lit", observed="(on ?lamp)")}, like=[Lamps()])
-    robot = Executive(DOMAIN, PLOTS, skills.components, knowledge, FaultyPlanner(OnePlan(), faults, *reached))
+    robot = Robot(DOMAIN, PLOTS, skills.components, knowledge, FaultyPlanner(OnePlan(), faults, *reached))
     robot.listen(records.append)
     with robot:
         end = robot.run(LIGHT_UP.name)
@@ -67,7 +67,7 @@ def test_one_that_hangs_is_given_up_at_its_deadline_in_simulated_time():
     knowledge, ends = world(DOMAIN.schema, "a b - lamp"), []
     skills = ScriptedSkills(knowledge, {}, like=[Lamps()])
     planner = FaultyPlanner(OnePlan(), Faults(1, 1.0, {Fault.PLANNER_HANGS}))
-    with Executive(DOMAIN, PLOTS, skills.components, knowledge, planner) as robot:
+    with Robot(DOMAIN, PLOTS, skills.components, knowledge, planner) as robot:
         robot.listen(lambda record: ends.append(record.t) if record.type == "end" else None)
         robot.achieve("(forall (?l - lamp) (on ?l))", seconds=7)
     assert ends == [7 + PATIENCE]

@@ -1,4 +1,4 @@
-"""The testing kit where a planner is in the loop: stand-ins, scripted skills and coverage under an executive."""
+"""The testing kit where a planner is in the loop: stand-ins, scripted skills and coverage under a robot."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dsc import Component, Library, Outcome, SkillCall, parse_plot, primitive_pl
 from dsc.errors import PlotError
 from dsc.testing import Answer, Coverage, ScriptedSkills, ends_with, entered, started, world
 from knowledge_base import InputError
-from planning import Executive, Plan, PlanningDomain, PlanStep
+from planning import Plan, PlanningDomain, PlanStep, Robot
 from planning.model.plan import PlanFound
 
 DOMAIN = PlanningDomain.parse("""
@@ -65,7 +65,7 @@ PLOTS = Library([LIGHT_UP, LIGHT])
 def light_up(replies, plots=PLOTS):
     knowledge = world(DOMAIN.schema, "a b - lamp")
     skills = ScriptedSkills(knowledge, {"lamps.light": replies}, like=[Lamps()])
-    robot = Executive(DOMAIN, plots, skills.components, knowledge, planner=OnePlan())
+    robot = Robot(DOMAIN, plots, skills.components, knowledge, planner=OnePlan())
     steps: list[Any] = []
     coverage = Coverage(plots)
 
@@ -119,4 +119,4 @@ def test_free_components_declare_nothing_so_an_executive_refuses_their_arguments
     knowledge = world(DOMAIN.schema, "a b - lamp")
     skills = ScriptedSkills(knowledge, {"lamps.light": ["lit", Answer("blown", {"lamp": "a"})]})
     with pytest.raises(PlotError, match="has no parameter 'lamp'"):
-        Executive(DOMAIN, PLOTS, skills.components, knowledge, planner=OnePlan())
+        Robot(DOMAIN, PLOTS, skills.components, knowledge, planner=OnePlan())

@@ -25,9 +25,9 @@ from knowledge_base.facts import Delta
 from knowledge_base.journal.file import Durability
 from knowledge_base.store import KnowledgeBase
 from planning.engines.planner import Planner
+from planning.robot.bringup import deploy as deploy_bundle
 from planning.robot.bundles import Bundle
-from planning.robot.deployment import Deployment
-from planning.robot.deployment import deploy as deploy_bundle
+from planning.robot.robot import Robot
 from planning.robot.simulation import Fault, Left, Setup, Simulation
 
 HOME = Path(str(files("domains.clean_up_table")))
@@ -165,7 +165,7 @@ def deploy(
     store: Path | None = None,
     durability: Durability = "process",
     profile: Profile | None = None,
-) -> Deployment:
+) -> Robot:
     """Deploy the robot and the simulated table for one run; the caller must close the result.
 
     Args:
@@ -188,7 +188,7 @@ def deploy(
     )  # fmt: skip
 
 
-def world_of(deployed: Deployment) -> TableWorld:
-    """Return the simulated world of a deployment of this robot."""
+def world_of(deployed: Robot) -> TableWorld:
+    """Return the simulated world of this robot."""
     assert isinstance(deployed.simulation, TableSimulation)  # noqa: S101  a wrong argument is a bug of the caller
     return deployed.simulation.world

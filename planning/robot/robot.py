@@ -1,22 +1,21 @@
-"""The executive: a robot program made of a domain, plots, components, knowledge and a planner."""
+"""A robot, deployed: domain, plots, components, knowledge and planner, and its simulated world if it has one."""
 
 from __future__ import annotations
 
-import gc
+import hashlib
 import math
-import threading
-from collections.abc import Callable, Collection, Coroutine, Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
-from functools import cache
-from importlib.resources import files
+import time
+from collections.abc import Callable, Collection, Coroutine, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
 from pydantic import ValidationError
 
 from dsc.calls import Outputs, PlotCall
+from dsc.components.assembly import require_deployed, require_instances, require_wired
 from dsc.components.component import Component
-from dsc.components.robot import require_deployed, require_instances, require_wired
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
 from dsc.events import SKILL_FAILURES
@@ -27,8 +26,9 @@ from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.sequencer.signals import OnSignal
 from dsc.skills import signatures
-from dsc.text.plot_files import parse_plot
+from dsc.text.profiles import Profile
 from dsc.trace import Listener, Trace
 from knowledge_base.errors import InputError, SchemaError, StoreError
 from knowledge_base.journal.file import Durability, located
@@ -39,12 +39,18 @@ from knowledge_base.world.schema_compatibility import require_extension
 from planning.engines.planner import Planner
 from planning.engines.race import CachingPlanner, PlannerRace
 from planning.engines.registry import repeatable
+from planning.execution.achieve import achieve_plot
 from planning.execution.planning_component import PlanningComponent
 from planning.execution.search import Foresight
 from planning.model.domain import PlanningDomain
 from planning.problem.construction import check_goal
 from planning.robot.bundles import Bundle, components_of, domain_of, gathered, plots_of, shipped_by
+from planning.robot.judgement import Judgement
+from planning.robot.progress import Tally
+from planning.robot.report import Report
+from planning.robot.simulation import SceneWriter, Simulation
 from planning.robot.soundness import require_parts, require_sound
+from planning.robot.task import Task
 
 Prepare = Callable[[Sequencer], None]
 """Callback that is called before a run starts, e.g. to post events or to keep a reference to the sequencer."""
@@ -56,13 +62,34 @@ In real time, and for an open-ended run, there is no default limit.
 """
 
 
-class Executive:
-    """A robot program that can run plots and achieve goals.
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Origin of a robot: the bundle that was deployed.
+
+    Attributes:
+        bundle: the bundle.
+        task: the task of the robot's reports.
+        simulation: the simulated world; `None` without a simulation.
+        profile: the settings profile; `None` without a profile.
+        kept: plain data that the store keeps with a run.
+        resumes: whether the robot resumes the run in its store.
+    """
+
+    bundle: Bundle
+    task: Task
+    simulation: Simulation | None = None
+    profile: Profile | None = None
+    kept: Mapping[str, Any] = field(default_factory=dict)
+    resumes: bool = False
+
+
+class Robot:
+    """A robot that can run plots and achieve goals. `deploy` makes one from a `Bundle`.
 
     Args:
         domain: the planning domain, or its PDDL file. Components may add fragments. The schema of the knowledge base
             must declare the merged domain.
-        plots: the plots; plots with `implements` execute planning actions. Several executives may share one `Library`
+        plots: the plots; plots with `implements` execute planning actions. Several robots may share one `Library`
             and its caches. The plot `achieve` is added if the library lacks it.
         components: the components, with their skills.
         knowledge: the knowledge base, whose schema the plots may use; by default an empty one with the domain's schema.
@@ -75,6 +102,15 @@ class Executive:
             created. With a store, the argument `knowledge` must be omitted.
         durability: with a store, "process" survives a crash of the process, and "power" also a power failure.
         failures: further outcomes with which a plot does not reach its goal, see `failures`.
+        origin: the deployed bundle; `None` for a robot that was not made by `deploy`.
+
+    Attributes:
+        components: the components.
+        domain: the merged planning domain.
+        library: the plots.
+        knowledge: the knowledge base.
+        store: the file of knowledge and runs; `None` without a store.
+        origin: the deployed bundle; `None` without a bundle.
 
     Raises:
         PlotError: a plot does not pass the validator; the error contains all findings.
@@ -98,6 +134,7 @@ class Executive:
         store: Path | str | None = None,
         durability: Durability = "process",
         failures: Collection[str] = (),
+        origin: Origin | None = None,
     ) -> None:
         require_parts(knowledge, planner, foresight, store)
         self.components = require_instances(components)
@@ -121,6 +158,7 @@ class Executive:
         self._foresight = foresight
         self._failures = failures
         self._listeners: list[Listener] = []
+        self.origin = origin
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
         declared = {
@@ -143,17 +181,17 @@ class Executive:
         components: Iterable[Component] = (),
         **how: Any,
     ) -> Self:
-        """Return an executive for bundles, the bundles that they need, and further plots and components.
+        """Return a robot for bundles, the bundles that they need, and further plots and components.
 
         Args:
             bundles: each a `Bundle`, or the name of an installed bundle.
             plots: further plots.
             components: further components.
-            how: the keyword arguments of `Executive` (`knowledge`, `planner`, `store`, ...).
+            how: the keyword arguments of `Robot` (`knowledge`, `planner`, `store`, ...).
 
         Raises:
             UnknownNameError: a bundle is missing.
-            InputError: two bundles contradict each other, or `Executive` raises the error.
+            InputError: two bundles contradict each other, or `Robot` raises the error.
         """
         found = gathered(bundles)
         how.setdefault("failures", frozenset[str]().union(*(bundle.failures for bundle in found)))
@@ -164,9 +202,28 @@ class Executive:
         """The outcomes that report failures: `failure_events` of the plots, and the argument `failures`."""
         return failure_events(self.library).union(self._failures)
 
-    def listen(self, listener: Listener) -> None:
-        """Call `listener` with every later record of every run."""
+    @property
+    def simulation(self) -> Simulation | None:
+        """The simulated world; `None` without a simulation."""
+        return None if self.origin is None else self.origin.simulation
+
+    def header(self) -> dict[str, Any]:
+        """Return the inputs that determine a run, for the first line of the trace."""
+        plots = "".join(sorted(plot.digest for plot in self.library))
+        domain = "\n".join(f"{name}\n{text}" for name, text in sorted(self.domain.statements().items()))
+        origin, world = self.origin, self.simulation
+        return {
+            **({} if origin is None else {"run": origin.bundle.name}),
+            **({} if world is None else {"seed": world.seed, "faults": world.chance}),
+            **({} if origin is None or origin.profile is None else {"profile": origin.profile.digest}),
+            "chart": hashlib.sha256(plots.encode()).hexdigest()[:12],
+            "domain": hashlib.sha256(domain.encode()).hexdigest()[:12],
+        }
+
+    def listen(self, listener: Listener) -> Callable[[], None]:
+        """Call `listener` with every later record of every run; return a function that ends this."""
         self._listeners.append(listener)
+        return partial(self._listeners.remove, listener)
 
     def run(
         self,
@@ -222,7 +279,7 @@ class Executive:
         sequencer, planning = self._wired(clock, 0, store, open_ended=open_ended, until=until)
         if prepare is not None:
             prepare(sequencer)
-        return await _to_its_end(sequencer.run(plot, arguments), planning, clock)
+        return await _to_its_end(sequencer.run(plot, arguments), planning)
 
     def resume(self, *, speed: float = math.inf, prepare: Prepare | None = None) -> RunEnd:
         """Resume the unfinished run of the store at its last macrostep, and run it to its end; for `speed` see `run`.
@@ -299,6 +356,72 @@ class Executive:
             header=header,
         )
 
+    def judgement(self, task: Task | None = None) -> Judgement:
+        """Return the judgement of a task, by default the robot's own; raise `InputError` without a task."""
+        task = task or (None if self.origin is None else self.origin.task)
+        if task is None:
+            raise InputError("a robot without a bundle has no task: name one, e.g. Task(goal=...)")
+        bundle = None if self.origin is None else self.origin.bundle
+        return Judgement(task, bundle, self.simulation, self.knowledge, self.domain)
+
+    def report(
+        self,
+        task: Task | None = None,
+        *,
+        simulated: bool = True,
+        speed: float = math.inf,
+        until: float | None = None,
+        on_signal: OnSignal = "suspend",
+        prepare: Prepare | None = None,
+    ) -> Report:
+        """Run a task and return the report, also if Ctrl-C, SIGTERM or SIGHUP ends the run.
+
+        Args:
+            task: the task; by default the robot's own. A robot that `planning.resume` returned resumes its kept run.
+            simulated: as for `run`; a resumed run keeps its kind of time.
+            speed: as for `run`.
+            until: as for `run`; a resumed run keeps its limit.
+            on_signal: with a store, `suspend` stops the components as at an end, and the run can be resumed; `end`
+                ends the run.
+            prepare: as for `run`.
+
+        Raises:
+            InputError: there is no task, or the goal or an argument does not fit the robot.
+            StoreError: the store cannot be read or written.
+            ChangedError: plots or domain differ from their versions at the start of the resumed run.
+        """
+        judgement, tally, started = self.judgement(task), Tally(), time.perf_counter()
+
+        def ready(sequencer: Sequencer) -> None:
+            sequencer.on_signal = on_signal
+            if self.simulation is not None and self.simulation.scene() is not None:
+                sequencer.trace.listen(SceneWriter(self.simulation, sequencer.trace))
+            if prepare is not None:
+                prepare(sequencer)
+
+        ignore = self.listen(tally)
+        try:
+            end = self._perform(judgement.task, ready, simulated=simulated, speed=speed, until=until)
+        except KeyboardInterrupt as interrupt:
+            suspended = self.store is not None and on_signal == "suspend"
+            end = RunEnd(finished=False, problem=_interrupted(*interrupt.args, suspended=suspended))
+        finally:
+            ignore()
+        name = "robot" if self.origin is None else self.origin.bundle.name
+        return judgement.report(name, end, tally, self.failures, time.perf_counter() - started)
+
+    def _perform(self, task: Task, prepare: Prepare, *, simulated: bool, speed: float, until: float | None) -> RunEnd:
+        if self.origin is not None and self.origin.resumes:
+            return self.resume(speed=speed, prepare=prepare)
+        header = {**self.header(), **({} if self.origin is None else self.origin.kept)}
+        if task.plot is not None:
+            return self.run(
+                task.plot, task.arguments, simulated=simulated, speed=speed, until=until, prepare=prepare, header=header
+            )
+        if task.goal is None:
+            raise InputError("a task is a plot or a goal: Task(plot=...) or Task(goal=...)")
+        return self.achieve(task.goal, simulated=simulated, speed=speed, until=until, prepare=prepare, header=header)
+
     def _taken_up(self) -> tuple[RunStore, Kept]:
         store = self._run_store({})
         if store is None:
@@ -314,7 +437,7 @@ class Executive:
         sequencer, planning = self._wired(clock, kept.last_record, store, open_ended=open_ended, until=until)
         if prepare is not None:
             prepare(sequencer)
-        return await _to_its_end(sequencer.resume(kept), planning, clock)
+        return await _to_its_end(sequencer.resume(kept), planning)
 
     def _wired(
         self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool, until: float | None
@@ -343,9 +466,11 @@ class Executive:
         return RunStore(self.knowledge, self.store, header, self.domain.statements())
 
     def close(self) -> None:
-        """Close the store, and terminate the processes of the default planners."""
+        """Close the store and the simulated world, and terminate the processes of the default planners."""
         if self.store is not None:
             self.knowledge.close()
+        if self.simulation is not None:
+            self.simulation.close()
         for planner in self._own_planners.values():
             planner.kill()
 
@@ -358,29 +483,19 @@ class Executive:
         return self._own_planners[clock.simulated]
 
     def __enter__(self) -> Self:
-        """Return the executive; the end of the `with` block calls `close`."""
+        """Return the robot; the end of the `with` block calls `close`."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close the executive, see `close`."""
+        """Close the robot, see `close`."""
         self.close()
 
 
-async def _to_its_end(
-    running: Coroutine[Any, Any, RunEnd[Outputs]], planning: PlanningComponent, clock: LoopClock
-) -> RunEnd[Outputs]:
-    with nullcontext() if clock.simulated else settled():
-        try:
-            return await running
-        finally:
-            await planning.over()
-
-
-@cache
-def achieve_plot() -> ActionPlot:
-    """Return the plot that plans for any goal; cached, because plots are immutable."""
-    resource = files("planning") / "plots" / "achieve.yaml"
-    return parse_plot(resource.read_text(encoding="utf-8"), str(resource))
+async def _to_its_end(running: Coroutine[Any, Any, RunEnd[Outputs]], planning: PlanningComponent) -> RunEnd[Outputs]:
+    try:
+        return await running
+    finally:
+        await planning.over()
 
 
 def _limit(until: float | None, *, bounded: bool) -> float | None:
@@ -401,37 +516,10 @@ def _budget(seconds: float, replans: int) -> Budget:
         raise InputError(wrong, found=str(first["input"])) from None
 
 
-_YOUNG = 10_000
-"""The least number of allocations between two collections of the youngest generation.
-
-The interpreter's default of 700 suits programs with few allocations. One new plan allocates 20,000 objects, most of
-them short-lived.
-"""
-
-_lock = threading.Lock()
-_thresholds: list[tuple[int, int, int]] = []
-"""The thresholds of the garbage collector before each run in progress."""
-
-
-@contextmanager
-def settled() -> Iterator[None]:
-    """Exclude the existing objects from garbage collection until the end of all runs in progress.
-
-    A collection of all objects takes a tenth of a second. New objects are also collected less often.
-    """
-    with _lock:
-        gc.freeze()
-        before = gc.get_threshold()
-        _thresholds.append(before)
-        if before[0]:  # 0 means that collection is disabled
-            gc.set_threshold(max(before[0], _YOUNG), *before[1:])
-    try:
-        yield
-    finally:
-        with _lock:
-            gc.set_threshold(*_thresholds.pop())
-            if not _thresholds:
-                gc.unfreeze()
+def _interrupted(name: str = "SIGINT", *, suspended: bool) -> str:
+    """Return how a run ended at the signal of that name."""
+    who = "the operator" if name == "SIGINT" else name
+    return f"{who} suspended the run, which can be resumed" if suspended else f"{who} ended the run"
 
 
 def failure_events(library: Library) -> frozenset[str]:

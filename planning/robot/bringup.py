@@ -1,0 +1,226 @@
+"""Bringup of robots: a bundle with its simulated world becomes a `Robot`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from dsc.components.assembly import require_instances
+from dsc.components.component import Component
+from dsc.components.hooks import contained
+from dsc.dynamic.knowledge_situation import ACHIEVE
+from dsc.dynamic.library import Library
+from dsc.profiles import adapted, configure
+from dsc.runs.archive import RunRow, archive, has_run, unfinished
+from dsc.text.profiles import Profile
+from dsc.trace import Listener
+from knowledge_base.errors import InputError, Place, StoreError
+from knowledge_base.facts import Delta
+from knowledge_base.journal.file import Durability
+from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.store import KnowledgeBase
+from knowledge_base.tracebacks import place_of, user_place
+from planning.engines.planner import Planner
+from planning.execution.achieve import achieve_plot
+from planning.problem.construction import check_goal
+from planning.robot.bundles import Bundle, components_of, gathered, plots_of
+from planning.robot.robot import Origin, Robot
+from planning.robot.simulation import Setup, Simulation
+from planning.robot.task import Task, own_task
+
+
+def deploy(
+    bundle: Bundle,
+    task: Task | None = None,
+    *,
+    seed: int | None = None,
+    faults: float | None = None,
+    scenario: object = None,
+    profile: Profile | None = None,
+    store: Path | None = None,
+    durability: Durability = "process",
+    planner: Planner | None = None,
+    listener: Listener | None = None,
+    target: str | None = None,
+) -> Robot:
+    """Return the robot of a bundle, with its simulated world; the caller must close it.
+
+    Args:
+        bundle: the robot.
+        task: the plot or goal to run; by default the bundle's own.
+        seed: the seed of the simulation's faults.
+        faults: the chance of a fault per skill call, in [0, 1].
+        scenario: the initial world of the simulation: a file, or a value that the simulation reads.
+        profile: the settings of the robot.
+        store: a file without a run, which then keeps the run.
+        durability: the events that the kept run survives, see `Robot`.
+        planner: the planner; by default the one of `Robot`.
+        listener: called with every record of the run.
+        target: the text that `dsc run --resume` uses to find the bundle again.
+
+    Raises:
+        InputError: the bundle has no task, or no simulation for an option. The task does not fit the bundle, a file
+            contains an error, or the store already contains a run.
+        StoreError: the store cannot be opened, or the world cannot be written.
+        ProgrammingError: the code of the simulation has failed; the message has file and line.
+    """
+    _require_simulated(bundle, seed=seed, faults=faults, scenario=scenario)
+    if store is not None and has_run(store):
+        raise InputError(f"'{store}' has a run already; resume it by --resume, or take another file")
+    setup = Setup(seed, faults, scenario, profile, store)
+    kept: dict[str, Any] = {} if target is None else {"target": target}
+    if profile is not None:
+        kept["settings"] = profile.model_dump(by_alias=True)
+    task = task or own_task(bundle)
+    if bundle.goal is not None and task.goal is None:
+        kept["goal"] = bundle.goal
+    return _deployed(bundle, setup, task, durability, planner, listener, kept)
+
+
+def resume(
+    bundle: Bundle,
+    store: Path,
+    *,
+    durability: Durability = "process",
+    planner: Planner | None = None,
+    listener: Listener | None = None,
+) -> Robot:
+    """Deploy a bundle to resume the run in a store; for the arguments see `deploy`.
+
+    Raises:
+        InputError: the simulation of the bundle does not last.
+        StoreError: the store or the world is missing or unreadable, or the run belongs to another robot.
+    """
+    run = kept_run(store)
+    if run.header.get("run") != bundle.name:
+        whose = "another program's, which resumes it: Robot.resume()"
+        if "run" in run.header:
+            whose = f"of the robot '{run.header['run']}', not of '{bundle.name}'"
+        message = f"the run of '{run.plot}' in this store is {whose}"
+        raise StoreError(message, place=Place(str(store)))
+    if bundle.simulation is not None and not bundle.simulation.lasts:
+        raise InputError(
+            f"the run cannot be resumed: the simulation of '{bundle.name}' ended with its program; a simulation that"
+            " lasts sets `lasts = True` and loads its world if `setup.resumes`"
+        )
+    said = run.header.get("settings")
+    profile = None if said is None else Profile.model_validate(said)
+    setup = Setup(run.header.get("seed"), run.header.get("faults"), None, profile, store, resumes=True)
+    task = Task(plot=run.plot, arguments=run.arguments)
+    if run.plot == ACHIEVE:
+        task = Task(goal=str(run.arguments["goal"]))
+    elif run.plot == bundle.main and not run.arguments:
+        task = Task(plot=bundle.main)
+    return _deployed(bundle, setup, task, durability, planner, listener, {})
+
+
+def kept_run(store: Path) -> RunRow:
+    """Return the unfinished run of a store.
+
+    Raises:
+        StoreError: the store is missing or unreadable, or has no unfinished run.
+    """
+    with archive(store) as runs:
+        return unfinished(runs)
+
+
+def _require_simulated(bundle: Bundle, **options: object) -> None:
+    """Raise `InputError` for an option that needs a simulation, if the bundle lacks it."""
+    given = [name for name, value in options.items() if value is not None]
+    if given and bundle.simulation is None:
+        options_text = ", ".join(f"--{name}" for name in given)
+        raise InputError(f"{options_text}: the robot '{bundle.name}' has no simulation (Bundle.simulation)")
+    if "scenario" in given and bundle.simulation is not None and not bundle.simulation.reads_scenarios:
+        raise InputError(f"--scenario: the simulation of '{bundle.name}' reads no scenarios (`reads_scenarios`)")
+
+
+def _deployed(
+    bundle: Bundle,
+    setup: Setup,
+    task: Task,
+    durability: Durability,
+    planner: Planner | None,
+    listener: Listener | None,
+    kept: Mapping[str, Any],
+) -> Robot:
+    simulation = simulated(bundle, setup)
+    try:
+        components = _components(bundle, simulation)
+        configure(components, setup.profile)
+        robot = Robot(
+            bundle.planning_domain, _library(bundle, setup.profile), components, None, planner,
+            foresight=bundle.foresight, store=setup.store, durability=durability, failures=bundle.failures,
+            origin=Origin(bundle, task, simulation, setup.profile, kept, setup.resumes),
+        )  # fmt: skip
+    except BaseException:
+        if simulation is not None:
+            simulation.close()
+        raise
+    try:
+        if simulation is not None and setup.store is not None and not setup.resumes:
+            with contained(f"{type(simulation).__name__}.begin", _MAY_RAISE):
+                simulation.begin()
+        begin(robot.knowledge, bundle, simulation, "deployment", key="deployment")
+        if task.goal is not None:
+            check_goal(parse_condition(task.goal, "goal"), robot.knowledge)
+    except BaseException:
+        robot.close()
+        raise
+    if listener is not None:
+        robot.listen(listener)
+    return robot
+
+
+def components_for(bundle: Bundle) -> tuple[Component, ...]:
+    """Return new components of a bundle, those of its simulation included, to read their declarations."""
+    return require_instances(_components(bundle, simulated(bundle, Setup())))
+
+
+def initial_knowledge(bundle: Bundle, simulation: Simulation | None) -> Delta:
+    """Return the initial knowledge of a bundle and its simulation; errors as for `deploy`."""
+    if simulation is None:
+        return bundle.knowledge
+    with contained(f"{type(simulation).__name__}.knowledge", _MAY_RAISE):
+        try:
+            return bundle.knowledge.then(simulation.knowledge())
+        except InputError as error:
+            error.place = error.place or user_place(error)
+            raise
+
+
+def begin(
+    knowledge: KnowledgeBase, bundle: Bundle, simulation: Simulation | None, author: str, key: str | None = None
+) -> None:
+    """Apply the initial knowledge of a bundle and its simulation; an error has the place of the simulation's method."""
+    delta = initial_knowledge(bundle, simulation)
+    try:
+        knowledge.apply(delta, author, key=key)
+    except InputError as error:
+        if simulation is not None:
+            error.place = error.place or place_of(type(simulation).knowledge)
+        raise
+
+
+def simulated(bundle: Bundle, setup: Setup) -> Simulation | None:
+    """Return the simulation of a bundle; raise `ProgrammingError` for an exception of its code."""
+    if bundle.simulation is None:
+        return None
+    with contained(bundle.simulation.__name__, _MAY_RAISE):
+        return bundle.simulation(setup)
+
+
+def _components(bundle: Bundle, simulation: Simulation | None) -> list[Component]:
+    with contained(f"the components of '{bundle.name}'", _MAY_RAISE):
+        found = [*components_of(gathered([bundle])), *(() if simulation is None else simulation.components())]
+    return [*require_instances(found)]
+
+
+_MAY_RAISE = (InputError, OSError)
+"""Exceptions of a simulation about its input: a scenario, a profile or a store."""
+
+
+def _library(bundle: Bundle, profile: Profile | None) -> Library:
+    if profile is None:
+        return bundle.library
+    return Library([*adapted(plots_of(gathered([bundle])), profile), achieve_plot()])
