@@ -8,7 +8,7 @@ BENCH  := .venv-bench
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: mistakes lively soak-robots soak-signals help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
+.PHONY: house mistakes lively soak-robots soak-signals help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
@@ -58,6 +58,10 @@ check: $(VENV)/.test   ## ruff, mypy strict, import contracts, prose
 	$(BIN)/mypy --config-file tests/mypy.toml tests
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/python tests/prose.py
+	$(BIN)/python tests/house.py
+
+house: $(VENV)/.test   ## sizes, imports, names and circles of the code, with their limits in tests/house.toml (NAMES=1 prints the names)
+	$(BIN)/python tests/house.py $(if $(NAMES),--names)
 
 conformance: $(VENV)/.test   ## the SCXML charts of SCION and of the W3C, fetched with npm into .conformance/, on this engine (WRITE=1 writes the docs)
 	$(BIN)/python tests/conformance/charts.py $(if $(WRITE),--write)

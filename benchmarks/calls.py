@@ -88,8 +88,8 @@ class Counter:
         """Start counting."""
         self.seconds = -time.perf_counter()
         if self._profiled:
-            threading.setprofile(self._hear)
-            sys.setprofile(self._hear)
+            threading.setprofile(self._receive)
+            sys.setprofile(self._receive)
 
     def stop(self) -> None:
         """Stop counting; calls of `stop` itself do not count."""
@@ -97,17 +97,17 @@ class Counter:
         threading.setprofile(None)
         self.seconds += time.perf_counter()
 
-    def _hear(self, frame: FrameType, kind: str, _: Any) -> None:
-        if kind != "call" or not self._is_ours(frame.f_code):
+    def _receive(self, frame: FrameType, kind: str, _: Any) -> None:
+        if kind != "call" or not self._is_covered(frame.f_code):
             return
         self.calls += 1
         self._files.add(frame.f_code.co_filename)
         caller = frame.f_back
-        while caller is not None and not self._is_ours(caller.f_code):  # through asyncio, pydantic, networkx
+        while caller is not None and not self._is_covered(caller.f_code):  # through asyncio, pydantic, networkx
             caller = caller.f_back
         self.hops += caller is not None and caller.f_code.co_filename != frame.f_code.co_filename
 
-    def _is_ours(self, code: CodeType) -> bool:
+    def _is_covered(self, code: CodeType) -> bool:
         known = self._ours.get(code)
         if known is None:
             known = self._ours[code] = code.co_filename.startswith((*ROOMS, "<")) and "frozen" not in code.co_filename

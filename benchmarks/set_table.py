@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from domains.clean_up_table import deployment
+from domains.clean_up_table import bringup
 from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.model.domain import PlanningDomain
 from planning.model.plan import PlanStep
 
-FILE = Path(deployment.HOME) / "domain.pddl"
+FILE = Path(bringup.HOME) / "domain.pddl"
 GOAL = parse_condition("(forall (?i - item) (tidy ?i))")
 TRIP = "throw-away"
 _PLACES = {

@@ -73,17 +73,17 @@ def says_all_is_clear(run: KeptRun) -> bool:
 
 def stands_still(run: KeptRun) -> Iterable[str]:
     """Yield skills that run on, or start, after the operator's stop."""
-    going_on: dict[str, str] = {}
+    improving: dict[str, str] = {}
     for step in run.steps:
         for record in step.records:
             if record.type == "action" and record.data["action"] == "start":
-                going_on[record.data["id"]] = record.data["skill"]
+                improving[record.data["id"]] = record.data["skill"]
             if record.type == "action" and record.data["action"] == "cancel":
-                going_on.pop(record.data["id"], None)
+                improving.pop(record.data["id"], None)
         if step.message.get("final"):
-            going_on.pop(step.message["action"], None)
+            improving.pop(step.message["action"], None)
         if step.configuration == STOPPED:
-            yield from (f"{skill} still runs at second {step.time:g}" for skill in going_on.values())
+            yield from (f"{skill} still runs at second {step.time:g}" for skill in improving.values())
 
 
 def ended_stopped(run: KeptRun) -> bool:

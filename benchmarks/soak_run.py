@@ -249,9 +249,9 @@ class ObeyedStop:
         def look(_: Step) -> None:
             if life is not self._life:
                 return  # another program has replaced this one
-            stands = sequencer.machine.state.configuration() == STOPPED
+            is_valid = sequencer.machine.state.configuration() == STOPPED
             world_of(table).catch_up()
-            if not stands:
+            if not is_valid:
                 self.judge(set(world_of(table).done))
                 self._done = None
             elif self._done is None:

@@ -97,7 +97,7 @@ def runs_watched(browsers: int | None, planner: Planner) -> Taken:
         with opened(str(page.port), page.token) as socket:
             socket.recv()  # its process has started
         stack.enter_context(watching(page, browsers))
-        return runs(planner, page.hear)
+        return runs(planner, page.receive)
 
 
 def runs(planner: Planner, listener: Listener | None) -> Taken:

@@ -156,7 +156,7 @@ async def _supervised(
         watchers.append(_later(stopping, lambda: post(leave_alone, None)))
 
     def leave_alone(_: None) -> None:
-        call.give_up(f"the {what} of action '{call.action_id}' went on for {stopping:g} s after it was told to stop")
+        call.abandon(f"the {what} of action '{call.action_id}' went on for {stopping:g} s after it was told to stop")
         ended.set_exception(DeadlineError())
 
     watchers: list[threading.Timer] = []
@@ -212,25 +212,25 @@ def _hold(call: SkillCall[Any]) -> AbstractContextManager[None]:
 
 def _in_child(body: Callable[..., Outcome], name: str, blocking: BlockingCall, arguments: Mapping[str, Any]) -> Outcome:
     context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
+    connection, theirs = context.Pipe()
     given = (theirs, body, name, blocking.action_id, blocking.seconds, dict(arguments))
     process = context.Process(target=_child, args=given, name=f"skill of {name}", daemon=True)
     process.start()
     theirs.close()
     try:
-        return _heard(ours, process, blocking)
+        return _outcome_from(connection, process, blocking)
     finally:
         _end(process)
-        ours.close()
+        connection.close()
 
 
-def _heard(ours: Connection, process: BaseProcess, blocking: BlockingCall) -> Outcome:
+def _outcome_from(connection: Connection, process: BaseProcess, blocking: BlockingCall) -> Outcome:
     """Pass the child's reports to `blocking.report` until the child ends; return the child's outcome."""
     while True:
-        while not ours.poll(_POLL):
+        while not connection.poll(_POLL):
             blocking.sleep()
         try:
-            kind, said = ours.recv()
+            kind, said = connection.recv()
         except EOFError:
             process.join(STOPPING)
             raise SkillError(f"its process ended with exit code {process.exitcode}") from None

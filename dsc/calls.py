@@ -65,7 +65,7 @@ class SkillCall(Generic[Reported_contra]):
         clock: the only clock that a skill may use.
         report: posts an intermediate event while the skill continues (e.g. progress, a perception).
         deadline: second of run time at which the skill is cancelled.
-        give_up: reports, as text, that a part of the skill continues and cannot be stopped.
+        abandon: reports, as text, that a part of the skill continues and cannot be stopped.
         rank: the rank of the skill among those that wait for its component.
         waits: reports, as text, the skill of another program for which the component lets this skill wait; empty when
             the wait ends.
@@ -79,7 +79,7 @@ class SkillCall(Generic[Reported_contra]):
     clock: Clock
     report: Callable[[Reported_contra], None]
     deadline: float = math.inf
-    give_up: Callable[[str], None] = lambda _: None
+    abandon: Callable[[str], None] = lambda _: None
     rank: Rank = ORDINARY
     waits: Callable[[str], None] = lambda _: None
 
@@ -113,7 +113,7 @@ MOST_WAITING = 5_000
 
 A report needs about 750 bytes, and a run handles about 10,000 reports in a second.
 """
-_AT_ONCE = 250
+_MOST_PENDING = 250
 """Number of observed changes that are merged together; the duration of each merge grows with the size of the change."""
 
 
@@ -147,7 +147,7 @@ class Reports:
         self._aside[report.event] = report.attributes, conflated + 1
         if report.observed:
             self._observed.append(report.observed)
-            if len(self._observed) > _AT_ONCE:
+            if len(self._observed) > _MOST_PENDING:
                 self._observed = [_as_one(self._observed)]
 
     def taken(self) -> None:

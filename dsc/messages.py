@@ -19,7 +19,7 @@ class SkillMessage:
         start: the start of the skill.
         outcome: the skill's event with its attributes, and the observed facts.
         final: whether this message ends the skill.
-        goes_on: whether the skill still executes although it counts as ended; the sequencer then cancels the skill.
+        continues: whether the skill still executes although it counts as ended; the sequencer then cancels the skill.
         conflated: number of older reports of an equal event that this message replaces, see `dsc.calls`.
         declared: the declared types of the outcome's attributes; `None` if there are no types to validate.
         activated: whether the message is a component event, which the state has activated, see `Event.inside`.
@@ -28,7 +28,7 @@ class SkillMessage:
     start: Start
     outcome: Outcome
     final: bool
-    goes_on: bool = False
+    continues: bool = False
     conflated: int = 0
     declared: Mapping[str, str | None] | None = None
     activated: bool = False

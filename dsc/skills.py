@@ -86,7 +86,7 @@ class SkillSignature:
     place: str = ""
 
 
-CarryOut = Callable[[Any, SkillBody, SkillCall[Any], Mapping[str, Any]], Awaitable[Outcome]]
+Execution = Callable[[Any, SkillBody, SkillCall[Any], Mapping[str, Any]], Awaitable[Outcome]]
 """Function that executes a decorated body; receives the component, the bound body, the call and the arguments."""
 
 
@@ -97,7 +97,7 @@ class Declared:
     Attributes:
         types: types of parameters by name; `None` accepts any value.
         outcomes: as in `SkillSignature`.
-        carry_out: executes a call with the body.
+        execute: executes a call with the body.
         own: number of leading parameters of the body that charts do not set.
         pattern: see `Pattern`.
         after_crash: see `AfterCrash`.
@@ -106,7 +106,7 @@ class Declared:
 
     types: Mapping[str, str | None]
     outcomes: Mapping[str, Mapping[str, str | None]]
-    carry_out: CarryOut
+    execute: Execution
     own: int = 2
     pattern: Pattern = "skill"
     after_crash: AfterCrash = "sense"
@@ -188,7 +188,7 @@ def skill(
     """
     if body is not None:
         require_function(body, "skill")
-    if blocking not in _CARRIED_OUT:
+    if blocking not in _EXECUTIONS:
         message = f"a skill blocks in a thread or a process, not {shown(blocking)}"
         raise InputError(message, found=str(blocking), valid=("thread", "process"))
 
@@ -200,7 +200,7 @@ def skill(
             outcomes |= _reported(body, own, names)
         with refused_at(body):
             types |= parameter_types(body, own, names)
-        return Declared(types, outcomes, _CARRIED_OUT[blocking], after_crash=after_crash, unlimited=unlimited)(body)
+        return Declared(types, outcomes, _EXECUTIONS[blocking], after_crash=after_crash, unlimited=unlimited)(body)
 
     return declare if body is None else declare(body)
 
@@ -250,7 +250,7 @@ async def _in_process(component: Any, body: SkillBody, call: SkillCall[Any], arg
     return await in_process(body, component.name, call, arguments)
 
 
-_CARRIED_OUT: Mapping[str | None, CarryOut] = {None: _awaited, "thread": _in_thread, "process": _in_process}
+_EXECUTIONS: Mapping[str | None, Execution] = {None: _awaited, "thread": _in_thread, "process": _in_process}
 
 
 @cache
@@ -324,9 +324,9 @@ def _require_form(named: str, body: SkillBody, declared: Declared) -> None:
         wanted = "self, call" if "." in named else "call"
         raise SchemaError(f"skill '{named}' has no parameter for its call: write ({wanted}, ...), not ({given})")
     coroutine = inspect.iscoroutinefunction(inspect.unwrap(body))
-    if declared.carry_out is _awaited and not coroutine:
+    if declared.execute is _awaited and not coroutine:
         raise SchemaError(f"skill '{named}' is not a coroutine: write `async def`, or declare it `blocking`")
-    if declared.carry_out in {_in_thread, _in_process} and coroutine:
+    if declared.execute in {_in_thread, _in_process} and coroutine:
         raise SchemaError(f"skill '{named}' is a coroutine, and a blocking skill is a plain function: write `def`")
     names = [one.name for one in parameters[own:]]
     for name in declared.types:

@@ -121,8 +121,10 @@ def test_nobody_waits_for_ever_for_a_guest():
 
 
 def test_serving_does_not_care_how_mixing_ends_well():
-    stand_in = ends_with(MIX, after=5)  # no arm pours anything here
-    run = rehearse(LIBRARY.substitute("mix", stand_in), "serve", ORDER, knowledge=bar(), skills={"arm.hand": "taken"})
+    substituted = ends_with(MIX, after=5)  # no arm pours anything here
+    run = rehearse(
+        LIBRARY.substitute("mix", substituted), "serve", ORDER, knowledge=bar(), skills={"arm.hand": "taken"}
+    )
     assert [call.skill for call in run.calls] == ["arm.hand"]
     assert told(run, "(has ann mojito)")
     coverage.add(*run.steps)  # counts for `serve`; what stood in for `mix` does not count for `mix`

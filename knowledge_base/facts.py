@@ -90,12 +90,14 @@ class Delta:
         If `later` removes an object, the result omits the replacements of this change that contain that object.
         """
         undone, gone = set(later.removed), set(later.removed_nodes)
-        anew = {(r.predicate, r.args[:-1]) for r in later.replaced}
+        reassigned = {(r.predicate, r.args[:-1]) for r in later.replaced}
         added = [
             a for a in self.added
-            if a not in undone and gone.isdisjoint(a.args) and (a.predicate, a.args[:-1]) not in anew
+            if a not in undone and gone.isdisjoint(a.args) and (a.predicate, a.args[:-1]) not in reassigned
         ]  # fmt: skip
-        replaced = [r for r in self.replaced if gone.isdisjoint(r.args) and (r.predicate, r.args[:-1]) not in anew]
+        replaced = [
+            r for r in self.replaced if gone.isdisjoint(r.args) and (r.predicate, r.args[:-1]) not in reassigned
+        ]
         redone = {*later.added, *later.replaced}
         removed = [r for r in self.removed if r not in redone] + [r for r in later.removed if r not in later.added]
         return Delta(

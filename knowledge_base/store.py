@@ -353,7 +353,7 @@ class KnowledgeBase(View):
         with self._lock:
             self._require_open()
             made = Watch(pattern, {} if params is None else params, self.schema, self._version, limit)
-            made.follow(self.subscribe(made.hear))
+            made.follow(self.subscribe(made.receive))
             self._watches.add(made)
             return made
 

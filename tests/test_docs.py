@@ -206,7 +206,7 @@ def test_the_first_robot_is_made_as_its_page_says(tmp_path):
     files = re.findall(r"^`((?:coffee|tests)/\S+)`[^\n]*:\n\n```\w+\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)
     for name, text in files:
         (home / name).write_text(text)
-    assert len(files) == 13
+    assert len(files) == 14
     for block in blocks(ROOT / "docs" / "first-robot.md", "console")[1:]:
         for shown in block.split("$ dsc ")[1:]:
             command, _, expected = shown.partition("\n")

@@ -30,6 +30,12 @@ def test_a_plot_and_a_world_are_pictures():
         assert name in [text.text for text in picture.iter("{http://www.w3.org/2000/svg}text")]
 
 
+def test_the_end_of_a_run_is_a_table_of_its_outputs():
+    html = RunEnd(finished=True, outputs={"where": "shelf"})._repr_html_()
+    assert cells(html) == ["where", "shelf"]
+    assert [heading in html for heading in ("reached", "output", "value")] == [True] * 3
+
+
 def test_a_plan_is_a_table_of_its_steps():
     steps = (PlanStep("take", ("a<b",)), PlanStep("put"))
     assert cells(Plan(steps)._repr_html_()) == ["1", "(take a<b)", "2", "(put)"]

@@ -80,7 +80,7 @@ def heard_of(*pushes):
     async def main():
         transport, said = LocalTransport(), []
         there = Endpoint("b", transport)
-        there.hear("n", lambda _, body: said.append(body))
+        there.receive("n", lambda _, body: said.append(body))
         for life, number, body in pushes:
             frame = {"what": "push", "kind": "n", "n": number, "low": number, "life": life, "body": body}
             transport.deliver("a", "b", encoded(frame))
@@ -222,7 +222,7 @@ def an_end_is_forgotten_only_when_it_is_kept(folder):
 # -- each of them planted --------------------------------------------------------------------------------
 
 SETTLED = """
-    if isinstance(message, SkillMessage) and message.final and not message.goes_on:
+    if isinstance(message, SkillMessage) and message.final and not message.continues:
         self.dispatcher.settle(message.start)
     if self.store is None:"""
 BUGS = {
@@ -233,9 +233,9 @@ BUGS = {
     "the newest key is forgotten": (
         MemoryHistory, "_remember", "next(iter(self._keys))", "key", exactly_the_last_keys_are_remembered),
     "a push is heard as often as it comes": (
-        Endpoint, "_heard", 'number > peer.newest', 'number >= peer.newest', a_push_is_heard_once),
+        Endpoint, "_received", 'number > peer.newest', 'number >= peer.newest', a_push_is_heard_once),
     "a push of an earlier life is heard": (
-        Endpoint, "_heard", 'and self._lives.get(sender) == said["life"] and', "and", a_push_of_an_earlier_life_is_not_heard),
+        Endpoint, "_received", 'and self._lives.get(sender) == said["life"] and', "and", a_push_of_an_earlier_life_is_not_heard),
     "an action is unknown while it is being stopped": (
         HostedActions, "_stop", "if action is not None", "self._actions.pop(_key(said), None)\n    if action is not None",
         stopping_is_over_when_things_are_in_order),

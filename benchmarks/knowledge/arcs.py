@@ -10,7 +10,7 @@ Arc = tuple[str, str, str]
 
 KINDS = ("on", "in", "near", "made", "opens")
 HALL, DOOR = "hall", "door"
-AT_ONCE = 1000
+PARALLEL_ENGINES = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,8 @@ class Arcs:
         """Yield batches of objects and arcs; the objects of an arc come before or with it."""
         fixed = [HALL, DOOR, *(f"p{n}" for n in range(self.places)), *(f"m{n}" for n in range(50))]
         yield fixed, [("opens", DOOR, HALL)]
-        for first in range(0, self.size, AT_ONCE):
-            numbers = range(first, min(first + AT_ONCE, self.size))
+        for first in range(0, self.size, PARALLEL_ENGINES):
+            numbers = range(first, min(first + PARALLEL_ENGINES, self.size))
             yield [f"i{n}" for n in numbers], [arc for n in numbers for arc in self.about(n)]
 
     def about(self, n: int) -> list[Arc]:

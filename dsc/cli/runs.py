@@ -60,14 +60,14 @@ def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
         row = runs.run(run)
         steps = list(runs.steps(row.number))
         summary = _summary(runs, row) | {"header": row.header, "arguments": row.arguments}
-        under_way = _open(runs, row)
+        running_actions = _open(runs, row)
     if as_json:
-        print_line(summary | {"under_way": under_way, "macrosteps": [_step_form(step) for step in steps]})
+        print_line(summary | {"under_way": running_actions, "macrosteps": [_step_form(step) for step in steps]})
         return
     for step in steps:
         typer.echo(f"{step.time:8.1f} s {step.number:5}  {_taken(step)}: {', '.join(_innermost(step.configuration))}")
     typer.echo(f"{row.plot}: {summary['state']}")
-    for one in under_way:
+    for one in running_actions:
         typer.echo(f"  under way since {one['since']:.1f} s: {one['skill']} ({one['id']})")
 
 
@@ -170,7 +170,7 @@ def _state(run: RunRow) -> str:
 def _open(runs: RunArchive, run: RunRow) -> list[dict[str, Any]]:
     return [] if run.ended is not None else [
         {"id": start.action_id, "skill": f"{start.component}.{start.skill}", "since": since}
-        for start, since in runs.under_way()
+        for start, since in runs.running_actions()
     ]  # fmt: skip
 
 

@@ -70,7 +70,7 @@ def tree_skill(
     for end in (success, failure):
         _require_bare(end, outcomes)
 
-    async def carry_out(_: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
+    async def execute(_: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         _observe.set(call.observe)
         root: Behaviour = body(call, **arguments)
         try:
@@ -84,7 +84,7 @@ def tree_skill(
         return Outcome(success if succeeded else failure)
 
     declared = {name: dict(one) for name, one in outcomes.items()}
-    return Declared(dict(types or {}), declared, carry_out, after_crash=after_crash)
+    return Declared(dict(types or {}), declared, execute, after_crash=after_crash)
 
 
 def _require_bare(end: str, outcomes: Mapping[str, Mapping[str, str | None]]) -> None:
@@ -154,9 +154,9 @@ class _Action(Behaviour):
         self.stopping: list[asyncio.Future[Outcome]] = []
 
     def initialise(self) -> None:
-        self._task = asyncio.ensure_future(self._carry_out())
+        self._task = asyncio.ensure_future(self._execute())
 
-    async def _carry_out(self) -> Outcome:
+    async def _execute(self) -> Outcome:
         with contained():
             outcome = await self._begin()
         if not isinstance(outcome, Outcome):

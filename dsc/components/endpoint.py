@@ -26,11 +26,11 @@ from knowledge_base.errors import InputError, described, text_of
 
 Answers = Callable[[str, Any], Awaitable[Any]]
 """Function that answers a call; receives the sender's address and the body."""
-Hears = Callable[[str, Any], None]
+FrameReceiver = Callable[[str, Any], None]
 """Function that handles a push; receives the sender's address and the body."""
 Receive = Callable[[str, bytes], None]
 """Function that handles a frame; receives the sender's address and the frame."""
-EVERYBODY = "*"
+BROADCAST = "*"
 """The address of all attached endpoints except the sender."""
 WITHIN = 5.0
 """Default bound of the silence during a call, in seconds."""
@@ -72,7 +72,7 @@ class Transport(Protocol):
         ...
 
     def send(self, sender: str, to: str, frame: bytes) -> None:
-        """Send a frame to an address, or to `EVERYBODY`. The frame may be lost, duplicated, delayed, or overtaken."""
+        """Send a frame to an address, or to `BROADCAST`. The frame may be lost, duplicated, delayed, or overtaken."""
         ...
 
 
@@ -99,7 +99,7 @@ class LocalTransport:
 
     def deliver(self, sender: str, to: str, frame: bytes) -> None:
         """Pass a frame to its receivers immediately."""
-        others = [address for address in self._attached if address != sender] if to == EVERYBODY else [to]
+        others = [address for address in self._attached if address != sender] if to == BROADCAST else [to]
         for address in others:
             receive = self._attached.get(address)  # an earlier receiver may have detached the address
             if receive is not None:
@@ -116,10 +116,10 @@ def encoded(value: Any) -> bytes:
 
 @dataclass(slots=True)
 class _Call:
-    """A call that waits for its answer; `heard` is the loop time of the last frame about it, or of its start."""
+    """A call that waits for its answer; `last_frame` is the loop time of the last frame about it, or of its start."""
 
     answer: asyncio.Future[Any]
-    heard: float
+    last_frame: float
 
 
 @dataclass(slots=True)
@@ -158,7 +158,7 @@ class Endpoint:
         self._transport = transport
         self.life = life or secrets.token_hex(6)
         self._answering: dict[str, Answers] = {}
-        self._hearing: dict[str, Hears] = {}
+        self._hearing: dict[str, FrameReceiver] = {}
         self._asked: dict[int, _Call] = {}
         self._peers: dict[tuple[str, str], _Peer] = {}  # by address and life
         self._lives: dict[str, str] = {}  # the present life of each address
@@ -171,9 +171,9 @@ class Endpoint:
         """Answer calls of that kind with `answers`; a repeated call is executed only one time."""
         self._answering[kind] = answers
 
-    def hear(self, kind: str, hears: Hears) -> None:
-        """Pass pushes of that kind to `hears`, except those older than the sender's newest push."""
-        self._hearing[kind] = hears
+    def receive(self, kind: str, receiver: FrameReceiver) -> None:
+        """Pass pushes of that kind to `receiver`, except those older than the sender's newest push."""
+        self._hearing[kind] = receiver
 
     def deafen(self, kind: str) -> None:
         """Stop handling pushes of that kind."""
@@ -195,7 +195,7 @@ class Endpoint:
         call = self._asked[number] = _Call(loop.create_future(), loop.time())
         try:
             while not call.answer.done():
-                left = call.heard + within - loop.time()
+                left = call.last_frame + within - loop.time()
                 if left <= RESOLUTION:
                     raise NoAnswerError(f"'{to}' has not answered '{kind}' within {within:g} s")
                 self._send(to, "call", kind, number, body)
@@ -210,8 +210,8 @@ class Endpoint:
         self._send(to, "push", kind, self._last, body)
 
     def broadcast(self, kind: str, body: Any) -> None:
-        """Send a push to `EVERYBODY`."""
-        self.push(EVERYBODY, kind, body)
+        """Send a push to `BROADCAST`."""
+        self.push(BROADCAST, kind, body)
 
     async def close(self) -> None:
         """Detach from the address, and cancel running calls."""
@@ -241,7 +241,7 @@ class Endpoint:
         elif said["what"] == "call":
             self._called(sender, peer, said)
         else:
-            self._heard(sender, peer, said)
+            self._received(sender, peer, said)
 
     def _peer(self, sender: str, life: str) -> _Peer | None:
         """Return the peer that sent a frame; `None` if the peer is new and the endpoint remembers too many."""
@@ -263,7 +263,7 @@ class Endpoint:
                 if self._lives.get(address) == life:
                     del self._lives[address]
 
-    def _heard(self, sender: str, peer: _Peer, said: Mapping[str, Any]) -> None:
+    def _received(self, sender: str, peer: _Peer, said: Mapping[str, Any]) -> None:
         kind, number = said["kind"], said["n"]
         if kind in self._hearing and self._lives.get(sender) == said["life"] and number > peer.newest.get(kind, 0):
             peer.newest[kind] = number
@@ -277,7 +277,7 @@ class Endpoint:
         call = self._asked.get(said["n"])
         if call is None or call.answer.done():
             return
-        call.heard, waiting = asyncio.get_running_loop().time(), call.answer
+        call.last_frame, waiting = asyncio.get_running_loop().time(), call.answer
         if said["what"] == "running":
             return
         if said["what"] == "answer":

@@ -46,7 +46,7 @@ class Heartbeat:
         self._activators: dict[str, float] = {}  # by name, the loop time of the last heartbeat
         self._stirred = asyncio.Event()
         self.active = False
-        endpoint.hear("heartbeat", self._heard)
+        endpoint.receive("heartbeat", self._received)
 
     @property
     def activators(self) -> frozenset[str]:
@@ -89,9 +89,9 @@ class Heartbeat:
 
     def need(self, sender: str) -> None:
         """Add an active component that needs this one, without waiting for its heartbeat."""
-        self._heard(sender, {"needs": [self._endpoint.address]})
+        self._received(sender, {"needs": [self._endpoint.address]})
 
-    def _heard(self, sender: str, said: Any) -> None:
+    def _received(self, sender: str, said: Any) -> None:
         needed = self._endpoint.address in said["needs"]
         before = self._activators.pop(sender, None)
         if needed:

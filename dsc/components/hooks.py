@@ -29,7 +29,7 @@ from knowledge_base.tracebacks import is_users_code, raised_at, waits_at, whole_
 
 _LOG = logging.getLogger(__package__)
 Classes = tuple[type[BaseException], ...]
-component_at_work: ContextVar[str | None] = ContextVar("component_at_work", default=None)
+active_component: ContextVar[str | None] = ContextVar("component_at_work", default=None)
 """Name of the component whose skill or hook the present task executes; the task's callbacks inherit it."""
 _found: ContextVar[list[str] | None] = ContextVar("found", default=None)
 _NEVER_AWAITED = "coroutine .* was never awaited"
@@ -236,18 +236,18 @@ GRACE = 30.0
 """Seconds of loop time for a cancelled task to clean up."""
 
 
-def give_up_after(task: asyncio.Task[Any], seconds: float, say: Callable[[], None]) -> None:
+def abandon_after(task: asyncio.Task[Any], seconds: float, say: Callable[[], None]) -> None:
     """Abandon the task if it has not ended after `seconds` of loop time, and call `say`."""
 
     def overdue() -> None:
-        give_up(task)
+        abandon(task)
         say()
 
     handle = asyncio.get_running_loop().call_later(seconds, overdue)
     task.add_done_callback(lambda _: handle.cancel())
 
 
-def give_up(task: asyncio.Task[Any]) -> None:
+def abandon(task: asyncio.Task[Any]) -> None:
     """Abandon a task, so that the loop does not wait for the task when the loop closes.
 
     Asyncio waits without end for a task that ignores its cancellation. Its documentation permits this function's calls
@@ -257,7 +257,7 @@ def give_up(task: asyncio.Task[Any]) -> None:
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(task.get_coro()))
     task._log_destroy_pending = False  # type: ignore[attr-defined]  # noqa: SLF001  # the task is known to be pending
     asyncio.tasks._unregister_task(task)  # noqa: SLF001  # documented under "Extending"
-    _given_up.add(task)
+    _abandoned.add(task)
 
 
 def cancel_once(task: asyncio.Task[Any]) -> None:
@@ -268,7 +268,7 @@ def cancel_once(task: asyncio.Task[Any]) -> None:
 
 def can_end(task: asyncio.Task[Any]) -> bool:
     """Return whether the end of a task can be awaited: it is neither done nor abandoned, and its loop is open."""
-    return not (task.done() or task in _given_up or task.get_loop().is_closed())
+    return not (task.done() or task in _abandoned or task.get_loop().is_closed())
 
 
-_given_up: WeakSet[asyncio.Task[Any]] = WeakSet()
+_abandoned: WeakSet[asyncio.Task[Any]] = WeakSet()

@@ -18,7 +18,7 @@ from dsc.calls import OBSERVED, Clock, Reports, SkillCall
 from dsc.components.component import Component
 from dsc.components.endpoint import Endpoint, Transport, encoded
 from dsc.components.heartbeat import Heartbeat
-from dsc.components.hooks import GRACE, cancel_once, contained, give_up, reason_of
+from dsc.components.hooks import GRACE, abandon, cancel_once, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.parameters import Configuration
 from dsc.components.publication import HostedStreams, Publisher
@@ -63,7 +63,7 @@ class Host:
         self._answer("take", "take", lambda said: component.receive(said["port"], said["message"]))
         self._answer("diagnose", "diagnose", lambda _: component.diagnose())
         self._is_active = asyncio.Event()
-        self._heart = Heartbeat(self.endpoint, self._needed, self._activated, busy=self._actions.any_at_work)
+        self._heart = Heartbeat(self.endpoint, self._needed, self._activated, busy=self._actions.is_any_active)
         self._beating = asyncio.get_running_loop().create_task(self._heart.run())
         self._changed()
         component.life.listen(self._changed)
@@ -227,7 +227,7 @@ class HostedActions:
         self._endpoint = endpoint
         self._clock = clock
         self._actions: dict[tuple[str, str], _Action] = {}
-        self._at_work: set[asyncio.Task[Any]] = set()
+        self._active: set[asyncio.Task[Any]] = set()
         endpoint.answer("start", self._start)
         endpoint.answer("how", self._how)
         endpoint.answer("stop", self._stop)
@@ -236,9 +236,9 @@ class HostedActions:
         """Return the tasks of all actions that were not forgotten."""
         return [action.task for action in self._actions.values() if action.task is not None]
 
-    def any_at_work(self) -> bool:
+    def is_any_active(self) -> bool:
         """Return whether the component executes an action; it then stays active, also without its client."""
-        return bool(self._at_work)
+        return bool(self._active)
 
     async def close(self) -> None:
         """Cancel all actions, and wait for their clean-up, for `GRACE` seconds at most."""
@@ -248,14 +248,14 @@ class HostedActions:
         if running:
             _, others = await asyncio.wait(running, timeout=GRACE)
             for task in others:
-                give_up(task)
+                abandon(task)
 
     def cancel(self) -> None:
         """Cancel the skills that the component executes, since the component is no longer alive."""
         life = self._component.life
         lost = {"bug": str(life.bug)} if life.bug is not None else {"failed": reason_of(NotAliveError(life.describe()))}
         for action in self._actions.values():
-            if action.task in self._at_work:
+            if action.task in self._active:
                 action.lost = lost
                 cancel_once(action.task)
 
@@ -311,11 +311,11 @@ class HostedActions:
         assert task is not None  # noqa: S101  # an action is a task
         await self._component.life.ensure_alive()
         with self._component.life.executing(task):
-            self._at_work.add(task)
+            self._active.add(task)
             try:
                 yield
             finally:
-                self._at_work.discard(task)
+                self._active.discard(task)
 
     def _turn(self, said: Mapping[str, Any], action: _Action, rank: Rank) -> AbstractAsyncContextManager[None]:
         """Return the turn of the component for a skill; a concurrent component needs none."""

@@ -18,8 +18,8 @@ from typing import Any, ClassVar, Protocol
 from dsc.components.hooks import (
     GRACE,
     Classes,
+    active_component,
     can_end,
-    component_at_work,
     contained,
     executes,
     reason_of,
@@ -393,7 +393,7 @@ class LifeCycle(Announcer):
                 self.fail(error)
 
     def _contained(self, hook: str) -> contained:
-        component_at_work.set(self._hooks.name)
+        active_component.set(self._hooks.name)
         self._hook = hook
         return contained(f"{self._hooks.name}.{hook}", self._hooks.device_errors)
 

@@ -108,7 +108,7 @@ class Subscription:
         self._port = port
         self._numbers: dict[str, int] = {}  # the newest number of each instance of the publisher, the present one last
         self._at = -math.inf
-        endpoint.hear(_kind(publisher, port), self._pushed)
+        endpoint.receive(_kind(publisher, port), self._pushed)
 
     @property
     def age(self) -> float:

@@ -240,7 +240,7 @@ class RemoteComponent(Component):
             NoAnswerError: the host does not answer.
         """
         news = asyncio.Event()
-        self._endpoint.hear(f"news {call.action_id}", lambda _, __: news.set())
+        self._endpoint.receive(f"news {call.action_id}", lambda _, __: news.set())
         seconds = call.remaining if call.remaining < float("inf") else None
         try:
             said: dict[str, Any] = {

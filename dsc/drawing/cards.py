@@ -150,7 +150,7 @@ def diamond(name: str, connector: Connector) -> Box:
     return Box(BoxKind.CHOICE, name, 0, 0, width, height, texts, title=title)
 
 
-def name_beside(final: Box) -> Box:
+def name_next_to(final: Box) -> Box:
     """Return a final state's box with its texts right of the bullseye, for edges that arrive from the left."""
     height = max(FINAL_SIZE, LINE_HEIGHT * len(final.texts))
     top = (height - LINE_HEIGHT * len(final.texts)) / 2

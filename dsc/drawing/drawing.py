@@ -113,7 +113,7 @@ class _Builder:
             return self._hull(BoxKind.COMPOSITE, name, state, self.scope(state, here))
         if isinstance(state, OrthogonalState):
             regions = [self._region(key, one, (*here, "regions", key)) for key, one in state.regions.items()]
-            inside = _below([history_card(*one) for one in state.connectors.items()], _side_by_side(regions))
+            inside = _below([history_card(*one) for one in state.connectors.items()], _in_row(regions))
             hull = self._hull(BoxKind.ORTHOGONAL, name, state, inside)
             joins = [join(hull, each, one.target) for each, one in state.connectors.items() if way_to(hull, one.target)]
             return replace(hull, edges=tuple(joins))
@@ -144,7 +144,7 @@ class _Builder:
         return replace(hull, name=name, x=0, y=0, width=width, height=height, texts=(title,))
 
 
-def _side_by_side(regions: list[Box]) -> Box:
+def _in_row(regions: list[Box]) -> Box:
     """Return the regions in a row or in a column, so that the result is closer to a square; no region leaves a gap."""
     widths, heights = [one.width for one in regions], [one.height for one in regions]
     in_row = max(sum(widths), *heights) <= max(*widths, sum(heights))

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from dsc.drawing.captions import Caption, Labelled, captions, labelled_by_value
-from dsc.drawing.cards import name_below, name_beside
+from dsc.drawing.cards import name_below, name_next_to
 from dsc.drawing.crossing import prolonged
 from dsc.drawing.layered.arrange import arrange
 from dsc.drawing.layered.graph import LayerLink, LayerNode, Route
@@ -114,7 +114,7 @@ def _link(source: int, target: int, span: ScopeSpan) -> LayerLink:
 
 def _written_aside(box: Box) -> Box:
     """Return a box whose texts do not cover horizontal edges; only final states and histories change."""
-    return name_beside(box) if box.kind is BoxKind.FINAL else name_below(box) if box.kind is BoxKind.HISTORY else box
+    return name_next_to(box) if box.kind is BoxKind.FINAL else name_below(box) if box.kind is BoxKind.HISTORY else box
 
 
 def _node(box: Box, own: Sequence[ScopeSpan], *, sideways: bool) -> LayerNode:

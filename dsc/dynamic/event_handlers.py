@@ -26,7 +26,7 @@ from knowledge_base.language.syntax.expression import Variable
 
 States = dict[str, AnyState]
 _EVENT = "event."
-BESIDE = "active"
+ACTIVE = "active"
 """Name of the orthogonal state that contains the plot and its handlers; a number follows if the name is in use."""
 
 
@@ -90,7 +90,7 @@ class _Handling:
                     more[waiting] = State(about=handler.label)
                     leading[then] = Transition(target=waiting, do=(Emit(emit=self._leaving(then)),))
             more[handled] = self._handled(handler, entrances.get(name, name), leading)
-            heard = self._heard(handler.on)
+            heard = self._received(handler.on)
             on[heard] = (*on.get(heard, ()), _way(handler, handled))
         return {name: state.model_copy(update={"on": on}), **more}
 
@@ -129,7 +129,7 @@ class _Handling:
             on[event] = (_passed_on(heard, frozenset().union(*mentioned)),)
         entry = tuple([handler.listen for handler in handlers if handler.listen is not None])
         around = OrthogonalState(regions=regions, entry=entry, on=on)
-        return plot.model_copy(update={"states": {self._added.state(BESIDE): around, **over}, "initial": None})
+        return plot.model_copy(update={"states": {self._added.state(ACTIVE): around, **over}, "initial": None})
 
     def _awaiting(self, event: str, handlers: list[Handler]) -> States:
         awaited = self._added.state(f"{event}_awaited")
@@ -144,9 +144,9 @@ class _Handling:
                 }
                 more[handled] = self._handled(handler, awaited, leading)
             ways.append(_way(handler, handled))
-        return {awaited: State(on={self._heard(event): tuple(ways)}), **more}
+        return {awaited: State(on={self._received(event): tuple(ways)}), **more}
 
-    def _heard(self, event: str) -> str:
+    def _received(self, event: str) -> str:
         return self._listening.get(event, event)
 
     def _handled(self, handler: Handler, back: str, leading: Mapping[str, Transition]) -> AnyState:

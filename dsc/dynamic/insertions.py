@@ -109,7 +109,7 @@ class Insertions:
                 return {"target": self.entrances[target]}
             kept: dict[str, Term] = {}
             passed = self._responses.remembered(way.passed, target, kept)
-            return _handing_over(way, self._in_front_of(target, passed, more), kept)
+            return _passing(way, self._in_front_of(target, passed, more), kept)
 
         return redirect
 
@@ -121,7 +121,7 @@ class Insertions:
         kept: dict[str, Term] = {}
         last = Transition(target=way.target, passed=self._responses.remembered(way.passed, mark, kept))
         first = self._chain(mark, name, state, rules, by_default, last, states)
-        return way.model_copy(update=_handing_over(way, str(first.target), kept))
+        return way.model_copy(update=_passing(way, str(first.target), kept))
 
     def _chain(
         self, mark: str, name: str, state: Step, rules: list[tuple[int, Rule]], by_default: str, last: Transition,
@@ -135,7 +135,7 @@ class Insertions:
             onward = partial(self._onward, number=number, name=name, state=state, default=default)
             connector = self._added.state(key)
             made: States = {}
-            branches = self._responses.carried_out(rule, name, key, onward, made)
+            branches = self._responses.execute(rule, name, key, onward, made)
             if branches[-1].guard is not None:
                 branches.append(following)
             states[connector] = ChoiceState(choice=tuple(branches))
@@ -162,7 +162,7 @@ class Insertions:
         return onward
 
 
-def _handing_over(way: Transition, target: str, kept: Mapping[str, Term]) -> dict[str, object]:
+def _passing(way: Transition, target: str, kept: Mapping[str, Term]) -> dict[str, object]:
     """Return the new fields of a transition to another target; it assigns its passed arguments to variables."""
     if not kept:
         return {"target": target}

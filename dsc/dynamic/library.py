@@ -35,7 +35,7 @@ class Library:
         self._compiled: dict[str, CompiledPlot] = {}
         self._bound: dict[str, CompiledPlot] = {}
         self._made: dict[str, ActionPlot] = {}
-        self._heard: frozenset[str] | None = None
+        self._received: frozenset[str] | None = None
         if isinstance(plots, ActionPlot | str) or not isinstance(plots, Iterable):
             raise InputError(f"a library is made of a list of plots, not of {shown(plots)[:60]}")
         for plot in plots:
@@ -63,7 +63,7 @@ class Library:
                 f"two different plots are named '{plot.name}'", place=plot.place(("plot",)), found=plot.name
             )
         self._plots[plot.name] = plot
-        self._heard = None
+        self._received = None
 
     def plot(self, name: str) -> ActionPlot:
         """Return the plot of that name, without expansion; raise `UnknownNameError` if there is none."""
@@ -74,10 +74,10 @@ class Library:
 
     def require_receiver(self, event: str) -> None:
         """Raise `UnknownNameError` if no plot has a reaction to the event; SCXML plots match events by prefix."""
-        if self._heard is None:
-            self._heard = frozenset[str]().union(*(plot.heard() for plot in self))
-        if event not in self._heard and all(plot.dialect == "dsc" for plot in self):
-            valid = self._heard - RESERVED
+        if self._received is None:
+            self._received = frozenset[str]().union(*(plot.heard() for plot in self))
+        if event not in self._received and all(plot.dialect == "dsc" for plot in self):
+            valid = self._received - RESERVED
             raise UnknownNameError(f"no plot receives the event '{event}'", found=event, valid=valid)
 
     def substitute(self, name: str, plot: ActionPlot) -> Library:
@@ -87,9 +87,9 @@ class Library:
 
         Raises:
             UnknownNameError: the library has no plot of that name.
-            SchemaError: a host state of the old plot could not contain the new plot; see `stand_in`.
+            SchemaError: a host state of the old plot could not contain the new plot; see `substitute_for`.
         """
-        other = stand_in(self.plot(name), plot)
+        other = substitute_for(self.plot(name), plot)
         return Library(other if own.name == name else own for own in self)
 
     def with_default(self, plot: str, name: str, value: object, who: Who) -> Library:
@@ -154,7 +154,7 @@ _ROLE = ("when", "implements", "effects", "confirm")
 """Fields of a plot's role as a candidate or planning action; a substitute without a role has the original's role."""
 
 
-def stand_in(original: ActionPlot, substitute: ActionPlot) -> ActionPlot:
+def substitute_for(original: ActionPlot, substitute: ActionPlot) -> ActionPlot:
     """Return the substitute under the original's name, with the original's role if the substitute declares none.
 
     The role consists of the condition as a candidate, and of the planning action with the treatment of its effects. The
@@ -163,13 +163,13 @@ def stand_in(original: ActionPlot, substitute: ActionPlot) -> ActionPlot:
     Raises:
         SchemaError: a host state of the original could not contain the substitute.
     """
-    require_stand_in(original, substitute)
+    require_substitute(original, substitute)
     role = {key: getattr(original, key) for key in _ROLE if key not in substitute.model_fields_set}
     emits = {**original.emits, **substitute.emits}
     return substitute.model_copy(update={"name": original.name, "emits": emits, **role})
 
 
-def require_stand_in(original: ActionPlot, substitute: ActionPlot) -> None:
+def require_substitute(original: ActionPlot, substitute: ActionPlot) -> None:
     """Raise an error if a host state of the original could not contain the substitute.
 
     A host state may pass all parameters of the original, or only the required parameters. It handles the original's

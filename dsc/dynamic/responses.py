@@ -40,12 +40,12 @@ class Responses:
         self._plots = plots
         self._added = added
         self._interrupted = any(handler.interrupt for handler in plot.handlers)
-        self._beside = {name: scope.states for scope in plot.scopes() for name in scope.states}
+        self._sidecar = {name: scope.states for scope in plot.scopes() for name in scope.states}
         self._states = {name: state for name, state, _ in plot.walk()}
         self._ends: dict[tuple[int, str], str] = {}
         self._endings: dict[tuple[str, str], Transition] = {}
 
-    def carried_out(self, rule: Rule, step: str, key: str, onward: Onward, states: States) -> list[Transition]:
+    def execute(self, rule: Rule, step: str, key: str, onward: Onward, states: States) -> list[Transition]:
         """Return transitions that execute a rule's response and then continue.
 
         A response with commands or a plot needs a recovery state, which is added to `states`.
@@ -95,27 +95,27 @@ class Responses:
         then, about = rule.then, rule.label if rule.on is None else rule.on
         if self._plot.generated and (then in {REPLAN, GIVE_UP} or rule.leads_away):
             return [self._leaving(rule, name, about)]
-        if then == CONTINUE and rule.before and skipped(name) in self._beside[name]:
+        if then == CONTINUE and rule.before and skipped(name) in self._sidecar[name]:
             return [Transition(target=skipped(name))]
         if then == CONTINUE:
             return self._wired(rule, number, name, state, DONE)
         if then == GIVE_UP:
             return [because(about, one) for one in self._wired(rule, number, name, state, GAVE_UP)]
         if then in {RETRY, REPLAN, ENTER}:
-            tested = again(name) in self._beside[name] and not rule.do.passed
+            tested = again(name) in self._sidecar[name] and not rule.do.passed
             return [Transition(target=again(name) if tested else name, passed=rule.do.passed)]
         return [Transition(target=then, passed=rule.do.passed)]
 
     def _leaving(self, rule: Rule, name: str, about: str) -> Transition:
         """Return a transition from a step to the final state with which a rule ends the generated plot."""
         if rule.leads_away:
-            return Transition(target=self._end(self._beside[name], rule.outcome), passed=rule.do.passed)
+            return Transition(target=self._end(self._sidecar[name], rule.outcome), passed=rule.do.passed)
         reason = about if rule.do.acts or rule.on is None else reason_of(rule.on)  # `about` if the event is `done`
         return self.ending(name, REPLAN if rule.then == REPLAN else GAVE_UP, reason)
 
     def ending(self, name: str, outcome: str, reason: str) -> Transition:
         """Return a transition from the step `name` to the final state that ends the generated plot with an outcome."""
-        end = self._end(self._beside[name], outcome)
+        end = self._end(self._sidecar[name], outcome)
         if (end, reason) not in self._endings:  # many steps share the transition
             self._endings[end, reason] = Transition.model_validate({"to": end, "assign": {"reason": reason}})
         return self._endings[end, reason]
@@ -214,17 +214,17 @@ def _spoken(rule: Rule) -> str:
     return f"on {rule.on}" if rule.on is not None else f"{rule.place} {', '.join(rule.steps)}"
 
 
-def because(outcome: str, giving_up: Transition) -> Transition:
+def because(outcome: str, abandoning: Transition) -> Transition:
     """Return a transition on `gave_up` for another outcome; this outcome replaces `event.reason`."""
     reason = {"event.reason": lang.Constant(outcome)}
-    return giving_up.model_copy(
+    return abandoning.model_copy(
         update={
-            "guard": None if giving_up.guard is None else lang.substitute(giving_up.guard, reason),
-            "assign": filled(giving_up.assign, reason),
-            "arguments": filled(giving_up.arguments, reason),
-            "passed": filled(giving_up.passed, reason),
-            "tell": None if giving_up.tell is None else substitute_effect(giving_up.tell, reason),
-            "do": tuple(_action_because(action, reason) for action in giving_up.do),
+            "guard": None if abandoning.guard is None else lang.substitute(abandoning.guard, reason),
+            "assign": filled(abandoning.assign, reason),
+            "arguments": filled(abandoning.arguments, reason),
+            "passed": filled(abandoning.passed, reason),
+            "tell": None if abandoning.tell is None else substitute_effect(abandoning.tell, reason),
+            "do": tuple(_action_because(action, reason) for action in abandoning.do),
         }
     )
 

@@ -42,7 +42,7 @@ class _Expansion:
         self._responses = Responses(plot, plots, self.added)
         answering = [rule for rule in plot.rules if answers_in_plans(rule, plots)]
         self._in_plans = [one for rule in answering for one in rule.continuations if one.leads_away]
-        self._given_up: dict[str, str] = {}  # reasons, by the event with which an inner state reports `gave_up`
+        self._abandoned: dict[str, str] = {}  # reasons, by the event with which an inner state reports `gave_up`
         self.detours = Insertions(plot, plots, self.added, self._responses)
 
     def scope(self, scope: Scope) -> dict[str, object]:
@@ -65,13 +65,13 @@ class _Expansion:
 
     def _around(self, state: CompositeState | OrthogonalState) -> AnyState:
         """Return a composite or orthogonal state with its inner scopes expanded."""
-        before, self._given_up = self._given_up, {}
+        before, self._abandoned = self._abandoned, {}
         if isinstance(state, CompositeState):
             inside = self.scope(state)
         else:
             inside = {"regions": {key: one.model_copy(update=self.scope(one)) for key, one in state.regions.items()}}
-        on = answered(state.on, self._given_up)
-        self._given_up = {**before, **self._given_up}
+        on = answered(state.on, self._abandoned)
+        self._abandoned = {**before, **self._abandoned}
         return state.model_copy(update={**inside, "on": on})
 
     def _with_rules(self, name: str, state: Step, beside: Mapping[str, AnyState]) -> States:
@@ -85,14 +85,14 @@ class _Expansion:
                 if rule.on == event and concerns(rule, name, state, self._plots):
                     about = about_step(rule, state, self._plot)
                     onward = partial(self._responses.onward, number=number, name=name, state=state)
-                    own += self._responses.carried_out(about, name, f"{name}_{event}_{number}", onward, recoveries)
+                    own += self._responses.execute(about, name, f"{name}_{event}_{number}", onward, recoveries)
             if self._plot.generated and event != PROGRAMMING_ERROR:
                 reason = NO_CANDIDATE_FITS if event == NO_CANDIDATE else reason_of(event)
                 own.append(self._responses.ending(name, REPLAN, reason))
             if own:
                 on[event] = tuple(own)
         if isinstance(state, DynamicState) and state.goal is not None:
-            on = dict(led_away(name, state, on, beside, self._in_plans, self.added, self._given_up))
+            on = dict(led_away(name, state, on, beside, self._in_plans, self.added, self._abandoned))
         return {name: state.model_copy(update={"on": on}), **recoveries}
 
 
@@ -109,7 +109,7 @@ def led_away(
     beside: Container[str],
     rules: Iterable[Rule],
     added: FreshNames,
-    given_up: MutableMapping[str, str],
+    abandoned: MutableMapping[str, str],
 ) -> Ways:
     """Return the transitions of a state with a goal, including the transitions of rules that leave its plans.
 
@@ -120,14 +120,14 @@ def led_away(
         beside: names of the states in the state's scope.
         rules: rules that may respond to steps of plans.
         added: generator of names for added elements.
-        given_up: mapping to which the events are added that report `gave_up` of the state, with reasons; `answered`
+        abandoned: mapping to which the events are added that report `gave_up` of the state, with reasons; `answered`
             reads this mapping.
     """
     leading = {rule.outcome: rule for rule in rules if rule.leads_away and rule.then in beside}
     if not leading:
         return on
     counter = added.variable(f"left_{name}", "number", 0)
-    ways = {**on, DONE: tuple(_counting_anew(way, counter) for way in on.get(DONE, ()))}
+    ways = {**on, DONE: tuple(_resetting(way, counter) for way in on.get(DONE, ()))}
     own = on.get(GAVE_UP, ())
     for event, rule in leading.items():
         most = state.budget.replans
@@ -135,22 +135,22 @@ def led_away(
         ways[event] = (_way(rule, counter, most), *(because(reason, way) for way in own))
         if not _settles(own):
             report = added.event(f"{GAVE_UP}_{name}_{rule.then}")
-            given_up[report] = reason
+            abandoned[report] = reason
             ways[event] += (Transition(do=(Emit(emit=report),)),)
     return ways
 
 
-def answered(on: Ways, given_up: MutableMapping[str, str]) -> Ways:
+def answered(on: Ways, abandoned: MutableMapping[str, str]) -> Ways:
     """Return the transitions of a state, including those on the reports of `gave_up` from inner states.
 
-    Remove from `given_up` each report that these transitions always handle.
+    Remove from `abandoned` each report that these transitions always handle.
     """
     own = on.get(GAVE_UP, ())
-    if not (own and given_up):
+    if not (own and abandoned):
         return on
-    ways = {**on, **{report: tuple(because(reason, way) for way in own) for report, reason in given_up.items()}}
+    ways = {**on, **{report: tuple(because(reason, way) for way in own) for report, reason in abandoned.items()}}
     if _settles(own):
-        given_up.clear()
+        abandoned.clear()
     return ways
 
 
@@ -168,5 +168,5 @@ def _way(rule: Rule, counter: str, most: int) -> Transition:
     )
 
 
-def _counting_anew(way: Transition, counter: str) -> Transition:
+def _resetting(way: Transition, counter: str) -> Transition:
     return way.model_copy(update={"do": (Assign(assign={counter: Constant(0)}), *way.do)})

@@ -245,7 +245,7 @@ class Execution:
         activations = {name: serial for name, serial in now.activations.items() if name in staying}
         children = {host: inner for host, inner in now.children.items() if host in staying}
         events = tuple([one for one in now.kept if one[0] in staying])
-        configuration = _going_on(reaction.following, before, staying)
+        configuration = _continuing(reaction.following, before, staying)
         state = FrameState(performer.serials, compiled, configuration, variables, activations, children, events)
         frame = Frame(state, parent, before.host)
         for entrance in reaction.parts[0].entrances:
@@ -304,7 +304,7 @@ def _shared(before: Frame, compiled: CompiledPlot) -> list[str]:
     return found
 
 
-def _going_on(following: Configuration, before: Frame, staying: Collection[str]) -> Configuration:
+def _continuing(following: Configuration, before: Frame, staying: Collection[str]) -> Configuration:
     """Return the configuration in which a staying state waits for its least time only if it has waited before."""
     known, compiled = before.compiled, following.compiled
     over = {compiled.index[name] for name in staying if known.index[name] not in before.configuration.waiting}

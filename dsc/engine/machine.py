@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from dsc.engine.machine_state import NOTHING, FrameState, MachineState, at_rest
+from dsc.engine.machine_state import NOTHING, FrameState, MachineState, idle_state
 from dsc.engine.macrostep import Macrostep
 from dsc.engine.reaction import CompiledReaction
 from dsc.engine.reaction_choice import Choice, Question
@@ -33,7 +33,7 @@ def move(state: MachineState, root: FrameState, event: Event, situation: Situati
         return None
     following = choice.following
     if before.bare is state:
-        after = following.bare or at_rest(root._replace(configuration=following), state.serials)
+        after = following.bare or idle_state(root._replace(configuration=following), state.serials)
     else:
         serial, compiled, _, variables, activations, children, kept = root
         frame = _new(FrameState, (serial, compiled, following, variables, activations, children, kept))

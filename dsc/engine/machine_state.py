@@ -289,7 +289,7 @@ class MachineState(NamedTuple):
         return any(path == state or path.endswith("/" + state) for path in self.configuration())
 
 
-def at_rest(root: FrameState, serials: int) -> MachineState:
+def idle_state(root: FrameState, serials: int) -> MachineState:
     """Return a machine's state between two steps; without data besides the configuration, it is a shared object."""
     frame_serial = 1  # serial number of the outermost plot
     if serials > frame_serial or root.variables or root.children:

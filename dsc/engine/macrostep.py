@@ -9,7 +9,7 @@ from typing import Any
 
 from dsc.engine.execution import Execution
 from dsc.engine.frames import Frame
-from dsc.engine.machine_state import FrameState, MachineState, at_rest, configuration_of
+from dsc.engine.machine_state import FrameState, MachineState, configuration_of, idle_state
 from dsc.engine.performing import Performer
 from dsc.engine.reaction import CompiledReaction, ReactionPart, reaction_of, report
 from dsc.engine.reaction_choice import Question, choice_of, settled
@@ -84,7 +84,7 @@ class Macrostep:
             self._leave()
             state = MachineState(None, done.serials, execution.finished)
         else:
-            state = at_rest(self._root.frozen(), done.serials)
+            state = idle_state(self._root.frozen(), done.serials)
         return Step(
             state, event, handled, tuple(done.microsteps), tuple(done.decisions), done.knowledge, tuple(done.output),
             tuple(done.emitted), tuple(done.errors), execution.outputs, tuple(done.bugs),

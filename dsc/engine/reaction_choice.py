@@ -39,7 +39,7 @@ class Question:
         found = self._branches.get(answer)
         if found is None:
             answers = {**self.answers, self.edge: answer}
-            found = self._branches[answer] = _work_out(self.configuration, self.trigger, answers)
+            found = self._branches[answer] = _compute(self.configuration, self.trigger, answers)
         return found
 
 
@@ -57,7 +57,7 @@ def choice_of(plot: Frame | FrameState, trigger: Trigger) -> Choice | None:
         if len(configuration.choices) >= MOST_TRIGGERS:
             configuration.forget()
         listens = any(edges_of(configuration.compiled, index, trigger) for index in configuration.active)
-        found = configuration.choices[trigger] = _work_out(configuration, trigger, {}) if listens else None
+        found = configuration.choices[trigger] = _compute(configuration, trigger, {}) if listens else None
     return found  # type: ignore[no-any-return]
 
 
@@ -72,7 +72,7 @@ class _Open(Exception):  # noqa: N818  # control flow: the search stops at a gua
         self.question = question
 
 
-def _work_out(configuration: Configuration, trigger: Trigger, answers: Mapping[TransitionEdge, bool]) -> Choice:
+def _compute(configuration: Configuration, trigger: Trigger, answers: Mapping[TransitionEdge, bool]) -> Choice:
     def guard(_frame: Frame, edge: TransitionEdge) -> bool:
         if edge.guard is None:
             return True
@@ -90,5 +90,5 @@ def _work_out(configuration: Configuration, trigger: Trigger, answers: Mapping[T
         if configuration.questions > MOST_QUESTIONS:
             configuration.forget()
         return stop.question
-    keepers = dict.fromkeys(one.frame.compiled.nodes[one.edge.source].name for one in late)
-    return reaction_of(configuration, tuple([one.edge for one in taken]), tuple(keepers))
+    keeping = dict.fromkeys(one.frame.compiled.nodes[one.edge.source].name for one in late)
+    return reaction_of(configuration, tuple([one.edge for one in taken]), tuple(keeping))

@@ -144,12 +144,12 @@ class ActionPlot(Written):
 
     @field_validator("rules")
     @classmethod
-    def _rules_are_told_apart(cls, rules: tuple[Rule, ...]) -> tuple[Rule, ...]:
+    def _require_distinct_rules(cls, rules: tuple[Rule, ...]) -> tuple[Rule, ...]:
         return told_apart(rules)
 
     @field_validator("handlers")
     @classmethod
-    def _handlers_are_told_apart(cls, handlers: tuple[Handler, ...]) -> tuple[Handler, ...]:
+    def _require_distinct_handlers(cls, handlers: tuple[Handler, ...]) -> tuple[Handler, ...]:
         return told_apart(handlers)
 
     @model_validator(mode="after")

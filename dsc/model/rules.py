@@ -70,7 +70,7 @@ class Response(Reaction):
     Attributes:
         then: the continuation; with `use`, after the plot is done. See `Rule.then` for the default. `retry` enters the
             step again, which chooses among its candidates. `continue` treats the step as done. `enter` enters the step
-            after a `before` rule. `replan` and `give_up` concern the plan. Any other word is a state's name.
+            after a `before` rule. `replan` and `abandon` concern the plan. Any other word is a state's name.
         passed: arguments for the step or state that is entered next (`pass`); they override that state's `with`.
         limit: upper bound of this rule's responses for one state while the plot is active; `None` means the default.
     """

@@ -153,7 +153,7 @@ class RunArchive:
         """Return the snapshot after the last macrostep of the last run."""
         return latest_snapshot(step.change for step in self._latest_steps(self.run().number))
 
-    def under_way(self) -> list[tuple[Start, float]]:
+    def running_actions(self) -> list[tuple[Start, float]]:
         """Return the skills of the unfinished run that have not ended, each with its start in seconds of run time."""
         rows = [SnapshotRow(*row) for _, row in sorted(self.latest_snapshot().pending.items())]
         return [(Start.from_json(row.what), row.at) for row in rows if row.kind == Start.__name__ and not row.cancelled]

@@ -36,7 +36,7 @@ A parameter or mode is effective until it is set again. A message is pending unt
 _BY_HASH = "$form"
 _MOST_REMEMBERED = 256
 _VISIBILITY = Event._fields[2:]
-_EVERYBODY = [Event._field_defaults[name] for name in _VISIBILITY]
+_PUBLIC = [Event._field_defaults[name] for name in _VISIBILITY]
 
 
 class Shortener:
@@ -198,7 +198,7 @@ def _event_form(event: Event, short: Shortener) -> Form:
     form: Form = {"name": name}
     if attributes:
         form["attributes"] = short(attributes)
-    if visibility != _EVERYBODY:
+    if visibility != _PUBLIC:
         form.update(zip(_VISIBILITY, visibility, strict=True))
     return form
 

@@ -148,8 +148,8 @@ class RunState:
                 for place in self._places.get(_key(start), ()):
                     row = self._rows[place]
                     self._put_row(place, row._replace(reports=row.reports + 1 + conflated))
-            case SkillMessage(start=start, goes_on=goes_on):
-                (self._cancel if goes_on else self._forget)(_key(start))
+            case SkillMessage(start=start, continues=continues):
+                (self._cancel if continues else self._forget)(_key(start))
             case TimerMessage(timer=timer):
                 self._forget(_key(timer))
             case LateMessage() | SendLater():
@@ -160,13 +160,13 @@ class RunState:
         for place in self._places.get(_key(start), ()):
             self._put_row(place, self._rows[place]._replace(waits=turn is None, turn=turn))
 
-    def dispatched(self, under_way: Collection[Told], refused: Collection[Told] = ()) -> None:
-        """Register that earlier commands were received, except those in `under_way` and `refused`."""
+    def dispatched(self, undelivered: Collection[Told], refused: Collection[Told] = ()) -> None:
+        """Register that earlier commands were received, except those in `undelivered` and `refused`."""
         for place in self._cancelled:
             self._drop_row(place)
         self._cancelled.clear()
         for place, told in list(self._outbox.items()):
-            if not any(told is one for one in under_way):
+            if not any(told is one for one in undelivered):
                 del self._outbox[place]
                 if any(told is one for one in refused):
                     self._drop_row(place)

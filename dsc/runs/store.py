@@ -181,7 +181,7 @@ class RunStore:
 
     Attributes:
         writing: one transaction, `with store.writing`, for the knowledge and for the methods below.
-        hear: receives a record of the trace, which is written with the next macrostep.
+        receive: receives a record of the trace, which is written with the next macrostep.
         last_late: the highest number of a pending `LateMessage`.
 
     Raises:
@@ -203,7 +203,7 @@ class RunStore:
         self._domain = domain or {}
         self._run = self._number = 0
         self._records: list[Record] = []
-        self.hear: Callable[[Record], None] = self._records.append
+        self.receive: Callable[[Record], None] = self._records.append
         self._short = Shortener(self._put_form)
         self._state = RunState(self._short)
 
@@ -258,7 +258,7 @@ class RunStore:
         message: Message | None,
         output: Iterable[Output],
         reactor: ReactorState,
-        under_way: Collection[Told] = (),
+        undelivered: Collection[Told] = (),
         refused: Collection[Told] = (),
         memories: Iterable[tuple[str, Any]] = (),
     ) -> None:
@@ -269,14 +269,14 @@ class RunStore:
             message: the handled message; `None` for entering and for leaving the plot.
             output: the macrostep's actions, which are dispatched after the commit.
             reactor: the reactor's state after the macrostep.
-            under_way: earlier commands that components have neither received nor refused yet.
+            undelivered: earlier commands that components have neither received nor refused yet.
             refused: earlier commands that components refused.
             memories: memories of components, by component name.
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
         state, version = reactor.machine.state, self._knowledge.version
-        self._state.dispatched(under_way, refused)
+        self._state.dispatched(undelivered, refused)
         if message is not None:
             self._state.take(message)
         self._state.ask(output, self._number, now, reactor)
@@ -302,7 +302,7 @@ class RunStore:
         }  # fmt: skip
         self.writing.end(self._run, text_of(ended), self._new_records())
 
-    def take_up(self, library: Library) -> Kept:
+    def load_unfinished(self, library: Library) -> Kept:
         """Load the unfinished run, to be resumed; call this method outside of `writing`.
 
         Raises:

@@ -24,7 +24,7 @@ from dsc.model.plot import ActionPlot, Path
 from dsc.scxml.document import STATES, Element, check, read_xml, written
 from dsc.scxml.ecmascript import condition
 from dsc.scxml.executable_content import Form, actions, assigned, fired, needed, set_at_first, variable
-from dsc.scxml.value_kinds import BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, Scope, work_out
+from dsc.scxml.value_kinds import BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, Scope, compute_kinds
 from dsc.text.yaml import Document, read_model
 from knowledge_base.errors import InputError, Place
 from knowledge_base.language.syntax.expression import Constant, Term, free_variables
@@ -95,19 +95,19 @@ class _Reader:
             names[name] = name.lower()
             self._note(("variables", name.lower()), element.place)
         self._known = Scope(names)
-        self._work_out_kinds()
+        self._compute_kinds()
         form: Form = {}
         for element in data:
             form[names[element.attributes["id"]]] = self._variable(element, form)
         return form
 
-    def _work_out_kinds(self) -> None:
+    def _compute_kinds(self) -> None:
         """Compute the kinds of all data; afterwards, translation refuses expressions that convert values."""
         known = self._known.data
         early = {self._known.names.get(name) for name in set_at_first(self._root, self._known)}
         given = [one for one in self._given(self._root, self._known) if one[1] is not None or one[0] not in early]
         known.received = {event: {} for event in self._received()}
-        work_out(known, given)
+        compute_kinds(known, given)
 
     def _given(self, element: Element, scope: Scope) -> Iterator[tuple[str, Term | None, Scope]]:
         """Yield variable, value and scope of each assignment inside an element; record the events that it fires."""

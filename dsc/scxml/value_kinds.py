@@ -173,7 +173,7 @@ def _refused(why: str, place: Place | None) -> NotExpressibleError:
     return NotExpressibleError("expression", why, place=place)
 
 
-def work_out(data: Data, given: Iterable[tuple[str, Term | None, Scope]]) -> None:
+def compute_kinds(data: Data, given: Iterable[tuple[str, Term | None, Scope]]) -> None:
     """Compute the kinds of all variables.
 
     Args:

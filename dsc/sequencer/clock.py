@@ -220,7 +220,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         self._holds = 0
         self._settling: list[asyncio.Future[None]] = []
         self._idle: list[tuple[float, asyncio.Future[None]]] = []
-        selector = _IdleSelector(self._go_on, self._until_jump, self._advance)
+        selector = _IdleSelector(self._settle_or_jump, self._until_jump, self._advance)
         self.real_input = RealInput(selector)
         super().__init__(selector)
 
@@ -332,7 +332,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         if self._pace is not None:
             self._pace.restart(self._simulated_now)
 
-    def _go_on(self) -> bool:
+    def _settle_or_jump(self) -> bool:
         """Advance simulated time, unless it is held, as no call is ready; return whether a call is ready now."""
         settling, self._settling = self._settling, []
         for waits in settling:
@@ -419,9 +419,11 @@ class _IdleSelector(selectors.DefaultSelector):
     If time cannot advance, it waits for real input.
     """
 
-    def __init__(self, go_on: Callable[[], bool], until_jump: Callable[[], float], arrived: Callable[[], None]) -> None:
+    def __init__(
+        self, advance: Callable[[], bool], until_jump: Callable[[], float], arrived: Callable[[], None]
+    ) -> None:
         super().__init__()
-        self._go_on = go_on
+        self._advance = advance
         self._until_jump = until_jump
         self._arrived = arrived
 
@@ -432,7 +434,7 @@ class _IdleSelector(selectors.DefaultSelector):
         while not ready and (seconds := self._until_jump()) > 0:
             ready = super().select(seconds)
         if not ready:
-            if self._go_on():
+            if self._advance():
                 return ready
             ready = super().select(None)
         self._arrived()

@@ -17,7 +17,7 @@ from typing import Any
 from dsc.calls import Clock, Ended, SkillCall, Status
 from dsc.components.assembly import Wiring, require_instances
 from dsc.components.component import Component
-from dsc.components.hooks import bug_in, cancel_once, component_at_work, contained, give_up, reason_of
+from dsc.components.hooks import abandon, active_component, bug_in, cancel_once, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.turns import Claim, Turns
 from dsc.engine import steps
@@ -185,9 +185,9 @@ class Dispatcher:
             self.activation.switched(told.component, told.mode)
 
     @property
-    def under_way(self) -> Collection[Told]:
+    def undelivered(self) -> Collection[Told]:
         """Commands that were neither received nor refused yet."""
-        return [*self.outbox.under_way, *self._undeployed.commands] if self._undeployed else self.outbox.under_way
+        return [*self.outbox.undelivered, *self._undeployed.commands] if self._undeployed else self.outbox.undelivered
 
     @property
     def components(self) -> Mapping[str, Component]:
@@ -373,7 +373,7 @@ class Dispatcher:
             stopped, others = await asyncio.wait(tasks, timeout=CLOSING)
             for task in others:
                 task.cancel()
-                give_up(task)
+                abandon(task)
             for task in stopped:
                 failure(task)  # marks the error as retrieved; the skill was cancelled
         await self.activation.close()
@@ -406,7 +406,7 @@ class Dispatcher:
         running.begin_limit()
 
     async def _execute(self, component: Component, running: RunningSkill, interrupted: InterruptedSkill | None) -> None:
-        component_at_work.set(component.name)
+        active_component.set(component.name)
         dependencies = SkillDependencies(self.activation, component)
         running.missing = lambda: dependencies.missing or self._missing(running, component)
         try:

@@ -11,7 +11,7 @@ from dsc.events import EVERY
 from dsc.messages import LateMessage, Message, SkillMessage, TimerMessage
 from dsc.sequencer.clock import LoopClock, ScheduledCall
 
-MOST_AT_ONCE = 10_000
+MOST_IN_A_TURN = 10_000
 """Upper bound of answers, timers and own events that a run handles at one simulated time.
 
 A long plan of skills without duration needs a few thousand such messages.
@@ -143,6 +143,6 @@ class LivelockGuard:
             self._moment, self._count = now, 0
         self._count += 1
         self._latest.append(event)
-        if self._count <= MOST_AT_ONCE:
+        if self._count <= MOST_IN_A_TURN:
             return None
-        return f"no time has passed for {MOST_AT_ONCE} macrosteps; the plot goes round: {' -> '.join(self._latest)}"
+        return f"no time has passed for {MOST_IN_A_TURN} macrosteps; the plot goes round: {' -> '.join(self._latest)}"

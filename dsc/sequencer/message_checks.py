@@ -176,7 +176,7 @@ def validated_in_world(message: SkillMessage, knowledge: KnowledgeBase, place: C
             outcome = failed(message.start, reason)
         else:
             outcome = _invalid(message.start, reason, place(message.start))
-        return SkillMessage(message.start, outcome, final=True, goes_on=not message.final)
+        return SkillMessage(message.start, outcome, final=True, continues=not message.final)
     return message
 
 

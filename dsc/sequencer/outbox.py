@@ -59,16 +59,16 @@ class Outbox:
         self.untaken: dict[str, Delivery] = {}
         self.configuring: Configuring = {}
         self._calls: dict[str, tuple[str, asyncio.Task[Any]]] = {}  # hooks that deliveries call, by component
-        self._under_way: dict[int, Told] = {}
+        self._undelivered: dict[int, Told] = {}
         self._refused: deque[Told] = deque(maxlen=_MOST_REFUSED)
         self._settings: dict[str, _Settings] = {}
         self._last = 0
         self._closed = False
 
     @property
-    def under_way(self) -> Collection[Told]:
+    def undelivered(self) -> Collection[Told]:
         """Outputs that were neither received nor refused yet."""
-        return self._under_way.values()
+        return self._undelivered.values()
 
     def refused(self) -> Collection[Told]:
         """Return the outputs that components have refused since the last call."""
@@ -114,11 +114,11 @@ class Outbox:
         """Store a setting, with its number if the component has not taken it."""
         replaced = self._settings_of(component).note(told, untaken)
         if replaced is not None:
-            del self._under_way[replaced]
+            del self._undelivered[replaced]
 
     def _number(self, told: Told) -> int:
         self._last += 1
-        self._under_way[self._last] = told
+        self._undelivered[self._last] = told
         return self._last
 
     async def _take(self, component: Component, told: Told) -> None:
@@ -149,7 +149,7 @@ class Outbox:
             settings.missing = True
             raise
         for number in settings.taken():
-            del self._under_way[number]
+            del self._undelivered[number]
 
     def _begin(self, component: Component, hook: str, told: Told | None, take: Callable[[], Awaitable[None]]) -> None:
         """Begin the delivery of an output by a call of a hook, or of all settings."""
@@ -167,7 +167,7 @@ class Outbox:
                         await take()
                     if setting is not None:
                         self._note(component, setting)
-                    self._under_way.pop(number, None)
+                    self._undelivered.pop(number, None)
                 elif setting is not None:
                     self._note(component, setting, number)
             except Exception as error:
@@ -177,7 +177,7 @@ class Outbox:
                     self._note(component, setting, number)
                 else:
                     self._refused.append(told)
-                    del self._under_way[number]
+                    del self._undelivered[number]
                 self._report(component, told, error, failures)
                 return error
             if before is not None and (why := failure(before)) is not None:

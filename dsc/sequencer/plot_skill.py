@@ -82,14 +82,14 @@ class PlotComponent(Component):
         sequencer = Sequencer(self._library, self._knowledge(), self._components, LoopClock(), part_of=part_of)
         ended: list[Outcome] = []
 
-        def hear(step: Step) -> None:
+        def receive(step: Step) -> None:
             said = [Outcome(event.name, dict(event.attributes)) for event in step.emitted]
             if step.state.finished:
                 ended.append(said.pop() if said and not step.outputs else Outcome(COMPLETED, dict(step.outputs)))
             for outcome in said:
                 call.report(outcome)
 
-        sequencer.listen(hear)
+        sequencer.listen(receive)
         end = await sequencer.run(skill_name, arguments)
         if end.programming_error is not None:
             raise ProgrammingError(end.programming_error)

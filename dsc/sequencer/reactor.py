@@ -225,7 +225,7 @@ class Reactor:
         self.trace.cause = self.caused_by.get(start.action_id)
         if message.final:
             self.tracer.answered(start)
-            if message.goes_on:
+            if message.continues:
                 self._forget_causes([start.action_id])
             else:
                 self.caused_by.pop(start.action_id, None)

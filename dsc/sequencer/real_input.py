@@ -14,7 +14,7 @@ from asyncio import futures
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from dsc.components.hooks import component_at_work
+from dsc.components.hooks import active_component
 
 TasksOf = Callable[[str], Iterable[asyncio.Task[None]]]
 """Function that returns the tasks of the running skills of a component."""
@@ -39,7 +39,7 @@ class RealInput:
 
     def add_process(self, process: asyncio.SubprocessTransport) -> None:
         """Add a process that the present task has started."""
-        self._processes[process] = component_at_work.get()
+        self._processes[process] = active_component.get()
 
     @property
     def may_come(self) -> bool:
@@ -75,7 +75,7 @@ class RealInput:
         yield from filter(None, self._processes.values())
         for key in self._selector.get_map().values():
             for handle in key.data or ():
-                owner = None if handle is None else handle._context.get(component_at_work)  # noqa: SLF001  # set when opened
+                owner = None if handle is None else handle._context.get(active_component)  # noqa: SLF001  # set when opened
                 if owner is not None:
                     yield owner
 

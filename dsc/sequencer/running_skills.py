@@ -12,7 +12,7 @@ from typing import Protocol
 
 from dsc.blocking import DeadlineError
 from dsc.calls import OBSERVED, Reports
-from dsc.components.hooks import GRACE, Classes, cancel_once, give_up_after, is_own, programming_error
+from dsc.components.hooks import GRACE, Classes, abandon_after, cancel_once, is_own, programming_error
 from dsc.components.turns import Claim
 from dsc.engine.steps import NO_CHANGE, Start
 from dsc.errors import PreemptedError, ProgrammingError
@@ -164,12 +164,12 @@ class RunningSkill:
         if outcome.observed is not NO_CHANGE and self.credible:
             self._post(SkillMessage(self.start, Outcome(OBSERVED, observed=outcome.observed), final=False))
 
-    def answer(self, outcome: Outcome, *, goes_on: bool = False) -> None:
+    def answer(self, outcome: Outcome, *, continues: bool = False) -> None:
         """Post the end, one time, and stop the timer of the deadline; post only the observations of a later outcome.
 
         Args:
             outcome: the end.
-            goes_on: whether the task still executes; the sequencer then cancels it.
+            continues: whether the task still executes; the sequencer then cancels it.
         """
         if self.answered:
             self._post_observed(outcome)
@@ -177,7 +177,7 @@ class RunningSkill:
         if self.reports is not None:
             self.reports.flush()
         declared = self.signature.outcomes.get(outcome.event) if outcome.attributes else None
-        self._post(SkillMessage(self.start, outcome, final=True, goes_on=goes_on, declared=declared))
+        self._post(SkillMessage(self.start, outcome, final=True, continues=continues, declared=declared))
         self.answered = True
         self.end_limit()
 
@@ -245,7 +245,7 @@ class RunningSkill:
 
     def lose(self, taker: str) -> None:
         """Post `preempted`, since a skill with a higher priority takes the component; the task is then cancelled."""
-        self.answer(self._preempted(taker), goes_on=True)
+        self.answer(self._preempted(taker), continues=True)
 
     def _preempted(self, taker: str) -> Outcome:
         return Outcome(PREEMPTED, {"skill": f"{self.start.component}.{self.start.skill}", "by": taker})
@@ -277,10 +277,10 @@ class RunningSkill:
     def _expire(self) -> None:
         missing, place = self.missing(), waits_at(self.task.get_coro())
         waited = f"for {missing}" if missing else f"at {place}" if place else ""
-        self.answer(late(self.start, self.within, waited), goes_on=True)
+        self.answer(late(self.start, self.within, waited), continues=True)
         cancel_once(self.task)
 
-    def given_up(self) -> None:
+    def abandon(self) -> None:
         """Report as a fault that the skill ignored its cancellation."""
         skill, place = f"{self.start.component}.{self.start.skill}", waits_at(self.task.get_coro())
         where = f"; it waits at {place}" if place else ""
@@ -320,10 +320,10 @@ class PendingCleanups:
 
         def abandon() -> None:
             end(task)
-            skill.given_up()
+            skill.abandon()
 
         task.add_done_callback(end)
-        give_up_after(task, GRACE, abandon)
+        abandon_after(task, GRACE, abandon)
 
     def tasks(self) -> Iterable[asyncio.Task[None]]:
         """Return the tasks that have not stopped."""

@@ -143,7 +143,7 @@ class Sequencer:
         self.store = store
         self.on_signal: OnSignal = "suspend"
         if store is not None:
-            self.trace.listen(store.hear)
+            self.trace.listen(store.receive)
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of)
         self._open_ended = open_ended
@@ -466,7 +466,7 @@ class Sequencer:
                     message = self._inbox.waiting.popleft()
                     output = self._react_and_keep(message)
         if isinstance(message, SkillMessage) and message.final:
-            if message.goes_on:
+            if message.continues:
                 self._inbox.drop_answers(message.start)
                 self.dispatcher.dismiss(message.start)
             else:
@@ -527,7 +527,7 @@ class Sequencer:
         dispatcher = self.dispatcher
         memories = dispatcher.memories()
         now, refused = self.clock.now(), dispatcher.outbox.refused()
-        self.store.step(now, message, output, self._reactor, dispatcher.under_way, refused, memories)
+        self.store.step(now, message, output, self._reactor, dispatcher.undelivered, refused, memories)
 
     # -- from outside ------------------------------------------------------------------------------------
 

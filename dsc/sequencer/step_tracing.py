@@ -26,7 +26,7 @@ class StepTracer:
         self._trace = trace
         self.known_plots: set[str] = set()
         self._frames: dict[str, FrameState] = {}
-        self._at_work: dict[int, dict[str, str]] = {}  # skills by activation and action id
+        self._active: dict[int, dict[str, str]] = {}  # skills by activation and action id
 
     def world(self, knowledge: KnowledgeBase) -> None:
         """Record the world at the start, unless the trace has no listener; later records are changes of this world."""
@@ -56,12 +56,12 @@ class StepTracer:
     def begun(self, start: steps.Start) -> str:
         """Register a skill that was started, here or before a crash; return its name as `component.skill`."""
         skill = f"{start.component}.{start.skill}"
-        self._at_work.setdefault(start.activation, {})[start.action_id] = skill
+        self._active.setdefault(start.activation, {})[start.action_id] = skill
         return skill
 
     def answered(self, start: steps.Start) -> None:
         """Register the end of a skill, after which the skill cannot be cancelled."""
-        self._at_work.get(start.activation, {}).pop(start.action_id, None)
+        self._active.get(start.activation, {}).pop(start.action_id, None)
 
     def step(self, step: steps.Step) -> int | None:
         """Record a macrostep that has microsteps; return the number of the record, or `None` without microsteps.
@@ -125,13 +125,13 @@ class StepTracer:
 
     def turn(self, start: steps.Start) -> None:
         """Record that a skill that has waited begins, unless it was cancelled."""
-        skill = self._at_work.get(start.activation, {}).get(start.action_id)
+        skill = self._active.get(start.activation, {}).get(start.action_id)
         if skill is not None:
             self._trace.record("action", action="begin", id=start.action_id, skill=skill)
 
     def cancelled(self, activation: int) -> Iterable[str]:
         """Record the cancellation of an activation's skills; return their action ids."""
-        skills = self._at_work.pop(activation, {})
+        skills = self._active.pop(activation, {})
         for action_id, skill in skills.items():
             self._trace.record("action", action="cancel", id=action_id, skill=skill)
         return skills

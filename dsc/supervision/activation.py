@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
 
 from dsc.components.component import Component
-from dsc.components.hooks import GRACE, contained, give_up, reason_of
+from dsc.components.hooks import GRACE, abandon, contained, reason_of
 from dsc.components.life_cycle import NEUTRAL, Announcer, Life
 from dsc.errors import ProgrammingError
 from dsc.supervision.component_registry import ComponentRegistry
@@ -107,7 +107,7 @@ class ComponentActivation(Announcer):
             _, others = await asyncio.wait(self._released.values(), timeout=2 * GRACE)
             for task in others:
                 task.cancel()
-                give_up(task)
+                abandon(task)
 
     # -- for skills and supervisors ---------------------------------------------------------------------------
 

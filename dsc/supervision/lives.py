@@ -8,7 +8,7 @@ from contextlib import suppress
 from functools import partial
 
 from dsc.components.component import Component
-from dsc.components.hooks import GRACE, give_up, reason_of
+from dsc.components.hooks import GRACE, abandon, reason_of
 from dsc.components.life_cycle import Life
 from knowledge_base.errors import InputError
 
@@ -91,7 +91,7 @@ async def _stop(component: Component, after: Collection[asyncio.Task[str]]) -> s
     await asyncio.wait([stopping], timeout=GRACE)
     if not stopping.done():
         stopping.cancel()
-        give_up(stopping)
+        abandon(stopping)
         return f"component '{component.name}' did not stop within {GRACE:g} s"
     why = stopping.exception()
     return "" if why is None else f"component '{component.name}' could not stop: {reason_of(why)}"

@@ -117,9 +117,9 @@ class Coverage:
 
     def _bind(self, micro: Microstep) -> None:
         for bound in micro.bound:
-            self._inside[bound.state] = bound.plot.name if self._is_ours(bound.plot) else None
+            self._inside[bound.state] = bound.plot.name if self._is_covered(bound.plot) else None
 
-    def _is_ours(self, plot: ActionPlot) -> bool:
+    def _is_covered(self, plot: ActionPlot) -> bool:
         if plot.name not in self._items:
             return False
         kept = self._seen.get(id(plot))  # one plot object occurs often; only its first use needs a comparison

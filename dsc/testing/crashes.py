@@ -136,12 +136,12 @@ class Crashes(Generic[_Result]):
         """Enable crashes after this component's actions, before their answers are committed; return the component."""
         execute = component.execute
 
-        async def carried_out(skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
+        async def executed(skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
             outcome = await execute(skill_name, call, arguments)
             await self.reached("after an action")
             return outcome
 
-        component.execute = carried_out  # type: ignore[method-assign]
+        component.execute = executed  # type: ignore[method-assign]
         return component
 
     async def reached(self, boundary: str) -> None:

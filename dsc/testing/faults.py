@@ -32,7 +32,7 @@ from dsc.sequencer.sequencer import Sequencer
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 
-SOMEBODY = "somebody"
+OUTSIDER = "somebody"
 """Author of the changes by others."""
 LATE = 5.0
 """Maximum delay in seconds of an answer, an event or a change by another author."""
@@ -141,7 +141,7 @@ class Faults:
         def hand_in(subject: str) -> None:
             options = changes()
             if options:
-                sequencer.change(choose(self.seed, subject, "change", options), SOMEBODY)
+                sequencer.change(choose(self.seed, subject, "change", options), OUTSIDER)
 
         self._during_actions(sequencer, Fault.KNOWLEDGE_CHANGED, "during", hand_in)
 

@@ -111,10 +111,10 @@ def executed_once(executed: Iterable[str]) -> Invariant:
 
 def knows(facts: Iterable[Fact], predicates: Iterable[str]) -> Invariant:
     """Require that the known facts of these predicates equal `facts`, which are true in the world."""
-    true, judged = frozenset(facts), frozenset(predicates)
+    true, compared = frozenset(facts), frozenset(predicates)
 
     def invariant(run: KeptRun) -> Iterable[str]:
-        believed = {one for one in run.knowledge.snapshot().facts if one.predicate in judged}
+        believed = {one for one in run.knowledge.snapshot().facts if one.predicate in compared}
         for wrong in sorted(map(str, believed - true)):
             yield f"it is known that {wrong}, which is not so"
         for missing in sorted(map(str, true - believed)):

@@ -21,7 +21,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 
-SOMEBODY = "somebody"
+OUTSIDER = "somebody"
 """Author of the changes that a test makes."""
 A_DAY = 86400.0
 """Seconds after which a rehearsal ends by default, so that every rehearsal ends."""
@@ -121,7 +121,7 @@ def rehearse(
         for second, event in events:
             sequencer.post(Event(event) if isinstance(event, str) else event, after=second)
         for second, change in changes:
-            sequencer.change(change_of(change, known), SOMEBODY, after=second)
+            sequencer.change(change_of(change, known), OUTSIDER, after=second)
         try:
             async with asyncio.timeout(until):
                 end = await sequencer.run(plot, arguments)

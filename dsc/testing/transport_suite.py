@@ -190,7 +190,7 @@ class TransportSuite:
     # -- calls -------------------------------------------------------------------------------------------
 
     @in_loop
-    async def test_a_call_is_carried_out_once_and_answered(self) -> None:
+    async def test_a_call_is_executed_once_and_answered(self) -> None:
         """Each call is executed one time, for any number of frames."""
         transport, done = self.transport(), []
         server, client = Endpoint("server", transport), Endpoint("client", transport)
@@ -256,7 +256,7 @@ class TransportSuite:
             await client.call("server", "keep", {"thing": object()}, PATIENCE)
 
     @in_loop
-    async def test_who_came_back_is_somebody_new(self) -> None:
+    async def test_a_restarted_host_has_a_new_identity(self) -> None:
         """The calls of a restarted endpoint are separate from its earlier calls."""
         transport, done = self.transport(), []
         server = Endpoint("server", transport)
@@ -341,7 +341,7 @@ class TransportSuite:
             await host.close()
 
     @in_loop
-    async def test_a_publisher_that_came_back_is_heard(self) -> None:
+    async def test_values_of_a_restarted_publisher_arrive(self) -> None:
         """The publisher restarts its count, and its subscribers receive its values again."""
         transport = self.transport()
         subscription = Subscription(Endpoint("user", transport), "laser", "scan")
@@ -420,7 +420,7 @@ class TransportSuite:
         await again.close()
 
     @in_loop
-    async def test_what_a_component_is_told_arrives_once_in_order(self) -> None:
+    async def test_commands_to_a_component_arrive_once_in_order(self) -> None:
         """Calls of the ports *param* and *send* arrive in sequence."""
         async with self._robot() as (robot, remote, _):
             for n in range(10):
@@ -434,7 +434,7 @@ class TransportSuite:
             assert (await remote.diagnose())["mode"] == "resting"
 
     @in_loop
-    async def test_whom_a_component_needs_is_said_when_it_changes(self) -> None:
+    async def test_changed_needs_of_a_component_are_announced(self) -> None:
         """Cases: the client has changed the component's mode, or the component itself has."""
         async with self._robot() as (robot, remote, _):
             assert remote.needed() == ()
@@ -513,7 +513,7 @@ class TransportSuite:
     # -- activation trees --------------------------------------------------------------------------------
 
     @in_loop
-    async def test_components_are_active_while_somebody_active_needs_them(self) -> None:
+    async def test_components_are_active_while_an_active_component_needs_them(self) -> None:
         """Activation proceeds from the root downwards, in any order of arrival.
 
         A component becomes inactive when its activator ends, or no longer needs it.

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dsc.dynamic.knowledge_situation import ACHIEVE
-from dsc.dynamic.library import Library, require_stand_in
+from dsc.dynamic.library import Library, require_substitute
 from dsc.model.plot import ActionPlot
 from dsc.model.plot import Path as FormPath
 from dsc.model.states import DynamicState
@@ -52,7 +52,7 @@ def cloned(plot: ActionPlot, library: Library, prefix: str, *, made: Library | N
     new = []
     for name, other in names.items():
         if other in known:
-            require_stand_in(library.plot(name), known.plot(other))
+            require_substitute(library.plot(name), known.plot(other))
         else:
             new.append(_renamed(library.plot(name), names, plans=apart))
     return tuple(new)

@@ -240,13 +240,13 @@ class _Data:
 
     def _continued(self, rule: Rule, scope: Types, path: Path) -> Iterator[Finding]:
         """Yield findings about a `continue` response whose event lacks outputs that transitions on `done` read."""
-        for name, state, outcomes in self._handing_back:
+        for name, state, outcomes in self._returning:
             if rule.on in outcomes and concerns(rule, name, state, self._library):
                 for transition in state.on.get(DONE, ()):
                     yield from self._transition(transition, scope, path)
 
     @cached_property
-    def _handing_back(self) -> list[tuple[str, Step, Outcomes]]:
+    def _returning(self) -> list[tuple[str, Step, Outcomes]]:
         """Return name, state and outcomes of each step that returns outputs with `done`."""
         steps = [(name, state) for name, state, _ in self._subject.steps if outputs_of(state, self._library)]
         return [(name, state, answerable(state, self._library)) for name, state in steps]

@@ -35,7 +35,7 @@ def check_wiring(subject: Subject) -> Iterator[Finding]:
     yield from (_reserved(subject, event, ("emits", event)) for event in emits if event in EXECUTIVES)
     yield from (_reserved(subject, event, ("receives", event)) for event in receives if event in RESERVED)
     yield from _rule_targets(subject)
-    yield from _left_out_in_a_circle(subject, expanded)
+    yield from _cyclic_omissions(subject, expanded)
     yield from _outcomes_of_reactions(subject)
     for name, state, path in subject.states:
         if isinstance(state, FinalState):
@@ -110,7 +110,7 @@ def _answers_here(subject: Subject, rule: Rule) -> bool:
     return any(rule.on is None or rule.on in answerable(state, subject.library) for state in here)
 
 
-def _left_out_in_a_circle(subject: Subject, expanded: ActionPlot) -> Iterator[Finding]:
+def _cyclic_omissions(subject: Subject, expanded: ActionPlot) -> Iterator[Finding]:
     """Yield a finding about a cycle of steps if rules may skip every step of the cycle."""
     if not any(rule.before for rule in subject.plot.rules):
         return
@@ -174,7 +174,7 @@ def _skills(
         yield from (_reserved(subject, event, (*here, "trigger")) for event in events if event in EXECUTIVES)
         if (subject.skills or {})[action.trigger].pattern == "event":
             yield from _visible_outside(subject, action, here)
-            elsewhere = traffic.heard_in(path).union(subject.plot.emits)
+            elsewhere = traffic.received_in(path).union(subject.plot.emits)
             events = [event for event in events if event not in elsewhere]
         yield from _outcomes(subject, name, [event for event in events if event not in EXECUTIVES], handled, path)
 
@@ -195,19 +195,19 @@ class _Traffic:
         anywhere: events that every state may receive.
         inside: events of a state's content, its skills and its inner states, by the state's path.
         heard: events for which the plot has a transition.
-        heard_at: events for which the state at a path has a transition.
+        received_at: events for which the state at a path has a transition.
         activated: component events by the path of the state that activates them; states inside see them, too.
     """
 
     anywhere: AbstractSet[str]
     inside: Mapping[Path, AbstractSet[str]]
     heard: AbstractSet[str]
-    heard_at: Mapping[Path, AbstractSet[str]]
+    received_at: Mapping[Path, AbstractSet[str]]
     activated: Mapping[Path, AbstractSet[str]]
 
-    def heard_in(self, path: Path) -> set[str]:
+    def received_in(self, path: Path) -> set[str]:
         """Return the events for which a state inside the state at `path` has a transition."""
-        return {event for at, events in self.heard_at.items() if at[: len(path)] == path != at for event in events}
+        return {event for at, events in self.received_at.items() if at[: len(path)] == path != at for event in events}
 
     def activated_around(self, path: Path) -> set[str]:
         """Return the component events of the states around the state at `path`."""
@@ -219,18 +219,18 @@ def _traffic(subject: Subject) -> _Traffic:
     anywhere.update(event for _, _, way in subject.ways() for event in way.emitted)
     inside: defaultdict[Path, set[str]] = defaultdict(set)
     heard: set[str] = {handler.on for handler in subject.plot.handlers}
-    heard_at: dict[Path, AbstractSet[str]] = {}
+    received_at: dict[Path, AbstractSet[str]] = {}
     activated: dict[Path, AbstractSet[str]] = {}
     for _, state, path in subject.states:
         if isinstance(state, State):
             heard.update(state.on)
-            heard_at[path] = state.on.keys()
+            received_at[path] = state.on.keys()
             if events := _skill_events(state, subject.skills, "event"):
                 activated[path] = events
             if ends := {*outcomes_of(state, subject.library), *_skill_events(state, subject.skills)}:
                 for place in subject.way_to(path):
                     inside[place] |= ends
-    return _Traffic(anywhere, inside, heard, heard_at, activated)
+    return _Traffic(anywhere, inside, heard, received_at, activated)
 
 
 def _skill_events(state: State, skills: Skills, pattern: str | None = None) -> set[str]:

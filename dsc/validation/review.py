@@ -43,7 +43,7 @@ Conditions = Mapping[str, Expression]
 """Conditions over the common parameters, by candidate, in the order of candidates."""
 
 
-_LEFT_OUT = "remove it, or change its condition"
+_REMEDY = "remove it, or change its condition"
 _ONWARD = {"before": frozenset({ENTER}), "after": frozenset({CONTINUE})}
 """Continuations that lead to the next rule of the step, by the place of the rule."""
 
@@ -175,7 +175,7 @@ def _rules(subject: Subject) -> Iterator[Finding]:
             why = f"every state that can end with '{rule.on}' answers it itself"
         if why is not None:
             message = f"the rule '{rule.label}' can never answer: {why}{_listed(earlier)}"
-            yield subject.finding(("rules", number), "rules", message, _LEFT_OUT, level="warning")
+            yield subject.finding(("rules", number), "rules", message, _REMEDY, level="warning")
 
 
 def _handlers(subject: Subject) -> Iterator[Finding]:
@@ -188,7 +188,7 @@ def _handlers(subject: Subject) -> Iterator[Finding]:
             why = f"every state answers '{handler.on}' itself"
         if why is not None:
             message = f"the '{handler.label}' can never answer: {why}{_listed(earlier)}"
-            yield subject.finding(("handlers", number), "handlers", message, _LEFT_OUT, level="warning")
+            yield subject.finding(("handlers", number), "handlers", message, _REMEDY, level="warning")
         if handler.do.use is not None and TIMED_OUT not in handler.do.on:
             for late in _late(subject.library, handler.do.use):
                 message = f"{late} may time out, which then ends the run"
@@ -230,8 +230,8 @@ def _comes_before(earlier: Rule, later: Rule) -> bool:
         return False
     if earlier.steps and not (later.steps and set(later.steps) <= set(earlier.steps)):
         return False
-    goes_on = {one.then for one in earlier.continuations} & _ONWARD.get(earlier.place, frozenset())
-    return limit_of(earlier) is None and not goes_on
+    continues = {one.then for one in earlier.continuations} & _ONWARD.get(earlier.place, frozenset())
+    return limit_of(earlier) is None and not continues
 
 
 def _settled(subject: Subject, rule: Rule, event: str) -> bool:
@@ -251,7 +251,7 @@ def _transitions(subject: Subject) -> Iterator[Finding]:
                 if why is not None:
                     which = f"transition on '{trigger}'" if here[len(path)] == "on" else "transition"
                     message = f"this {which} out of '{name}' is never taken: {why}"
-                    yield subject.finding(here, "transitions", message, _LEFT_OUT, level="warning")
+                    yield subject.finding(here, "transitions", message, _REMEDY, level="warning")
                 guards.append(way.guard)
 
 

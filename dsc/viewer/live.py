@@ -80,7 +80,7 @@ class LivePage:
         for thread in self._threads:
             thread.start()
 
-    def hear(self, record: Record) -> None:
+    def receive(self, record: Record) -> None:
         """Queue a record for the page; the method is a `Listener` of a trace."""
         if not self._gone:
             self._lines.put(record.to_line())

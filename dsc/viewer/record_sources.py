@@ -60,7 +60,7 @@ def following_run(path: Path) -> Iterator[RecordLog]:
         with archive(path, again=True) as runs:
             for here, line in runs.lines(run.number, place):
                 if (record := _record(line, len(log), path)).seq > len(log):  # the last macrostep may get more records
-                    log.hear(record)
+                    log.receive(record)
                 place = here
             return runs.run(run.number).ended is None
 
@@ -94,19 +94,19 @@ def following_store(path: Path) -> Iterator[RecordLog]:
         log = RecordLog(_header(path, changes), live=True)
         start = changes[0].time if changes else None
         first = kb.at(version=kb.oldest)
-        log.hear(Record(1, 0.0, "world", None, {
+        log.receive(Record(1, 0.0, "world", None, {
             "version": first.version, "schema": schema_form(first.schema), **world_form(first.snapshot()),
         }))  # fmt: skip
 
-        def hear(change: Change) -> None:
+        def receive(change: Change) -> None:
             nonlocal start
             start = change.time if start is None else start
             data = {"version": change.version, "author": change.author, **delta_form(change.delta)}
-            log.hear(Record(len(log) + 1, change.time - start, "knowledge", None, data))
+            log.receive(Record(len(log) + 1, change.time - start, "knowledge", None, data))
 
         for change in changes:
-            hear(change)
-        kb.subscribe(hear)
+            receive(change)
+        kb.subscribe(receive)
         with followed(log, lambda: kb.refresh() >= 0):
             yield log
 

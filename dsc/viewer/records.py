@@ -65,7 +65,7 @@ class RecordLog:
         """Whether more records may be appended."""
         return self._live
 
-    def hear(self, record: Record) -> None:
+    def receive(self, record: Record) -> None:
         """Append a record; the method is a `Listener` of a trace."""
         self.append(record.to_line())
 

@@ -177,13 +177,13 @@ def watch(
         touches, left = _touches(kb, pattern), count
         end = None if seconds is None else time.monotonic() + seconds
 
-        def heard(change: Change) -> None:
+        def print_change(change: Change) -> None:
             nonlocal left
             if left != 0 and touches(change):
                 _print(change, as_json=json)
                 left = None if left is None else left - 1
 
-        kb.subscribe(heard)
+        kb.subscribe(print_change)
         while left != 0 and (end is None or time.monotonic() < end):
             kb.refresh()
             time.sleep(POLL_S)

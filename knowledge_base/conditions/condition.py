@@ -183,7 +183,7 @@ class Condition:
         if self.truth:
             self._hold()
 
-    def judge(self, version: int, changed: Container[ConditionRow]) -> None:
+    def evaluate(self, version: int, changed: Container[ConditionRow]) -> None:
         """Compare the present truth with the truth before `version`, and notify the listeners of a difference.
 
         `changed` contains the rows with changed witnesses, among them at least one row of this condition.

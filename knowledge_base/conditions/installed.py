@@ -120,7 +120,7 @@ class Installed:
         for row in self._changed:
             touched.update(self._conditions.get(row, {}))
         for condition in sorted(touched, key=attrgetter("number")):
-            condition.judge(self._notifier.version, self._changed)
+            condition.evaluate(self._notifier.version, self._changed)
 
     def _remove(self, condition: Condition) -> None:
         """Remove a condition, and the rows that no other condition uses."""

@@ -64,7 +64,7 @@ class Watch:
         """Store `unsubscribe`, which `close` calls to end the notifications."""
         self._unsubscribe = unsubscribe
 
-    def hear(self, change: Change) -> None:
+    def receive(self, change: Change) -> None:
         """Queue a change for the readers if it matches; the knowledge base calls this method from any thread."""
         if self._touches is not None and not self._touches(change):
             return

@@ -45,11 +45,11 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """Cards and arrows; `left_out` is the number of omitted objects."""
+    """Cards and arrows; `omitted` is the number of omitted objects."""
 
     cards: tuple[Card, ...]
     links: tuple[Arrow, ...]
-    left_out: int = 0
+    omitted: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,16 +98,16 @@ def _content(content: Content) -> str:
 
 def _around(thing: str, said: Iterable[_Said], hops: int) -> Iterator[str]:
     """Yield the objects that are at most `hops` facts away, the nearest first."""
-    beside: dict[str, dict[str, None]] = {}
+    adjacent: dict[str, dict[str, None]] = {}
     for one in said:
         for name in one.things:
-            beside.setdefault(name, {}).update(dict.fromkeys(one.things))
+            adjacent.setdefault(name, {}).update(dict.fromkeys(one.things))
     distance, waiting = {thing: 0}, deque([thing])
     while waiting:
         here = waiting.popleft()
         yield here
         if distance[here] < hops:
-            fresh = [name for name in beside.get(here, ()) if name not in distance]
+            fresh = [name for name in adjacent.get(here, ()) if name not in distance]
             distance.update(dict.fromkeys(fresh, distance[here] + 1))
             waiting.extend(fresh)
 

@@ -47,7 +47,7 @@ class Arranged:
     links: tuple[Arrow, ...]
     width: float
     height: float
-    left_out: int
+    omitted: int
 
 
 def arranged(scene: Picture) -> Arranged:
@@ -62,7 +62,7 @@ def arranged(scene: Picture) -> Arranged:
     placed = [_part(graph, [cards[key] for key in part]) for part in parts]
     width, height = _in_rows(placed)
     found = {one.card.key: one for part in placed for one in part}
-    return Arranged({key: found[key] for key in cards}, scene.links, width, height, scene.left_out)
+    return Arranged({key: found[key] for key in cards}, scene.links, width, height, scene.omitted)
 
 
 def _part(graph: nx.Graph[str], cards: list[Card]) -> list[Placed]:
@@ -152,7 +152,7 @@ _STYLE = (
 
 def to_svg(picture: Arranged) -> str:
     """Return the picture as one SVG document with an opaque background."""
-    note = f"{picture.left_out} more things are not drawn" if picture.left_out else ""
+    note = f"{picture.omitted} more things are not drawn" if picture.omitted else ""
     width, height = picture.width + 2 * MARGIN, picture.height + 2 * MARGIN + LINE * bool(note)
     width = max(width, len(note) * 7 + 2 * MARGIN)
     colours = _colours(picture)

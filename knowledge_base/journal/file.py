@@ -21,7 +21,7 @@ from typing import Literal, NamedTuple
 
 from knowledge_base.errors import DamagedStoreError, Place, StoreError
 from knowledge_base.journal.sidecar_files import INDEX, LOG, OLD_LOG, place, regular, require_no_strangers, unlocked
-from knowledge_base.pddl.files import files_beside
+from knowledge_base.pddl.files import neighbour_files
 
 Durability = Literal["memory", "process", "power"]
 """The failures that a commit survives.
@@ -121,8 +121,8 @@ def _identity(name: str) -> tuple[int, int, bool] | None:
 @lru_cache(maxsize=256)  # queries of past versions and followers open the same files repeatedly
 def _require_readable(path: Path, seen: Seen) -> None:  # noqa: ARG001  other files, another answer
     if not is_there(path):
-        beside = files_beside(path)
-        raise StoreError(f"there is no store '{path.name}'", place=Place(str(path)), found=path.name, valid=beside)
+        neighbours = neighbour_files(path)
+        raise StoreError(f"there is no store '{path.name}'", place=Place(str(path)), found=path.name, valid=neighbours)
     require_own(path)
 
 

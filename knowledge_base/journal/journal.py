@@ -279,14 +279,14 @@ def _guarded(connection: sqlite3.Connection) -> Iterator[None]:
     """Refuse statements of the block that begin or end a transaction: they would commit a change in part."""
     refused = False
 
-    def judge(action: int, *_: str | None) -> int:
+    def authorize(action: int, *_: str | None) -> int:
         nonlocal refused
         if action not in (sqlite3.SQLITE_TRANSACTION, sqlite3.SQLITE_SAVEPOINT):
             return sqlite3.SQLITE_OK
         refused = True
         return sqlite3.SQLITE_DENY
 
-    connection.set_authorizer(judge)
+    connection.set_authorizer(authorize)
     try:
         yield
     except sqlite3.DatabaseError as error:

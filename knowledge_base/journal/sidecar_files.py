@@ -58,7 +58,7 @@ def store_owning(path: Path, in_use: Iterable[Path] = ()) -> Path | None:
         stores = {store.resolve() for store in in_use}
         owner: Path | None = path.resolve()
         while owner is not None and owner not in stores and not is_database(owner):
-            owner = _beside(owner)
+            owner = _sidecar(owner)
     except (OSError, RuntimeError, ValueError):  # an invalid name: too long, a null character, links in a cycle
         return None
     return owner
@@ -190,7 +190,7 @@ def _begins_as_database(path: Path) -> bool:
         return file.read(len(_MAGIC)) == _MAGIC
 
 
-def _beside(path: Path) -> Path | None:
+def _sidecar(path: Path) -> Path | None:
     """Return the path of the file whose sidecar file has the name of `path`, or `None`."""
     for ending in ENDINGS:
         name = path.name.removesuffix(ending)

@@ -222,7 +222,7 @@ class Checkpoints:
         self._changed = Condition()
         self._waiting: dict[Path, int] = {}  # number of requests
         self._pages: dict[Path, int] = {}  # number of pages in the log at its last checkpoint
-        self._at_work: Path | None = None
+        self._writing: Path | None = None
         self._thread: Thread | None = None
 
     @contextmanager
@@ -230,7 +230,7 @@ class Checkpoints:
         """Request a checkpoint of the store if the commit in the block succeeds; the store must be open for writing."""
         with self._changed:  # no checkpoint begins during the block
             yield
-            if self._at_work == path:
+            if self._writing == path:
                 return
             self._waiting[path] = self._waiting.get(path, 0) + 1
             if self._thread is None or not self._thread.is_alive():
@@ -245,13 +245,13 @@ class Checkpoints:
         """Cancel the requests for the store, and wait until no checkpoint of the store runs."""
         with self._changed:
             self._waiting.pop(path, None)
-            self._changed.wait_for(lambda: self._at_work != path)
+            self._changed.wait_for(lambda: self._writing != path)
             self._pages.pop(path, None)
 
     def settle(self) -> None:
         """Wait until no request is pending."""
         with self._changed:
-            self._changed.wait_for(lambda: self._at_work is None and not self._waiting)
+            self._changed.wait_for(lambda: self._writing is None and not self._waiting)
 
     def _run(self) -> None:
         while (path := self._next()) is not None:
@@ -261,7 +261,7 @@ class Checkpoints:
             finally:
                 with self._changed:
                     self._pages[path] = pages
-                    self._at_work = None
+                    self._writing = None
                     self._changed.notify_all()
             time.sleep(PAUSE * (time.monotonic() - began))
 
@@ -270,9 +270,9 @@ class Checkpoints:
             if not self._waiting:
                 self._thread = None
                 return None
-            self._at_work = next(iter(self._waiting))
-            del self._waiting[self._at_work]
-            return self._at_work
+            self._writing = next(iter(self._waiting))
+            del self._waiting[self._writing]
+            return self._writing
 
 
 def _started(work: Callable[[], None]) -> Thread | None:

@@ -107,7 +107,7 @@ def _pieces(path: Path, most: int) -> Iterator[bytes]:
         finally:
             os.close(handle)
     except FileNotFoundError:
-        raise InputError(f"there is no file '{path}'", found=path.name, valid=files_beside(path)) from None
+        raise InputError(f"there is no file '{path}'", found=path.name, valid=neighbour_files(path)) from None
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise _unreadable(path, reason) from None
@@ -134,7 +134,7 @@ def text_and_source(text_or_path: str | Path, source: str | None) -> tuple[str, 
     return read_text(path, errors="surrogateescape"), source or str(path)
 
 
-def files_beside(path: Path) -> list[str]:
+def neighbour_files(path: Path) -> list[str]:
     """Return the names of the files with the same ending in the same folder, as suggestions."""
     try:
         return [p.name for p in path.parent.iterdir() if p.suffix == path.suffix]

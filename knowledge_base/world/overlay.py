@@ -103,8 +103,8 @@ class Overlay:
     def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
         """Return the reference of the source that is bound to the function, or `None`."""
         below = getattr(self._base, "reference", None)
-        begins_anew = self._gone and not self._gone.keys().isdisjoint(args)
-        return below(function, args) if below and not begins_anew else None
+        is_recreated = self._gone and not self._gone.keys().isdisjoint(args)
+        return below(function, args) if below and not is_recreated else None
 
     def objects(self, type_name: str) -> list[str]:
         """Return the objects of that type and its subtypes; objects of the base come first."""
@@ -118,8 +118,8 @@ class Overlay:
         return None if name in self._gone else self._base.type_of(name)
 
     def _base_value(self, fluent: Fact) -> Content:
-        begins_anew = self._gone and not self._gone.keys().isdisjoint(fluent.args)
-        return self.schema.unset(fluent.predicate) if begins_anew else self._base.value(fluent.predicate, fluent.args)
+        is_recreated = self._gone and not self._gone.keys().isdisjoint(fluent.args)
+        return self.schema.unset(fluent.predicate) if is_recreated else self._base.value(fluent.predicate, fluent.args)
 
     def _add(self, fact: Fact) -> None:
         if self._gone and not self._gone.keys().isdisjoint(fact.args):  # the removal of the object removed the fact too

@@ -29,7 +29,7 @@ from planning.model.cancellable_work import WorkLimit
 from planning.model.domain import PlanningAction, PlanningDomain
 from planning.model.plan import PlanStep
 from planning.model.problem import Problem
-from planning.model.quantities import Assignment, NumericBound, helps, worth
+from planning.model.quantities import Assignment, NumericBound, helps, value_of
 from planning.problem.conditions import Every, Grounder, Literal, Residual, Some, is_so
 from planning.problem.construction import ProblemBuilder, check_goal
 from planning.problem.derived import derivation
@@ -124,7 +124,7 @@ class _Reach:
                 present = is_so(fact, self.world) is positive
                 return present or as_fact(condition) in self.facts
             case NumericBound():
-                numbers = {one: worth(self.world, one) for one in condition.fluents()}
+                numbers = {one: value_of(self.world, one) for one in condition.fluents()}
                 return condition.holds(numbers) or any(
                     helps(change, condition) for change in self.changes if change.fluent in numbers
                 )
@@ -212,10 +212,10 @@ class _Causes:
 
     def closest(self, rule: JoinRule, start: dict[str, Value]) -> _Nearest | None:
         """Return the step with the fewest dropped positive preconditions so that the other ones have arguments."""
-        for given_up in range(len(rule.atoms) + 1):
+        for abandoned in range(len(rule.atoms) + 1):
             found = [
                 self.lacking(rule, full)
-                for kept in itertools.combinations(rule.atoms, len(rule.atoms) - given_up)
+                for kept in itertools.combinations(rule.atoms, len(rule.atoms) - abandoned)
                 for bindings in itertools.islice(rule.join(self.index, kept, start, self.grounder.patience), 1)
                 if (full := self.completed(rule, bindings)) is not None
             ]

@@ -15,7 +15,7 @@ from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.world.overlay import Overlay
 from planning.model.plan import Plan
-from planning.model.timeline import FINEST, Act, Changes, Flaw, TimelineEvent, carried_out
+from planning.model.timeline import FINEST, Act, Changes, Flaw, TimelineEvent, execute
 from planning.problem.derived import derivation
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def _as_scheduled(plan: Plan, derived: Derivation, world: World) -> Overlay | Va
         ahead.apply(_delta(changes, world.schema))
         return ahead
 
-    end = carried_out(acts, Overlay(world), after)
+    end = execute(acts, Overlay(world), after)
     return Validation(valid=False, failing_step=end.act, why=end.why) if isinstance(end, Flaw) else end
 
 

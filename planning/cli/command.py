@@ -27,7 +27,7 @@ from planning.cli.run import components_of_target, robot_knowledge, run_command
 if TYPE_CHECKING:
     from knowledge_base.errors import InputError
 
-BAD_INPUT, NOT_WRITTEN, NOBODY_READS = 2, 74, 141
+BAD_INPUT, NOT_WRITTEN, NO_READER = 2, 74, 141
 """Exit statuses of every command: bad input, EX_IOERR of sysexits.h, and a shell's status for a broken pipe."""
 
 NO_FILE = frozenset({errno.ELOOP, errno.ENAMETOOLONG, errno.ENOTDIR, errno.EACCES, errno.EPERM})
@@ -35,13 +35,13 @@ NO_FILE = frozenset({errno.ELOOP, errno.ENAMETOOLONG, errno.ENOTDIR, errno.EACCE
 
 
 class _Commands(TyperGroup):
-    """The group of commands; a closed pipe of the reader ends a command with `NOBODY_READS`."""
+    """The group of commands; a closed pipe of the reader ends a command with `NO_READER`."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
         except BrokenPipeError:
-            raise typer.Exit(NOBODY_READS) from None
+            raise typer.Exit(NO_READER) from None
 
 
 app = typer.Typer(
@@ -92,7 +92,7 @@ def main() -> None:
     try:
         _command()
     except BrokenPipeError:
-        sys.exit(NOBODY_READS)
+        sys.exit(NO_READER)
     except OSError as error:
         from knowledge_base.output_files import FULL
 

@@ -27,13 +27,13 @@ from knowledge_base.pddl import ProblemText
 from planning.model.domain import PlanningDomain
 from planning.model.plan import (
     EngineFailed,
-    NobodyCan,
     NoneFound,
     Plan,
     PlanFound,
     PlanningOutcome,
     ProvenUnsolvable,
     TimedOut,
+    Unsupported,
 )
 from planning.ordering.partial_order import PartialOrder, chains
 
@@ -65,7 +65,7 @@ def answer_of(outcome: PlanningOutcome) -> tuple[int, dict[str, Any]]:
             return TIMED_OUT, {"outcome": "timed_out", "steps": [], "engine": engine, "seconds": seconds}
         case EngineFailed(engine=engine, message=message):
             return FAILED, {"outcome": "engine_failed", "steps": [], "engine": engine, "reason": message}
-        case NobodyCan(engine=engine, message=message):
+        case Unsupported(engine=engine, message=message):
             return FAILED, {"outcome": "no_engine", "steps": [], "engine": engine, "reason": message}
 
 

@@ -132,7 +132,7 @@ def run_command(
         given = [name for name, value in beginning.items() if value is not None] + ["--real-time"] * real_time
         if given:
             raise InputError(f"--resume continues a run as it began, without {', '.join(given)}")
-        robot = _resumed(resume, target, durability, planner)
+        robot = _resume(resume, target, durability, planner)
     else:
         bundle = _bundle(target)
         robot = _robot(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
@@ -214,7 +214,7 @@ def _planner(engine: str) -> Planner:
     return CachingPlanner(PlannerRace(choose=only(engine)))
 
 
-def _resumed(store: Path, target: str | None, durability: Durability, planner: Planner | None) -> Robot:
+def _resume(store: Path, target: str | None, durability: Durability, planner: Planner | None) -> Robot:
     """Deploy the robot that began the run in a store; `target` replaces the target that the store has kept."""
     from knowledge_base.errors import Place, StoreError
     from planning.robot.bringup import kept_run, resume
@@ -247,7 +247,7 @@ def _viewed(
     from dsc.viewer.live import LivePage
 
     live = LivePage(header(**robot.header()), PageAddress.on(port), control=control)
-    robot.listen(live.hear)
+    robot.listen(live.receive)
     with page(live, opens=opens) as viewer:
         report = follow(prepare=live.control.attach if live.control else None)
         live.end()

@@ -22,7 +22,7 @@ from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, able, chosen, timing
 from planning.model.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.model.domain import PlanningDomain
-from planning.model.plan import NobodyCan, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
+from planning.model.plan import Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut, Unsupported
 from planning.model.problem import Problem
 from planning.ordering.causal_tracing import deordered
 from planning.ordering.partial_order import PartialOrder, in_sequence
@@ -57,7 +57,7 @@ def plan(
         end(TIMED_OUT, late | {"while": error.doing}, notes, as_json=as_json)
     notes += problem.notes
     status, answer = answer_of(outcome)
-    if isinstance(outcome, NobodyCan):
+    if isinstance(outcome, Unsupported):
         answer["reason"] = why_no_engine(domain, read.goal, outcome)
     if isinstance(outcome, ProvenUnsolvable) and explain:
         answer["why"] = why_none(domain, read, world, seconds)
@@ -123,7 +123,7 @@ def solved(
     patience = WorkLimit(seconds)
     durations = bool(timing()) or engine is not None
 
-    def posed() -> Problem:
+    def problem_of_files() -> Problem:
         form = Derivable.of(domain)
         if form is not None:
             return form.build_problem(world, read.goal, read.metric, durations=durations, patience=patience)
@@ -131,7 +131,7 @@ def solved(
 
     async def solve() -> tuple[Problem, PlanningOutcome]:
         with _progress("grounding the problem"):
-            problem = await aside(posed, patience)
+            problem = await aside(problem_of_files, patience)
         planner = _planner(problem, engine)
         names = [engine] if engine else [one.name for one in chosen(problem)]
         with _progress(f"planning with {' and '.join(names)}, {len(problem.actions)} ground actions"):

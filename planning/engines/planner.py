@@ -13,7 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from planning.engines.action_elimination import indispensable
 from planning.engines.process import EngineProcess, EngineStoppedError, OutOfTimeError, answers, worker
-from planning.engines.registry import can_time, cannot, in_concert, nobody
+from planning.engines.registry import can_time, cannot, in_concert, refusal
 from planning.engines.request import written
 from planning.model.cancellable_work import aside
 from planning.model.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
@@ -132,7 +132,7 @@ class PlannerProcess:
         if not problem.goal and not problem.bounds and not problem.unreachable:
             return PlanFound(Plan(), self.engine, 0.0, problem.simulated_seconds)
         if cannot(self.engine, problem):
-            return nobody(problem.features, self.engine)
+            return refusal(problem.features, self.engine)
         return None
 
     def _none(self, problem: Problem, reason: str) -> ProvenUnsolvable | NoneFound:
@@ -186,7 +186,7 @@ class PlannerProcess:
         try:
             async with aclosing(answers(process, written(problem), seconds)) as heard:
                 async for answer in heard:
-                    outcome = self._judged(answer, problem, time.monotonic() - started)
+                    outcome = self._outcome_of(answer, problem, time.monotonic() - started)
                     if best is None or (isinstance(outcome, PlanFound) and outcome.cost < best.cost):
                         yield outcome
                     if not isinstance(outcome, PlanFound):
@@ -214,7 +214,7 @@ class PlannerProcess:
         if not process.idle:
             await aside(lambda: process.start(self._start_up_seconds))
 
-    def _judged(self, answer: dict[str, Any], problem: Problem, seconds: float) -> PlanningOutcome:
+    def _outcome_of(self, answer: dict[str, Any], problem: Problem, seconds: float) -> PlanningOutcome:
         """Return the outcome for the engine's answer; a plan that does not solve the problem is a failure."""
         if "failed" in answer:
             return EngineFailed(self.engine, str(answer["failed"]))

@@ -97,7 +97,7 @@ class EngineProcess:
         self._turn = threading.Lock()
         self._ready = False
         self._unsent = memoryview(b"")
-        self._heard = bytearray()
+        self._received = bytearray()
         self._searches: set[int] = set()
         self._end = weakref.finalize(self, _end, popen, self._searches, folder)
 
@@ -134,13 +134,13 @@ class EngineProcess:
                 raise EngineStoppedError("it did not say that it is ready")
             self._ready = True
 
-    def ask(self, request: bytes, deadline: Deadline, hear: Callable[[dict[str, Any]], object]) -> None:
+    def ask(self, request: bytes, deadline: Deadline, receive: Callable[[dict[str, Any]], object]) -> None:
         """Send a request to the worker, and return after the end of the search.
 
         Args:
             request: the problem, as a line of JSON.
             deadline: the deadline of the search.
-            hear: called with each answer, in this thread.
+            receive: called with each answer, in this thread.
 
         Raises:
             OutOfTimeError: the deadline has passed, and the search has been killed. The process has been killed too,
@@ -155,7 +155,7 @@ class EngineProcess:
                     self._follow(said["searching"])
                 else:
                     answered = True
-                    hear(said)
+                    receive(said)
             self._searches.clear()
             if not answered:
                 raise EngineStoppedError(f"the search {_ending(said['ended'])} without an answer")
@@ -194,10 +194,10 @@ class EngineProcess:
         self._searches.clear()
 
     def _next(self, deadline: Deadline) -> dict[str, Any]:
-        while b"\n" not in self._heard:
+        while b"\n" not in self._received:
             self._exchange(deadline)
-        line, _, rest = bytes(self._heard).partition(b"\n")
-        self._heard = bytearray(rest)
+        line, _, rest = bytes(self._received).partition(b"\n")
+        self._received = bytearray(rest)
         said = json.loads(line)
         if not isinstance(said, dict):
             raise ValueError(f"no answer: {line[:80]!r}")
@@ -225,8 +225,8 @@ class EngineProcess:
         chunk = os.read(self._from, 65536)
         if not chunk:
             raise ValueError(f"the process {_ending(self._status())}")
-        self._heard += chunk
-        if len(self._heard) > _LONGEST_ANSWER:
+        self._received += chunk
+        if len(self._received) > _LONGEST_ANSWER:
             raise ValueError(f"no answer: over {_LONGEST_ANSWER} bytes without an end")
 
     def _status(self) -> int | None:

@@ -44,8 +44,8 @@ def task(request: Request) -> Task:
     return Task("problem", set(names), init, goal, operators)
 
 
-def _plans(posed: Task) -> Answers:
+def _plans(task: Task) -> Answers:
     # The search prunes only states that are hopeless by h_FF even without deletions. An exhausted search is therefore a
     # proof of unsolvability.
-    found = greedy_best_first_search(posed, hFFHeuristic(posed))
+    found = greedy_best_first_search(task, hFFHeuristic(task))
     yield None if found is None else [operator.name for operator in found]

@@ -15,15 +15,15 @@ from dataclasses import replace
 
 from knowledge_base.errors import described
 from planning.engines.planner import PlannerProcess
-from planning.engines.registry import Engine, chosen, nobody
+from planning.engines.registry import Engine, chosen, refusal
 from planning.model.plan import (
     EngineFailed,
-    NobodyCan,
     NoneFound,
     PlanFound,
     PlanningOutcome,
     ProvenUnsolvable,
     TimedOut,
+    Unsupported,
 )
 from planning.model.problem import Problem
 
@@ -91,14 +91,14 @@ class PlannerRace:
         problem = problem if problem.timed is None else replace(problem, timed=None)
         async with aclosing(self._raced(self._choose(problem), problem, seconds)) as outcomes:
             async for outcome in outcomes:
-                yield outcome if isinstance(outcome, EngineFailed | NobodyCan) else _with(failures, outcome)
+                yield outcome if isinstance(outcome, EngineFailed | Unsupported) else _with(failures, outcome)
 
     async def _raced(
         self, engines: Sequence[Engine], problem: Problem, seconds: float
     ) -> AsyncGenerator[PlanningOutcome, None]:
         """Yield the outcomes of a race of `engines` for one form of a problem, e.g. its temporal form."""
         if not engines:
-            yield nobody(problem.features)
+            yield refusal(problem.features)
             return
         for task in self._improving:
             task.cancel()
@@ -142,7 +142,7 @@ def _with(failures: tuple[EngineFailed, ...], outcome: _Failing) -> PlanningOutc
 def _failures(outcome: PlanningOutcome) -> tuple[EngineFailed, ...]:
     if isinstance(outcome, EngineFailed):
         return (outcome,)
-    return () if isinstance(outcome, NobodyCan) else outcome.failures
+    return () if isinstance(outcome, Unsupported) else outcome.failures
 
 
 async def _run(planner: PlannerProcess, problem: Problem, seconds: float, answers: asyncio.Queue[_Answer]) -> None:
@@ -178,7 +178,7 @@ async def _better_and_better(
                     return
             case EngineFailed():
                 failures.append(outcome)
-            case NobodyCan():
+            case Unsupported():
                 failures.append(EngineFailed(name, outcome.message))
             case TimedOut():
                 late.append(name)

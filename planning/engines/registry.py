@@ -13,13 +13,13 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 from knowledge_base.errors import InputError, UnknownNameError
-from planning.model.plan import NobodyCan
+from planning.model.plan import Unsupported
 from planning.model.problem import Problem
 
 WISHES = frozenset({"costs"})
 """Features that an engine may ignore; the plan is then still valid, but may be expensive."""
 
-AT_ONCE = 2
+PARALLEL_ENGINES = 2
 """The maximum number of engines in a race (CONTRACTS.md, Planning), because some robots have only two cores."""
 
 
@@ -155,10 +155,10 @@ def in_concert() -> str:
     return "engines that could do several: " + ", ".join(map(described, able({"durations"})))
 
 
-def nobody(features: Collection[str], engine: str = "") -> NobodyCan:
+def refusal(features: Collection[str], engine: str = "") -> Unsupported:
     """Return the outcome for a problem with these features, which no permitted engine supports."""
     could = tuple((one.name, one.lacks()) for one in able(features) if one.races)
-    return NobodyCan(engine, tuple(sorted(frozenset(features) - WISHES)), could)
+    return Unsupported(engine, tuple(sorted(frozenset(features) - WISHES)), could)
 
 
 def cannot(name: str, problem: Problem) -> bool:
@@ -173,7 +173,7 @@ def described(one: Engine) -> str:
 
 
 def chosen(problem: Problem, *, usable: Callable[[Engine], bool] = installed) -> list[Engine]:
-    """Return at most `AT_ONCE` engines for a race; empty if no usable engine supports the problem.
+    """Return at most `PARALLEL_ENGINES` engines for a race; empty if no usable engine supports the problem.
 
     The result is also empty for a temporal problem that is too large for every engine. The problem with one action at
     a time is then solved faster.
@@ -181,7 +181,7 @@ def chosen(problem: Problem, *, usable: Callable[[Engine], bool] = installed) ->
     racing = [one for one in able(problem.features) if one.races and usable(one)]
     size = len(problem.actions)
     fitting = [one for one in racing if one.most_actions is None or size <= one.most_actions]
-    return (fitting or ([] if "durations" in problem.features else racing))[:AT_ONCE]
+    return (fitting or ([] if "durations" in problem.features else racing))[:PARALLEL_ENGINES]
 
 
 def repeatable(problem: Problem, *, usable: Callable[[Engine], bool] = installed) -> list[Engine]:

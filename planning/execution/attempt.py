@@ -94,17 +94,17 @@ class Attempt:
         """Note that a step was completed."""
         self.disturbances = self.outages = 0
 
-    def failed(self, failure: Failure, *, stands: bool, others: bool, outage: bool = False) -> EscalationStep:
+    def failed(self, failure: Failure, *, is_valid: bool, others: bool, outage: bool = False) -> EscalationStep:
         """Count a failure, and return the next escalation step for it.
 
         Args:
             failure: the failed step, the reason and the situation.
-            stands: whether the plan, with the failed step, still leads to the goal.
+            is_valid: whether the plan, with the failed step, still leads to the goal.
             others: whether another candidate implements the failed step.
             outage: whether the device has failed and not the step, so that further plans may succeed later.
         """
         self.failures[failure] += 1
-        if stands and self.resumed[failure.step] < MOST_RESUMED:
+        if is_valid and self.resumed[failure.step] < MOST_RESUMED:
             answers = [
                 EscalationStep.RESUME,
                 *([EscalationStep.OTHER_CANDIDATE] if others else []),

@@ -83,12 +83,12 @@ class Escalation:
         if step is EscalationStep.GIVE_UP:
             remedy = self._remedy(failed) if failed is not None and why.startswith(NOT_OBSERVED) else ""
             reason = f"{failed} has failed before, in the same way and the same situation: {why}{remedy}"
-            return self._give_up(run, reason)
+            return self._abandon(run, reason)
         disturbed = run.disturbed or (failed is None and run.successor is not None)
         if not attempt.replan(run.replans, disturbed=disturbed):
             used = f"the budget of {run.replans} new plans is used up"
             ended = f"changes by others ended {run.replans} plans before a step was completed"
-            return self._give_up(run, f"{ended if disturbed else used}: {why}")
+            return self._abandon(run, f"{ended if disturbed else used}: {why}")
         if step is EscalationStep.EXCLUDE and failed is not None:
             self.search.exclude(failed, why)
         return Replan()
@@ -133,7 +133,7 @@ class Escalation:
         choice = self.choices.of(failed)
         others = choice is not None and len(implementing(failed, self.plotting.library)) > 1
         failure = Failure(failed, why, situation(progress.domain, self._knowledge, progress.goal))
-        return attempt.failed(failure, stands=end is not None, others=others, outage=outage), choice
+        return attempt.failed(failure, is_valid=end is not None, others=others, outage=outage), choice
 
     def _failed_step(self, progress: PlanProgress) -> PlanStep | None:
         """Return the running step; `None` if its expected effects hold, or if several steps are running."""
@@ -227,7 +227,7 @@ class Escalation:
             self.records.resumed(run.name, name, steps[0], why, instead_of)
         return name
 
-    def _give_up(self, run: PlanRun, reason: str) -> GaveUp:
+    def _abandon(self, run: PlanRun, reason: str) -> GaveUp:
         self.runs.conclude(run.task)
         self.runs.over(run.name)
         self.records.gave_up(run.name, reason)

@@ -99,7 +99,7 @@ class LinkMonitor:
         progress: the progress of the plan. The caller that begins a step there must then call `look`.
         domain, knowledge: the planning domain and the knowledge base.
         is_own: returns whether a change by this author is an effect of the running step.
-        hear: receives the news of a change, during the commit of the change.
+        receive: receives the news of a change, during the commit of the change.
     """
 
     def __init__(
@@ -108,13 +108,13 @@ class LinkMonitor:
         domain: PlanningDomain,
         knowledge: KnowledgeBase,
         is_own: Callable[[str], bool],
-        hear: Callable[[News], None],
+        receive: Callable[[News], None],
     ) -> None:
         self._progress = progress
         self._domain = domain
         self._knowledge = knowledge
         self._is_own = is_own
-        self._hear = hear
+        self._receive = receive
         self._links: dict[Expression, Condition] = {}
         self._to_come: dict[Expression, Condition] = {}
         self._brought: dict[PlanStep, list[Expression]] = {}
@@ -135,20 +135,20 @@ class LinkMonitor:
         self.update()
         progress, world = self._progress, self._knowledge
         if is_true(progress.goal, world):
-            self._hear(GoalReached(author))
+            self._receive(GoalReached(author))
         elif len(progress.running) > 1:  # a shorter plan interrupts no step
-            if not progress.stands(world):
-                self._hear(self._broken(author, world.version))
+            if not progress.is_valid(world):
+                self._receive(self._broken(author, world.version))
         else:
             end = shortest_end(progress.remaining_steps, self._domain, world, progress.goal)
             if end is None:
-                self._hear(self._broken(author, world.version))
+                self._receive(self._broken(author, world.version))
                 return
             if progress.early:
                 progress.early = False
                 end = thinned(end, self._domain, world, progress.goal)
             if len(end) < len(progress.remaining):
-                self._hear(Shorter(end))
+                self._receive(Shorter(end))
 
     def close(self) -> None:
         """Cancel all installed conditions."""
@@ -208,7 +208,7 @@ class LinkMonitor:
     def _goal_fired(self, _: Expression, firing: Firing) -> None:
         author = self._foreign(firing) if firing.truth else None
         if author is not None:
-            self._hear(GoalReached(author))
+            self._receive(GoalReached(author))
 
     def _came(self, _: Expression, firing: Firing) -> None:
         if firing.truth and self._foreign(firing) is not None:
@@ -228,14 +228,14 @@ class LinkMonitor:
         if later:
             # Effects of the running step do not matter here, because a later step may become the next step.
             if shortest_end(progress.coming(), self._domain, world, progress.goal) is None:
-                self._hear(self._broken(author, firing.version, e))
-        elif not progress.stands(world):  # the change breaks the running step
+                self._receive(self._broken(author, firing.version, e))
+        elif not progress.is_valid(world):  # the change breaks the running step
             end = shortest_end(progress.coming(), self._domain, world, progress.goal)
-            self._hear(self._broken(author, firing.version, e) if end is None else Shorter(end))
+            self._receive(self._broken(author, firing.version, e) if end is None else Shorter(end))
 
     def _changed(self, change: Change) -> None:
-        if not self._is_own(change.author) and not self._progress.stands(self._knowledge):
-            self._hear(self._broken(change.author, change.version))
+        if not self._is_own(change.author) and not self._progress.is_valid(self._knowledge):
+            self._receive(self._broken(change.author, change.version))
 
     def _broken(self, author: str, version: int, fallen: Expression | None = None) -> Broken:
         progress, world = self._progress, self._knowledge.snapshot()

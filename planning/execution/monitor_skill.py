@@ -16,7 +16,7 @@ from planning.execution.link_monitor import OVERTAKING, OWN_STEPS, Broken, GoalR
 from planning.execution.outcomes import GoalHolds, Monitored, PlanInvalid
 from planning.execution.plan_ends import shortest_end
 from planning.execution.plan_progress import cost_of
-from planning.execution.plan_run import Better, Heard, PlanRun, PlanState, Successor
+from planning.execution.plan_run import Better, PlanNews, PlanRun, PlanState, Successor
 from planning.execution.search import Found, NotFound
 from planning.model.plan import PlanFound
 
@@ -101,14 +101,14 @@ class MonitorSkill:
         while run.missed:
             self._begun(run.number(run.missed.pop(0)))
 
-    async def _next_news(self) -> Heard:
+    async def _next_news(self) -> PlanNews:
         """Wait for the next news and return it."""
         while not self._run.news:
             self._new.clear()
             await self._new.wait()
         return self._run.news.popleft()
 
-    def _put(self, heard: Heard) -> None:
+    def _put(self, heard: PlanNews) -> None:
         self._run.news.append(heard)
         self._new.set()
 
@@ -122,7 +122,7 @@ class MonitorSkill:
         if self._monitor is not None:
             self._monitor.close()
 
-    def _answer(self, news: Heard) -> Monitored | None:
+    def _answer(self, news: PlanNews) -> Monitored | None:
         """Handle the news; return the outcome with which monitoring ends, or `None` if monitoring continues."""
         run = self._run
         outcome: Monitored | None = None
@@ -167,10 +167,10 @@ class MonitorSkill:
         progress = self._run.progress
         if self._monitor is not None:
             self._monitor.close()
-        self._monitor = LinkMonitor(progress, progress.domain, self._knowledge, self._is_own, self._hear)
+        self._monitor = LinkMonitor(progress, progress.domain, self._knowledge, self._is_own, self._receive)
         return self._monitor
 
-    def _hear(self, news: News) -> None:
+    def _receive(self, news: News) -> None:
         if isinstance(news, Broken):
             if self._run.state is PlanState.BROKEN:
                 return

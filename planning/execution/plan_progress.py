@@ -24,7 +24,7 @@ from planning.model.cancellable_work import WorkLimit
 from planning.model.domain import PlanningDomain
 from planning.model.plan import Plan, PlanStep
 from planning.model.problem import Problem
-from planning.model.quantities import worth
+from planning.model.quantities import value_of
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation
 from planning.problem.operators import TOTAL_COST
@@ -35,7 +35,7 @@ MOST_LONGER = 2
 """The number of steps by which a repaired plan may be longer than the remaining plan."""
 _MOST_UNMET = 3
 """The largest number of unmet conditions with which a repair keeps an end of a plan."""
-_MOST_LEFT_OUT = 2
+_MOST_OMITTED = 2
 """The largest number of first steps that a repair may replace."""
 _MOST_THINNED = 60
 """The largest number of steps of a repaired plan from which useless steps are removed, in quadratic time."""
@@ -86,7 +86,7 @@ def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> 
     for step in steps:
         ahead.apply(domain.effects(step, ahead))
     total = Fact(TOTAL_COST.function)
-    return worth(ahead, total) - worth(world, total)
+    return value_of(ahead, total) - value_of(world, total)
 
 
 class PlanProgress:
@@ -210,7 +210,7 @@ class PlanProgress:
         """Return the conditions of `needed` as if all running steps were done."""
         return self._needs.before(self._after(self.running))
 
-    def stands(self, world: World) -> bool:
+    def is_valid(self, world: World) -> bool:
         """Return whether the plan reaches the goal from `world`, with any subset of the running steps done."""
         return any(leads_to(steps, self.domain, world, self.goal) for steps in self._ways_on())
 
@@ -286,7 +286,7 @@ def local_repair(
     )  # read only once, since the plan may continue during the repair
     if derived.recursive:  # the conditions in `before` belong to another state of the world
         before = before.renewed(derived.domain, derived.expand(goal))
-    ends = (left[first:] for first in range(min(_MOST_LEFT_OUT + 1, len(left))))
+    ends = (left[first:] for first in range(min(_MOST_OMITTED + 1, len(left))))
     needs = [(before.steps_of(end), before.needed_by(end)) for end in ends]
     truths: dict[int, bool] = {}
     gaps = [

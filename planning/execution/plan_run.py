@@ -85,7 +85,7 @@ class Better:
     answer: PlanFound
 
 
-Heard = News | Found | NotFound | Better
+PlanNews = News | Found | NotFound | Better
 """The news that `MonitorSkill` handles."""
 
 
@@ -130,7 +130,7 @@ class PlanRun:
     state: PlanState = PlanState.BOUND
     successor: Successor | None = None
     begun: set[int] = field(default_factory=set)
-    news: deque[Heard] = field(default_factory=deque)
+    news: deque[PlanNews] = field(default_factory=deque)
     searching_since: float | None = None
     missed: list[int] = field(default_factory=list)
     on_begin: Callable[[int], None] | None = None

@@ -156,16 +156,16 @@ class PlannerCalls:
         self._clock = clock
         self.name = type(planner).__name__
 
-    def give_up_at(self, seconds: float) -> asyncio.Timeout:
+    def abandon_at(self, seconds: float) -> asyncio.Timeout:
         """Return a timeout in simulated time for all calls of a block.
 
         A search stops simulated time. A planner that is itself simulated may let time pass up to this timeout.
         """
         return self._clock.timeout_at(self._clock.now() + seconds + PATIENCE if self._clock.simulated else math.inf)
 
-    async def solve(self, problem: Problem, seconds: float, *, going_on: bool = True) -> Answer:
+    async def solve(self, problem: Problem, seconds: float, *, improving: bool = True) -> Answer:
         """Return the outcome of the planner, in real time with its better plans, which are not repeatable."""
-        if going_on and not self._clock.simulated and isinstance(self._planner, Improving):
+        if improving and not self._clock.simulated and isinstance(self._planner, Improving):
             plans = self._planner.plans(problem, seconds)
             better = Improvements(plans, self.name)
             answer = await self._bounded(anext(plans), seconds)

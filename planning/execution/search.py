@@ -24,13 +24,13 @@ from planning.execution.planner_call import Answer, Improvements, PlannerCalls
 from planning.model.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.model.plan import (
     EngineFailed,
-    NobodyCan,
     NoneFound,
     Plan,
     PlanFound,
     PlanStep,
     ProvenUnsolvable,
     TimedOut,
+    Unsupported,
 )
 from planning.model.problem import WrongPlan
 from planning.ordering.causal_tracing import deordered
@@ -268,7 +268,7 @@ class Search:
             if self._clock.simulated:
                 await sleep(found.answer.simulated_seconds)
             try:
-                verdict, found = await self._judge(found, goal, seconds)
+                verdict, found = await self._validate(found, goal, seconds)
             except WorkLimitError:
                 await found.close()
                 return NotFound("timed_out", f"the plan found was not validated within {seconds:g} s")
@@ -344,7 +344,7 @@ class Search:
         rejected[found.steps[verdict.failing_step]] = verdict.why
         return None
 
-    async def _judge(self, found: Found, goal: Expression, seconds: float) -> tuple[Validation, Found]:
+    async def _validate(self, found: Found, goal: Expression, seconds: float) -> tuple[Validation, Found]:
         """Validate the plan found on the present world in a thread, again while the world changes meanwhile.
 
         Raises:
@@ -352,13 +352,15 @@ class Search:
         """
         for _ in range(MAX_ATTEMPTS):
             version, snapshot = self._knowledge.version, self._knowledge.snapshot()
-            work = partial(self._judged, found, goal, snapshot, version)
-            judged = await self.aside(work, WorkLimit(seconds))
+            work = partial(self._validate_and_order, found, goal, snapshot, version)
+            validated = await self.aside(work, WorkLimit(seconds))
             if version == self._knowledge.version:
-                return judged
-        return self._judged(found, goal, self._knowledge.snapshot(), self._knowledge.version)
+                return validated
+        return self._validate_and_order(found, goal, self._knowledge.snapshot(), self._knowledge.version)
 
-    def _judged(self, found: Found, goal: Expression, world: World, version: int) -> tuple[Validation, Found]:
+    def _validate_and_order(
+        self, found: Found, goal: Expression, world: World, version: int
+    ) -> tuple[Validation, Found]:
         """Validate the plan, and compute its partial order and the needs of its steps."""
         plan, order, found = found.answer.plan, None, replace(found, version=version)
         if not plan.schedule:
@@ -375,7 +377,7 @@ class Search:
 
     async def _in_time(self, finding: Awaitable[Found | NotFound], seconds: float) -> Found | NotFound:
         try:
-            async with self._planner.give_up_at(seconds):
+            async with self._planner.abandon_at(seconds):
                 return await finding
         except TimeoutError:
             return NotFound("timed_out", f"no plan within {seconds:g} s, nor soon after ({self._planner.name})")
@@ -446,7 +448,7 @@ class Search:
         if how is None:
             return None
         seconds = min(patience.left / 4, LOCAL_REPAIR_SECONDS)
-        answer, _ = await self._planner.solve(without(how.problem, excluded), seconds, going_on=False)
+        answer, _ = await self._planner.solve(without(how.problem, excluded), seconds, improving=False)
         if not isinstance(answer, PlanFound):
             return answer if isinstance(answer, TimedOut) else None
         plan = await self.aside(lambda: how.repaired(answer.plan, before.remaining_steps, self._domain, snapshot, goal))
@@ -504,7 +506,7 @@ def _ahead(running: Collection[PlanStep], domain: PlanningDomain, world: World) 
 
 
 def _unknown(
-    answer: NoneFound | TimedOut | EngineFailed | NobodyCan, domain: PlanningDomain, goal: Expression, seconds: float
+    answer: NoneFound | TimedOut | EngineFailed | Unsupported, domain: PlanningDomain, goal: Expression, seconds: float
 ) -> NotFound:
     """Convert an outcome without a plan and without a proof of unsolvability."""
     match answer:
@@ -514,7 +516,7 @@ def _unknown(
             return NotFound("timed_out", f"no plan within {seconds:g} s ({engine}); {_REMEDY}")
         case EngineFailed(engine=engine, message=message):
             return NotFound("failed", f"{engine}: {message}")
-        case NobodyCan():
+        case Unsupported():
             return NotFound("failed", why_no_engine(domain, goal, answer))
 
 

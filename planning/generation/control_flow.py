@@ -57,7 +57,7 @@ class Writer:
         order: the partial order of the steps.
         lanes: the chains of steps.
         plan: the name of the plan, with which states report the begin of steps; `None` without the planning component.
-        left_out: the numbers of the steps that rules may skip.
+        omitted: the numbers of the steps that rules may skip.
         leading: outcomes with which rules leave the plan for another state; for each, the names of the passed data.
         retried: whether rules may enter steps again.
         running: the steps that are running in the plot that this plot replaces.
@@ -69,7 +69,7 @@ class Writer:
         order: PartialOrder,
         lanes: Sequence[ControlFlow],
         plan: str | None,
-        left_out: Collection[int],
+        omitted: Collection[int],
         leading: Mapping[str, Iterable[str]],
         *,
         retried: bool,
@@ -78,7 +78,7 @@ class Writer:
         self._retried = retried
         self._running = frozenset(running)
         self._steps = steps
-        self._left_out = left_out
+        self._omitted = omitted
         self._ends: dict[str, Mapping[str, str]] = {end: {"reason": "?reason"} for end in (REPLAN, GAVE_UP)}
         self._ends.update({end: {name: f"?{passed(name)}" for name in names} for end, names in leading.items()})
         self._plan = plan
@@ -104,8 +104,8 @@ class Writer:
             if self._retried and self._steps[number].needed:
                 states[again(f"step_{number}")] = self._again(number, lane)
             states[f"after_{number}"] = self._after(number, following, lane)
-            if number in self._left_out:
-                states[skipped(f"step_{number}")] = self._after(number, following, lane, left_out=True)
+            if number in self._omitted:
+                states[skipped(f"step_{number}")] = self._after(number, following, lane, omitted=True)
             if following is not None and self._waits[following]:
                 states[f"before_{following}"] = self._before(following, lane)
         for end, handed_out in self._ends.items():
@@ -154,19 +154,17 @@ class Writer:
             state["after"] = {"seconds": step.seconds, **self._replan(lane, f"too slow: {step.text}")}
         return state
 
-    def _after(
-        self, number: int, following: int | None, lane: ControlFlow, *, left_out: bool = False
-    ) -> dict[str, Any]:
+    def _after(self, number: int, following: int | None, lane: ControlFlow, *, omitted: bool = False) -> dict[str, Any]:
         step, flag = self._steps[number], f"{_DONE}_{number}"
         told = {"assign": {flag: True}} if flag in self._flags else {}
         if following is not None and self._waits[following]:
-            onward = [_guarded({"to": f"before_{following}", **told}, None if left_out else _seen(step))]
-        elif left_out:
+            onward = [_guarded({"to": f"before_{following}", **told}, None if omitted else _seen(step))]
+        elif omitted:
             onward = self._onward(following, lane, (), told)
         else:
             onward = self._onward(following, lane, step.expected, told, step)
         state: dict[str, Any] = {"always": onward}
-        if step.expected and not left_out:
+        if step.expected and not omitted:
             state["after"] = {"seconds": step.confirm, **self._replan(lane, f"{NOT_OBSERVED}{step.text}")}
         return state
 

@@ -127,14 +127,14 @@ def plot_of(
     labels = labels or range(1, len(plan.steps) + 1)
     layout = layout.labelled(labels)
     steps, lanes, rules = layout.steps, layout.lanes, layout.rules
-    left_out = [
-        label for label, step in zip(labels, plan.steps, strict=True) if any(_leaves_out(rule, step) for rule in rules)
+    omitted = [
+        label for label, step in zip(labels, plan.steps, strict=True) if any(_omits(rule, step) for rule in rules)
     ]
     continuations = tuple(chain.from_iterable(rule.continuations for rule in rules))
     retried = any(one.then in {RETRY, ENTER} for one in continuations)
     leading = {one.outcome: dict.fromkeys(one.do.passed, "symbol") for one in continuations if one.leads_away}
     writer = Writer(
-        dict(zip(labels, steps, strict=True)), layout.order, lanes, name if watched else None, left_out, leading,
+        dict(zip(labels, steps, strict=True)), layout.order, lanes, name if watched else None, omitted, leading,
         retried=retried, running=labels[:running],
     )  # fmt: skip
     ends = {FINISHED: {"final": True}}
@@ -170,7 +170,7 @@ def _inherited(rule: Rule, plan: Plan) -> Rule | None:
     return rule.model_copy(update={key: named}) if named else None
 
 
-def _leaves_out(rule: Rule, step: PlanStep) -> bool:
+def _omits(rule: Rule, step: PlanStep) -> bool:
     return step.action in rule.before and rule.then == CONTINUE
 
 

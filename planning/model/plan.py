@@ -166,7 +166,7 @@ class EngineFailed:
 
 
 @dataclass(frozen=True, slots=True)
-class NobodyCan:
+class Unsupported:
     """Refusal of a problem: no permitted engine supports the problem's features, so no engine received the problem.
 
     Attributes:
@@ -183,9 +183,9 @@ class NobodyCan:
     @property
     def who(self) -> str:
         """The missing support, and the engines that provide it, as text."""
-        nobody = f"{self.engine} cannot do that" if self.engine else "no installed engine can do that"
+        cannot = f"{self.engine} cannot do that" if self.engine else "no installed engine can do that"
         others = ", ".join(f"{name} could ({how or 'name it as the planner'})" for name, how in self.could)
-        return f"{nobody}, {others or 'nor can any engine known here'}"
+        return f"{cannot}, {others or 'nor can any engine known here'}"
 
     @property
     def message(self) -> str:
@@ -193,5 +193,5 @@ class NobodyCan:
         return f"the problem needs {', '.join(self.needs) or 'STRIPS'}; {self.who}"
 
 
-PlanningOutcome = PlanFound | ProvenUnsolvable | NoneFound | TimedOut | EngineFailed | NobodyCan
+PlanningOutcome = PlanFound | ProvenUnsolvable | NoneFound | TimedOut | EngineFailed | Unsupported
 """The outcome of a planning request."""

@@ -16,7 +16,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
 from planning.model.plan import Plan, PlanStep, Timing
 from planning.model.quantities import Assignment, Numbers, NumericBound
-from planning.model.timeline import FINEST, Act, Changes, Flaw, TimelineEvent, carried_out
+from planning.model.timeline import FINEST, Act, Changes, Flaw, TimelineEvent, execute
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -243,7 +243,7 @@ class Problem:
             if not least - FINEST <= seconds <= most + FINEST:
                 return f"{action.step} takes {seconds:g} s, which is not between {least:g} and {most:g}"
             acts.append(action.act(Timing(start, seconds)))
-        state = carried_out(acts, frozenset(self.init), _changed)
+        state = execute(acts, frozenset(self.init), _changed)
         if isinstance(state, Flaw):
             return f"{self.actions[chosen[state.act][0]].step} needs {state.why}"
         missing = [wanted for wanted in self.goal if wanted not in state]

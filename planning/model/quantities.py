@@ -216,7 +216,7 @@ def from_json(data: Any) -> Quantity:
             return float(data) if isinstance(data, float) else int(data)
 
 
-def worth(world: World, fluent: Fact) -> float:
+def value_of(world: World, fluent: Fact) -> float:
     """Return the value of a numeric fluent in the world.
 
     Raises:

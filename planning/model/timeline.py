@@ -68,7 +68,7 @@ class Flaw:
     why: str
 
 
-def carried_out(acts: Sequence[Act[State]], state: State, after: Callable[[State, Changes], State]) -> State | Flaw:
+def execute(acts: Sequence[Act[State]], state: State, after: Callable[[State, Changes], State]) -> State | Flaw:
     """Return the state after all acts, or the first violated condition.
 
     Args:

@@ -66,7 +66,7 @@ class _Pattern:
         for part in effect_parts(action.effect) if action.timed is None else ():
             if isinstance(part, AllOf):
                 continue
-            if not isinstance(part, Add | Delete) or not _may_be_told(part.atom, types, schema):
+            if not isinstance(part, Add | Delete) or not _may_be_asserted(part.atom, types, schema):
                 return _Pattern(None)
             names = tuple([term.name for term in part.atom.args if isinstance(term, Variable)])
             changes.append((part.atom.predicate, names, isinstance(part, Add)))
@@ -95,7 +95,7 @@ def literal_of(e: Expression, schema: Vocabulary) -> Literal | None:
     return Literal(Fact(atom.predicate, values), atom is e) if len(values) == len(atom.args) else None
 
 
-def _may_be_told(atom: Atom, types: dict[str, tuple[str, ...]], schema: Vocabulary) -> bool:
+def _may_be_asserted(atom: Atom, types: dict[str, tuple[str, ...]], schema: Vocabulary) -> bool:
     signature = schema.predicates.get(atom.predicate)
     if signature is None or atom.predicate in schema.functional or len(atom.args) != len(signature.parameters):
         return False

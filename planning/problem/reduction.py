@@ -139,13 +139,13 @@ def spared(task: Task) -> list[int]:
     mentions = _mentions(task, left, _settled(task, left))
     if not mentions:
         return []
-    stand_ins = [name for name in naming if name not in mentions and not left.keys().isdisjoint(naming[name])]
+    substitutes = [name for name in naming if name not in mentions and not left.keys().isdisjoint(naming[name])]
     exchanges: dict[tuple[str, str], _Exchange] = task.ways.known("exchanges", dict)
     last: dict[str, str] = task.ways.known("replaced", dict)
     gone: set[int] = set()
     for name, listed in mentions.items():
         # The object that replaced `name` in the last problem can usually replace it again.
-        for other in [last[name], *stand_ins] if last.get(name) in stand_ins else stand_ins:
+        for other in [last[name], *substitutes] if last.get(name) in substitutes else substitutes:
             exchange = exchanges.get((name, other))
             if exchange is None:
                 exchange = exchanges[name, other] = _Exchange(name, other, task)

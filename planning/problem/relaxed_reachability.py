@@ -37,11 +37,11 @@ def reachable(task: Task) -> Reach:
     """Return the set reachable without deletes; a bound is possible if a number can change in its direction."""
     last: list[Reach] = task.ways.known("reach", list)
     found = _Again(last[0], task).reach() if last and not task.numbering.supports else None
-    last[:] = [found or _worked_out(task)]
+    last[:] = [found or _computed_reach(task)]
     return last[0]
 
 
-def _worked_out(task: Task) -> Reach:
+def _computed_reach(task: Task) -> Reach:
     ways, users, supports = task.ways.all, task.ways.users, task.numbering.supports
     reached, agenda = dict.fromkeys(task.init, _GIVEN), list(task.init)
     missing = list(task.ways.counts)

@@ -11,7 +11,7 @@ from knowledge_base.language.syntax.expression import Atom, Comparison, Expressi
 from knowledge_base.language.syntax.rewriting import inside, name_in, names_of
 from knowledge_base.language.syntax.text import to_text
 from planning.model.domain import PlanningAction, PlanningDomain
-from planning.model.plan import NobodyCan
+from planning.model.plan import Unsupported
 from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
 from planning.problem.derived import Derivation, derivation
 from planning.problem.expressions import changed, conditions_of, name_of
@@ -133,7 +133,7 @@ def numeric_constructs(domain: PlanningDomain, goal: Expression) -> Iterator[Con
                 yield Construct(owner, to_text(one), one.place)
 
 
-def why_no_engine(domain: PlanningDomain, goal: Expression, nobody: NobodyCan) -> str:
+def why_no_engine(domain: PlanningDomain, goal: Expression, nobody: Unsupported) -> str:
     """Return one line: the construct that no installed engine supports, its place, and an engine to install.
 
     Args:

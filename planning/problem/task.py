@@ -12,7 +12,7 @@ from knowledge_base.facts import Fact, Value
 from knowledge_base.language.evaluation.world_protocol import World
 from planning.model.plan import PlanStep
 from planning.model.problem import GroundAction, Problem
-from planning.model.quantities import Assignment, NumericBound, fluents, worth
+from planning.model.quantities import Assignment, NumericBound, fluents, value_of
 from planning.problem.conditions import Leaf, Literal, is_so
 
 NOT = "not "
@@ -26,12 +26,12 @@ _V = TypeVar("_V")
 class LazyTable(dict[int, _V]):
     """A mapping that computes each value on first access."""
 
-    def __init__(self, work_out: Callable[[int], _V]) -> None:
+    def __init__(self, compute_kinds: Callable[[int], _V]) -> None:
         super().__init__()
-        self._work_out = work_out
+        self._compute = compute_kinds
 
     def __missing__(self, number: int) -> _V:
-        made = self[number] = self._work_out(number)
+        made = self[number] = self._compute(number)
         return made
 
 
@@ -89,7 +89,7 @@ class Numbering:
 
     def present(self, world: World) -> set[int]:
         """Return the numbers of all literals and bounds that hold in `world`; fluents have no truth value."""
-        values = {fluent: worth(world, fluent) for fluent in map(self.facts.__getitem__, sorted(self.fluents))}
+        values = {fluent: value_of(world, fluent) for fluent in map(self.facts.__getitem__, sorted(self.fluents))}
         held = {number for number, bound in self.bounds.items() if bound.holds(values)}
         computed = world.schema.computed
         for predicate, listed in self._by_predicate.items():
@@ -179,9 +179,9 @@ class OperatorIndex:
         self.all = ways
         self._known: dict[Hashable, Any] = {}
 
-    def known(self, key: Hashable, work_out: Callable[[], _T]) -> _T:
-        """Return the cached result for `key`, or compute and cache the result of `work_out`."""
-        found: _T = self._known.pop(key) if key in self._known else work_out()
+    def known(self, key: Hashable, compute_kinds: Callable[[], _T]) -> _T:
+        """Return the cached result for `key`, or compute and cache the result of `compute_kinds`."""
+        found: _T = self._known.pop(key) if key in self._known else compute_kinds()
         self._known[key] = found  # at the end, so that the least recently used result is evicted first
         if len(self._known) > _MOST_KNOWN:
             del self._known[next(iter(self._known))]
@@ -279,7 +279,7 @@ class Assembly:
         mentioned.update(dict.fromkeys([str(value) for fact in (*init, *goal) for value in fact.args]))
         objects = {one: things[one] for one in mentioned if one in things}
         asked = _fluents(actions, bounds) if self._numbering.fluents else ()
-        numbers = {} if world is None else {one: worth(world, one) for one in asked}
+        numbers = {} if world is None else {one: value_of(world, one) for one in asked}
         return Problem(domain, objects, init, goal, actions, numbers=numbers, bounds=bounds, notes=notes)
 
     def _action(self, way: GroundOperator) -> GroundAction:

@@ -29,7 +29,7 @@ from knowledge_base.pddl.domain_text import read_domain
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.analysis.explanation import why_unsolvable
-from planning.engines.registry import able, installed, nobody
+from planning.engines.registry import able, installed, refusal
 from planning.execution.achieve import achieve_plot
 from planning.execution.planning_component import PlanningComponent
 from planning.model.cancellable_work import WorkLimit, WorkLimitError
@@ -235,7 +235,7 @@ class _Robot:
                   and state.goal is not None]  # fmt: skip
         constructs = {construct.place: construct for goal in goals for construct in numeric_constructs(domain, goal)}
         for construct in constructs.values():
-            error = InputError(f"{replace(construct, place=None)}; {nobody({'numeric'}).who}", place=construct.place)
+            error = InputError(f"{replace(construct, place=None)}; {refusal({'numeric'}).who}", place=construct.place)
             yield Finding(error, "engine", level="warning")
 
     def pointless(self) -> Iterator[Finding]:

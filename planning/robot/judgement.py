@@ -55,7 +55,7 @@ class Judgement:
             failures: the outcomes of skills that count as failures, see `Robot.failures`.
             wall_s: the duration in real time, in seconds.
         """
-        judge, left = self._judged(end, tally.gave_up)
+        judge, left = self._verdict(end, tally.gave_up)
         report = summarise(name, judge, left, tally, end, failures, wall_s)
         world = self.simulation
         if world is None:
@@ -65,7 +65,7 @@ class Judgement:
             headline = world.headline(own, reached=report.goal_reached) if judge == "world" else None
         return replace(report, own=own, faults=tuple(world.fired), headline=headline or report.headline)
 
-    def _judged(self, end: RunEnd, gave_up: str) -> tuple[Judge, list[Left]]:
+    def _verdict(self, end: RunEnd, gave_up: str) -> tuple[Judge, list[Left]]:
         world, why = self.simulation, reason_of_end(end, gave_up)
         if world is not None and (left := self._left_in_world()) is not None:
             with contained(f"{type(world).__name__}.reason"):

@@ -77,7 +77,7 @@ class Report:
         """Return the report as lines of text."""
         lines = [
             f"{self.headline}, {self.simulated_s:.0f} s of run time.",
-            *([] if self._bug_is_told else [f"  programming error in {self.programming_error}"]),
+            *([] if self._names_bug else [f"  programming error in {self.programming_error}"]),
             *map(self._left_line, self.left),
             f"  plans {self.plans}, replans {self.replans}"
             + (f", wrong plans {self.wrong_plans}" * bool(self.wrong_plans)),
@@ -99,7 +99,7 @@ class Report:
         return text(self.lines())
 
     @property
-    def _bug_is_told(self) -> bool:
+    def _names_bug(self) -> bool:
         return self.programming_error is None or self.programming_error in self.headline
 
     def _left_line(self, left: Left) -> str:

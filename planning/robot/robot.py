@@ -292,23 +292,23 @@ class Robot:
             ChangedError: plots or domain differ from their versions at the start of the run; the message lists the
                 differences.
         """
-        store, kept = self._taken_up()
-        going_on = self._go_on(store, kept, prepare)
-        return run_simulated(going_on, kept.time, speed) if kept.run.header["simulated"] else run_real(going_on)
+        store, kept = self._unfinished()
+        resumption = self._resume(store, kept, prepare)
+        return run_simulated(resumption, kept.time, speed) if kept.run.header["simulated"] else run_real(resumption)
 
-    async def go_on(self, *, prepare: Prepare | None = None) -> RunEnd:
+    async def resuming(self, *, prepare: Prepare | None = None) -> RunEnd:
         """Resume the unfinished run inside an existing asyncio loop, see `resume`.
 
         Raises:
             InputError: the run uses simulated time and the loop real time, or the run uses real time and the loop
                 simulated time.
         """
-        store, kept = self._taken_up()
+        store, kept = self._unfinished()
         simulated = LoopClock().simulated
         if simulated != kept.run.header["simulated"]:
             was, now = ("real", "simulated") if simulated else ("simulated", "real")
             raise InputError(f"the run was begun in {was} time and cannot be resumed in {now} time")
-        return await self._go_on(store, kept, prepare)
+        return await self._resume(store, kept, prepare)
 
     def achieve(
         self,
@@ -422,13 +422,13 @@ class Robot:
             raise InputError("a task is a plot or a goal: Task(plot=...) or Task(goal=...)")
         return self.achieve(task.goal, simulated=simulated, speed=speed, until=until, prepare=prepare, header=header)
 
-    def _taken_up(self) -> tuple[RunStore, Kept]:
+    def _unfinished(self) -> tuple[RunStore, Kept]:
         store = self._run_store({})
         if store is None:
             raise StoreError("only a run with a store can be resumed")
-        return store, store.take_up(self.library)
+        return store, store.load_unfinished(self.library)
 
-    async def _go_on(self, store: RunStore, kept: Kept, prepare: Prepare | None) -> RunEnd:
+    async def _resume(self, store: RunStore, kept: Kept, prepare: Prepare | None) -> RunEnd:
         for record in kept.records:
             for listener in self._listeners:
                 listener(record)

@@ -35,13 +35,13 @@ from planning.engines.race import PlannerRace
 from planning.model.domain import PlanningDomain
 from planning.model.plan import (
     EngineFailed,
-    NobodyCan,
     NoneFound,
     Plan,
     PlanFound,
     PlanningOutcome,
     ProvenUnsolvable,
     TimedOut,
+    Unsupported,
 )
 from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
 from planning.problem.construction import build_problem
@@ -152,7 +152,7 @@ def tried(pair: Pair, seconds: float) -> Result:
         said = str(error).replace(f"{pair.problem.parent}/", "")
         return Result(pair.name, verdicts[0] if verdicts else "wrong", detail=said)
     outcome = asyncio.run(_solved(posed, seconds))
-    if isinstance(outcome, NobodyCan):
+    if isinstance(outcome, Unsupported):
         return Result(pair.name, "no engine", detail=why_no_engine(domain, problem.goal, outcome))
     if isinstance(outcome, PlanFound):
         said = judged(pair, outcome.plan, domain, problem)

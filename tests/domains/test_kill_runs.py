@@ -33,19 +33,19 @@ def processes():
 
 def lived(processes, path: Path, seed: int, records: int) -> bool:
     """One life, killed when it has made so many records (or a few more: it goes on); whether it ended before that."""
-    hear, say = processes.Pipe(duplex=False)
+    receive, say = processes.Pipe(duplex=False)
     process = processes.Process(target=kept_lives.live, args=(str(path), seed, FAULTS, say))
     process.start()
     say.close()
     heard = None
     try:
         for _ in range(records):
-            heard = hear.recv()
+            heard = receive.recv()
         process.kill()
         while True:
-            heard = hear.recv()
+            heard = receive.recv()
     except EOFError:
-        hear.close()
+        receive.close()
     process.join()
     process.close()
     return heard == "end"

@@ -143,10 +143,10 @@ def test_other_surfaces_are_looked_at_one_after_the_other_whatever_comes_of_it()
 
 
 def test_after_a_stop_nothing_moves_until_the_restart():
-    stand_ins = LIBRARY
+    substitutes = LIBRARY
     for name in ("search", "look_elsewhere", "report"):
-        stand_ins = stand_ins.substitute(name, ends_with(LIBRARY.plot(name), after=20))
-    run = DryRun(stand_ins, "clean_up_table", knowledge=world(DOMAIN, ITEMS, "(hand-free)"))
+        substitutes = substitutes.substitute(name, ends_with(LIBRARY.plot(name), after=20))
+    run = DryRun(substitutes, "clean_up_table", knowledge=world(DOMAIN, ITEMS, "(hand-free)"))
     run.advance(5)
     stopped = run.send("stop")
     assert entered(stopped, "stopped")
@@ -156,7 +156,7 @@ def test_after_a_stop_nothing_moves_until_the_restart():
     run.advance(60)
     assert run.finished
     assert entered(run, "reported")
-    late = DryRun(stand_ins, "clean_up_table", knowledge=world(DOMAIN, ITEMS, "(hand-free)"))
+    late = DryRun(substitutes, "clean_up_table", knowledge=world(DOMAIN, ITEMS, "(hand-free)"))
     late.send("stop")
     late.advance(3600)
     assert late.finished

@@ -244,7 +244,7 @@ class Campaign:
             ready = wait([one.pipe for one in busy], timeout=0.2)
             for worker in busy:
                 if worker.pipe in ready:
-                    self._heard(worker)
+                    self._received(worker)
                 elif worker.hangs:
                     self._lost(worker, "hang", f"it took more than {HANG_S:g} s")
         seconds = time.monotonic() - begun
@@ -252,7 +252,7 @@ class Campaign:
             one.end()
         return self._report(seconds)
 
-    def _heard(self, worker: Worker) -> None:
+    def _received(self, worker: Worker) -> None:
         try:
             target, finding, growth = worker.pipe.recv()
         except EOFError:

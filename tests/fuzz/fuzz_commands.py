@@ -24,9 +24,9 @@ import typer
 from fuzz_mutation import NAMES, NUMBERS, mutated
 from fuzz_readers import READERS, Target, stores
 
-from planning.cli.command import NOBODY_READS, NOT_WRITTEN, app, main
+from planning.cli.command import NO_READER, NOT_WRITTEN, app, main
 
-STATUSES = {0, 1, 2, NOT_WRITTEN, NOBODY_READS}
+STATUSES = {0, 1, 2, NOT_WRITTEN, NO_READER}
 MORE_STATUSES = {("plan",): {3, 4}, ("kb", "watch"): {130}}
 """Of a planner whose time was up or whose engine failed; of what was interrupted."""
 NEVER = {

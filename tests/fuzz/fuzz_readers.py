@@ -316,7 +316,7 @@ def _read_runs(file: Path) -> None:
             for step in runs.steps(run.number):
                 list(step.records)
             list(runs.records(run.number))
-        runs.under_way()
+        runs.running_actions()
 
 
 # -- what comes over a wire ------------------------------------------------------------------------------
@@ -378,7 +378,7 @@ async def _asked(asked: dict[str, Any]) -> None:
     clock = LoopClock()
     knowledge = KnowledgeBase(_kitchen().schema)
     sequencer = Sequencer(Library([_waiting()]), knowledge, [], clock, Trace(clock.now), open_ended=True)
-    sequencer.trace.listen(log.hear)
+    sequencer.trace.listen(log.receive)
     control.attach(sequencer)
     running = asyncio.create_task(sequencer.run("waiting"))
     try:

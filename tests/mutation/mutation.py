@@ -85,14 +85,14 @@ def report(
 ) -> list[str]:
     """Print figures and survivors, and return what is wrong."""
     counts = Counter(known[mutant.name][0] for mutant in tested if mutant.name in known)
-    total, left_out = counts.total(), excluded.total()
+    total, omitted = counts.total(), excluded.total()
     killed = counts[Verdict.KILLED] + counts[Verdict.TIMEOUT]
     accepted = read_accepted()
     survivors = [mutant for mutant in tested if known.get(mutant.name, (None,))[0] is Verdict.SURVIVED]
     bare = [mutant for mutant in survivors if (mutant.function, mutant.change) not in accepted]
     for verdict in Verdict:
         print(f"  {verdict:<9} {counts[verdict]:6} {_percent(counts[verdict], total)}")
-    print(f"  excluded  {left_out:6} {_percent(left_out, total + left_out)} of all")
+    print(f"  excluded  {omitted:6} {_percent(omitted, total + omitted)} of all")
     for reason, number in excluded.most_common():
         print(f"            {number:6} {reason}")
     for mutant in sorted(survivors, key=lambda one: (one.path, one.line)):
@@ -102,7 +102,7 @@ def report(
     checks = {
         f"{name}: {len(tested) - total} mutants are not decided": total < len(tested),
         f"{name}: {_percent(killed, total)} killed, at least {KILLED:.0%} needed": killed < KILLED * total,
-        f"{name}: {_percent(left_out, total + left_out)} excluded, at most {EXCLUDED:.0%} allowed": left_out > EXCLUDED * (total + left_out),
+        f"{name}: {_percent(omitted, total + omitted)} excluded, at most {EXCLUDED:.0%} allowed": omitted > EXCLUDED * (total + omitted),
         f"{name}: {len(bare)} of {len(survivors)} survivors have no reason in accepted.toml": bool(bare),
     }  # fmt: skip
     return [text for text, failed in checks.items() if failed]

@@ -118,7 +118,7 @@ class Run:
         self.library = Library(map(plot, plots))
         with KnowledgeBase.open(SCHEMA, self.path) as kb:
             store = RunStore(kb, self.path)
-            kept = store.take_up(self.library) if resume else None
+            kept = store.load_unfinished(self.library) if resume else None
 
             async def main():
                 clock = LoopClock(kept.time if kept else 0.0)

@@ -42,17 +42,17 @@ class UndoneError(Exception):
 
 @dataclass
 class Soak:
-    """One run: everybody works until `go_on` says no.
+    """One run: everybody works until `resuming` says no.
 
     Attributes:
         kb: what is shared.
-        go_on: asked by each thread before each commit, with the number of its commits so far.
+        resuming: asked by each thread before each commit, with the number of its commits so far.
         acknowledged: commits that returned, by thread.
         failures: what was not as it must be.
     """
 
     kb: KnowledgeBase
-    go_on: Callable[[int], bool]
+    resuming: Callable[[int], bool]
     acknowledged: dict[str, int] = field(default_factory=dict)
     failures: list[str] = field(default_factory=list)
     heard: list[Change] = field(default_factory=list)
@@ -109,7 +109,7 @@ class Soak:
     def _work(self, worker: str) -> None:
         random, commits = Random(worker), 0
         try:
-            while self.go_on(commits):
+            while self.resuming(commits):
                 commits += self._commit(worker, commits, random)
                 self._ask(self.kb)
         except Exception as error:  # noqa: BLE001  said at the end
@@ -214,10 +214,10 @@ def replayed(kb: KnowledgeBase) -> WorldState:
     return state
 
 
-def soak(path: Path | None, go_on: Callable[[int], bool], limit_s: float) -> Soak:
+def soak(path: Path | None, resuming: Callable[[int], bool], limit_s: float) -> Soak:
     """A run on a store (`None`: in memory); its failures are for the caller to look at."""
     with KnowledgeBase.open(SCHEMA, path) as kb:
-        done = Soak(kb, go_on)
+        done = Soak(kb, resuming)
         done.run(limit_s)
         if path is not None:
             state = replayed(kb)

@@ -67,15 +67,15 @@ def dispatch_before_commit(monkeypatch):
 
     monkeypatch.setattr(RunStore, "step", put_off)
     monkeypatch.setattr(RunStore, "end", kept)
-    monkeypatch.setattr(RunStore, "take_up", _forgetting(RunStore.take_up, later))
+    monkeypatch.setattr(RunStore, "load_unfinished", _forgetting(RunStore.load_unfinished, later))
 
 
-def _forgetting(take_up, later):
+def _forgetting(load_unfinished, later):
     """A program that has died has forgotten what it has noted."""
 
     def taken_up(self, library):
         later.noted.clear()
-        return take_up(self, library)
+        return load_unfinished(self, library)
 
     return taken_up
 

@@ -213,7 +213,7 @@ class Inside:
 
     def _ways(self, anywhere, later):
         outcome = () if self.plot == "p0" else ("out",)
-        on = {event: self._listed(anywhere, emits=("i", "j", "k", *outcome)) for event in self._heard()}
+        on = {event: self._listed(anywhere, emits=("i", "j", "k", *outcome)) for event in self._received()}
         on |= {"i": self._listed(anywhere, emits=("j", "k"))} if self.chance(4) else {}
         on |= {"j": self._listed(anywhere, emits=("k",))} if self.chance(4) else {}
         on |= {"k": [self._effect({})]} if self.chance(3) else {}
@@ -228,7 +228,7 @@ class Inside:
     def _error(self):
         return "error.execution" if self.grower.scxml else "error"
 
-    def _heard(self):
+    def _received(self):
         events: Sequence[str] = PREFIXES if self.grower.scxml else EVENTS
         events = events if self.grower.private else [one for one in events if one != "*"]
         return [event for event in events if self.chance(2 if len(events) == 3 else 4)]

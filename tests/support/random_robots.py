@@ -380,14 +380,14 @@ class Trial:
 
         with robot.program(world, store) as program:
 
-            def hear(record: Record) -> None:
+            def receive(record: Record) -> None:
                 records.append(record)
                 if not resume:  # a resumed program first tells the records of the whole run again
                     self._look(record, program)
                 if len(records) in crashes:
                     self._crashes.append((copied(folder, folder.parent / f"crash{len(records)}"), world.after_a_kill()))
 
-            program.listen(hear)
+            program.listen(receive)
             end = program.resume() if resume else robot.begin(program)
             facts = sorted(map(str, program.knowledge.facts()))
         with archive(store) as runs:

@@ -189,15 +189,15 @@ class Reference:
         enabled = self._select(event)
         late = [way for way in enabled if way.node in self.waiting and way.transition.targets]
         taken = self._without_conflicts([way for way in enabled if way not in late])
-        keepers = {way.node: way for way in late if not any(self._preempts(other, way) for other in taken)}
+        keeping = {way.node: way for way in late if not any(self._preempts(other, way) for other in taken)}
         if event is None or event.name == "every":
-            keepers = {}
-        self.kept += [(node, event) for node in keepers]
+            keeping = {}
+        self.kept += [(node, event) for node in keeping]
         if taken:
             if len(self.report.microsteps) >= MOST_MICROSTEPS:
                 raise GoesRoundError
             self._microstep(taken)
-        return bool(taken or keepers)
+        return bool(taken or keeping)
 
     # -- which transitions: selectTransitions, removeConflictingTransitions ------------------------------
 

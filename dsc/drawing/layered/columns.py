@@ -116,7 +116,7 @@ TIGHT = 8.0
 """Distance of ports in pixels if the usual distance exceeds the node's width."""
 CORNER = 11.0
 """Length at a node's corners where no link ends, in pixels."""
-BESIDE = 12.0
+MARGIN = 12.0
 """Distance between a diamond's corner and links that end next to this corner, in pixels."""
 STRAIGHT = 16.0
 """Weight of a connection that can be straight; a connection that cannot has the weight 1."""
@@ -159,7 +159,7 @@ def _at_corner(axis: float, width: float, turning: Sequence[float | None]) -> li
     """
     if None not in turning:
         return [axis] * len(turning)
-    aside = min(BESIDE, width / 4)
+    aside = min(MARGIN, width / 4)
     return [axis if other is None else axis + (aside if other >= axis else -aside) for other in turning]
 
 

@@ -35,7 +35,7 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.spelling import value_text
 
-_Judged = tuple["Explanation", InputError | None]
+_Explained = tuple["Explanation", InputError | None]
 """A part, and the error if the part cannot be computed, else `None`."""
 
 MOST_TRIED = 200
@@ -122,11 +122,11 @@ def _explain(e: Expression, world: World, bindings: Bindings) -> Explanation:
             child = _explain(body, world, bindings)
             found = Explanation(text, not child.truth, (child,), decider=0)
         case And(parts):
-            found = _junction(text, [_judged(p, world, bindings) for p in parts], neutral=True)
+            found = _junction(text, [_explain_part(p, world, bindings) for p in parts], neutral=True)
         case Or(parts):
-            found = _junction(text, [_judged(p, world, bindings) for p in parts], neutral=False)
+            found = _junction(text, [_explain_part(p, world, bindings) for p in parts], neutral=False)
         case Imply(premise, conclusion):
-            found = _implication(text, *[_judged(p, world, bindings) for p in (premise, conclusion)])
+            found = _implication(text, *[_explain_part(p, world, bindings) for p in (premise, conclusion)])
         case Exists():
             found = _existence(text, e, world, bindings)
         case Forall():
@@ -134,7 +134,7 @@ def _explain(e: Expression, world: World, bindings: Bindings) -> Explanation:
     return found
 
 
-def _judged(e: Expression, world: World, bindings: Bindings) -> _Judged:
+def _explain_part(e: Expression, world: World, bindings: Bindings) -> _Explained:
     """Return the explanation of a part with its error; the error is ignored if another part decides."""
     try:
         return _explain(e, world, bindings), None
@@ -144,7 +144,7 @@ def _judged(e: Expression, world: World, bindings: Bindings) -> _Judged:
         return Explanation(text, truth=False, detail=f"cannot be computed: {error}"), error
 
 
-def _junction(text: str, parts: Sequence[_Judged], *, neutral: bool) -> Explanation:
+def _junction(text: str, parts: Sequence[_Explained], *, neutral: bool) -> Explanation:
     """Return the explanation of `and` (neutral: true) or `or` (neutral: false).
 
     The first part whose truth is not neutral decides.
@@ -159,7 +159,7 @@ def _junction(text: str, parts: Sequence[_Judged], *, neutral: bool) -> Explanat
     return Explanation(text, truth, children, decider=decider)
 
 
-def _implication(text: str, premise: _Judged, conclusion: _Judged) -> Explanation:
+def _implication(text: str, premise: _Explained, conclusion: _Explained) -> Explanation:
     (first, unknown_first), (second, unknown_second) = premise, conclusion
     by_premise = unknown_first is None and not first.truth
     by_conclusion = unknown_second is None and second.truth

@@ -148,7 +148,7 @@ def execute(component, name, run=run_simulated, seconds=None, cancel_after=None,
     async def main():
         clock = LoopClock()
         deadline = {} if seconds is None else {"deadline": clock.now() + seconds}
-        call = SkillCall("a1.0", clock, reports.append, give_up=given_up.append, **deadline)
+        call = SkillCall("a1.0", clock, reports.append, abandon=given_up.append, **deadline)
         task = asyncio.ensure_future(component.execute(name, call, arguments))
         if cancel_after is not None:
             await asyncio.to_thread(cancel_after)
@@ -299,7 +299,7 @@ def test_a_process_that_does_not_end_when_it_is_told_to_is_killed_and_nothing_go
             reports.append(outcome)
             begun.set()
 
-        call = SkillCall("a1.0", LoopClock(), report, give_up=given_up.append)
+        call = SkillCall("a1.0", LoopClock(), report, abandon=given_up.append)
         task = asyncio.ensure_future(Far().execute("stubborn", call, {}))
         await begun.wait()
         task.cancel()
@@ -334,7 +334,7 @@ def test_a_skill_that_swallows_its_cancellation_holds_nothing_up_and_is_said(wit
 def test_a_skill_that_swallows_its_cancellation_does_not_keep_the_process():
     program = """
 import asyncio
-from dsc.components.hooks import give_up
+from dsc.components.hooks import abandon
 
 async def swallows():
     while True:
@@ -348,7 +348,7 @@ async def main():
     await asyncio.sleep(0)
     task.cancel()
     await asyncio.sleep(0)
-    give_up(task)
+    abandon(task)
 
 asyncio.run(main())
 print("over")

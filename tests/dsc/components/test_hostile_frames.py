@@ -17,7 +17,7 @@ from dsc.calls import SkillCall
 from dsc.components import endpoint as endpoints
 from dsc.components import host as hosts
 from dsc.components.component import Component
-from dsc.components.endpoint import EVERYBODY, Endpoint, LocalTransport, NoAnswerError, RefusedError
+from dsc.components.endpoint import BROADCAST, Endpoint, LocalTransport, NoAnswerError, RefusedError
 from dsc.components.host import CONDITION, Host
 from dsc.components.publication import Subscription
 from dsc.components.remote import RemoteComponent
@@ -123,7 +123,7 @@ def test_whatever_arrives_the_host_answers_an_honest_caller_afterwards(frames):
         user = Endpoint("user", transport, life="known")
         subscription = Subscription(user, "robot", CONDITION)
         for sender, frame in frames:
-            transport.deliver(sender, EVERYBODY, frame)
+            transport.deliver(sender, BROADCAST, frame)
             await asyncio.sleep(0.01)
         remote = await RemoteComponent.connect("robot", transport)
         assert set(remote.skills()) == {"go", "exits", "closes", "cancels", "waits"}
@@ -160,7 +160,7 @@ def test_frames_that_are_none_are_counted():
         server = Endpoint("server", transport)
         for frame in (b"", b"[]", b"{}", b'{"what":"call","kind":7,"n":1,"low":1,"life":"l","body":0}'):
             transport.deliver("x", "server", frame)
-        server.hear("news", lambda _, body: body["missing"])
+        server.receive("news", lambda _, body: body["missing"])
         transport.deliver("x", "server", b'{"what":"push","kind":"news","n":1,"low":1,"life":"l","body":{}}')
         return server.dropped
 
@@ -176,14 +176,14 @@ def frame(**said):
 
 def test_peers_are_bounded_and_nobody_known_is_served_twice(monkeypatch):
     monkeypatch.setattr(endpoints, "MOST_PEERS", 50)
-    carried_out = []
+    executed = []
 
     async def main():
         transport = LocalTransport()
         server = Endpoint("server", transport)
 
         async def count(sender, _):
-            carried_out.append(sender)
+            executed.append(sender)
 
         server.answer("count", count)
         transport.deliver("honest", "server", frame())
@@ -192,12 +192,12 @@ def test_peers_are_bounded_and_nobody_known_is_served_twice(monkeypatch):
         transport.deliver("honest", "server", frame())
         await asyncio.sleep(1)
         assert len(server._peers) == len(server._lives) == 50
-        assert carried_out.count("honest") == 1
+        assert executed.count("honest") == 1
         assert server.dropped == {"too many peers": 451}
         await asyncio.sleep(2 * endpoints.REMEMBERED)
         transport.deliver("late", "server", frame())
         await asyncio.sleep(1)
-        assert carried_out[-1] == "late"
+        assert executed[-1] == "late"
         assert len(server._peers) == 1
 
     run_simulated(main())

@@ -237,3 +237,8 @@ def test_an_initial_value_that_reads_an_unknown_variable_names_it_and_the_neares
     area = "{plot: p, parameters: {width: number}, variables: {area: {type: number, initial: ?widht}}, states: {s: }}"
     with pytest.raises(UnknownNameError, match="'\\?widht' has no value here; did you mean 'width'"):
         Run(plot(area)).start(width=2)
+
+
+def test_a_plot_begins_directly_inside():
+    with pytest.raises(UnknownNameError, match="no state 'b' to begin with"):
+        Run(plot("{plot: p, initial: b, states: {a: {states: {b: }}}}")).start()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from dsc_charts import plot
+from dsc_charts import Run, plot
 from dsc_runs import ran
 
 from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, event, skill, validate_plot
@@ -241,3 +241,11 @@ def test_only_the_state_itself_sees_its_timeout():
           e: {final: true}
     """
     assert seen(text) == (["inner", "outer"], [])
+
+
+def test_an_outcome_with_the_name_of_a_declared_event_is_not_that_event():
+    chart = Run(plot("{plot: p, emits: {moved: {}}, states: {a: {entry: {trigger: robot.move}}}}"))
+    chart.start()
+    step = chart.send("moved", to="a")
+    assert not step.handled
+    assert step.emitted == ()

@@ -96,7 +96,7 @@ def test_an_interrupted_run_with_a_damaged_macrostep_is_not_resumed(tmp_path):
     crashes = Crashes(tmp_path, CHART)
     path = edited(crashes.copies[-1][2], tmp_path / "damaged", "UPDATE steps SET change = '' WHERE number = 1")
     with KnowledgeBase.open(None, path) as kb, pytest.raises(DamagedStoreError, match="macrostep 1 of run 1"):
-        RunStore(kb, path).take_up(Library([plot(CHART)]))
+        RunStore(kb, path).load_unfinished(Library([plot(CHART)]))
 
 
 def test_the_chain_goes_on_over_restarts_and_what_is_added_to_a_macrostep(tmp_path):

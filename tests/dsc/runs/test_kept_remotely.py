@@ -134,7 +134,7 @@ def lived(tmp_path, crash_at):
         remote = await RemoteComponent.connect("robot", transport)
         with KnowledgeBase.open(SCHEMA, folder / "run.kb") as kb:
             store = RunStore(kb, folder / "run.kb")
-            kept = None if listener else store.take_up(library)
+            kept = None if listener else store.load_unfinished(library)
             clock = clock or LoopClock(kept.time)
             trace = Trace(clock.now, kept.last_record if kept else 0)
             sequencer = Sequencer(library, kb, [remote], clock, trace, store=store)

@@ -138,7 +138,7 @@ def test_nothing_is_started_that_is_not_committed(tmp_path):
         @skill(after_crash="same_id")
         async def work(self, call, seconds=0, observes="") -> Did:  # type: ignore[override]
             with archive(tmp_path / "run.kb") as runs:
-                seen.append((call.action_id, [start.action_id for start, _ in runs.under_way()]))
+                seen.append((call.action_id, [start.action_id for start, _ in runs.running_actions()]))
             return Did()
 
     run_with(tmp_path, TWICE, Watching())
@@ -470,7 +470,7 @@ def test_a_changed_domain_is_refused_with_the_difference(tmp_path):
             store.begin("p", {}, Library())
         now = {action("go"): "(went)", action("come"): "(come)", action("eat"): "(eat)"}
         with pytest.raises(ChangedError) as found:
-            RunStore(kb, tmp_path / "run.kb", domain=now).take_up(Library())
+            RunStore(kb, tmp_path / "run.kb", domain=now).load_unfinished(Library())
     assert found.value.differences == (
         "the planning action 'go' was '(go)', now it is '(went)'",
         "the planning action 'stay' is missing",

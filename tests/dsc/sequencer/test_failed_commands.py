@@ -146,8 +146,8 @@ LEFT = """
 @pytest.mark.parametrize("command", COMMANDS)
 def test_all_plots_see_the_failure_of_a_command_whose_state_was_left(command):
     text = LEFT.replace("COMMAND", command)
-    hears = "on: {skill_error: {to: e}, component_failed: {to: e, emit: heard, with: {why: ?event.reason}}},"
-    end, at = ran(text.replace("HEARS", hears), Drive())
+    receiver = "on: {skill_error: {to: e}, component_failed: {to: e, emit: heard, with: {why: ?event.reason}}},"
+    end, at = ran(text.replace("HEARS", receiver), Drive())
     assert (end.finished, at) == (True, 1)
     assert end.emitted[0].attributes["why"] == COMMANDS[command][1]
     end, at = ran(text.replace("HEARS", ""), Drive())
@@ -330,3 +330,23 @@ def test_the_attributes_of_the_events_of_components_are_checked():
     wrong = plot(HANDLING.replace("?event.component", "?event.componnet", 1))
     found = [str(one) for one in validate_plot(wrong, Library([wrong, plot(REPORT)]), Schema(), [])]
     assert any("there is no variable '?event.componnet' here; did you mean 'event.component'?" in one for one in found)
+
+
+def test_a_mode_is_left_without_a_start_of_a_component_that_has_failed():
+    class Dead(Drive):
+        starts = 0
+
+        async def start(self):
+            self.starts += 1
+            raise OSError("no power")
+
+    text = """
+        plot: p
+        states:
+          a: {entry: {send: drive.say, with: {text: a}}, on: {skill_error: b}}
+          b: {entry: {switch: drive, to: neutral}, after: {seconds: 5, to: e}}
+          e: {final: true}
+    """
+    drive = Dead()
+    end, _ = ran(text, drive)
+    assert (end.finished, drive.starts) == (True, 1)

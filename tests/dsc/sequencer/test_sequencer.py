@@ -747,3 +747,11 @@ def test_a_skill_waits_for_its_component_within_its_time_limit(deployed, left, a
         assert "waited for its component: there is no component 'arm'" in end.emitted[0].attributes["why"]
     if not log:
         assert end.problem == "set arm.speed: there is no component 'arm'"
+
+
+def test_the_first_state_may_choose_its_content():
+    text = "{plot: p, states: {a: {dynamic: [busy, free], on: {done: e}}, e: {final: true}}}"
+    busy = "{plot: busy, when: (p), states: {b: {}}}"
+    free = "{plot: free, when: (not (p)), states: {f: {final: true}}}"
+    ran = Ran(text, busy, free)
+    assert ran.end.finished, ran.end

@@ -20,7 +20,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 
 from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, skill
 from dsc.components.endpoint import LocalTransport
-from dsc.components.hooks import give_up
+from dsc.components.hooks import abandon
 from dsc.components.host import Host
 from dsc.components.life_cycle import Life
 from dsc.components.remote import RemoteComponent
@@ -220,10 +220,10 @@ class Lives(RuleBasedStateMachine):
                 component = await RemoteComponent.connect("device", self.transport)
             self.kb = KnowledgeBase.open(Schema(), self.folder / "run.kb")
             store, library = RunStore(self.kb, self.folder / "run.kb"), Library([CHART])
-            kept = store.take_up(library) if resumed else None
+            kept = store.load_unfinished(library) if resumed else None
             clock = LoopClock()
             self.sequencer = Sequencer(library, self.kb, [component], clock, open_ended=True, store=store)
-            self.sequencer.listen(self.hear)
+            self.sequencer.listen(self.receive)
             signals._ending.set(self.ending)
             run = self.sequencer.run("p") if kept is None else self.sequencer.resume(kept)
             self.run_task = asyncio.ensure_future(run)
@@ -239,7 +239,7 @@ class Lives(RuleBasedStateMachine):
     def device(self) -> Device:
         return self.devices[-1]
 
-    def hear(self, step) -> None:
+    def receive(self, step) -> None:
         for one in [*step.emitted, step.event]:
             if isinstance(one, Event):
                 self.heard += [str(value) for value in one.attributes.values()]
@@ -313,7 +313,7 @@ class Lives(RuleBasedStateMachine):
         self.kb.close()
         self.loop.set_exception_handler(lambda *_: None)
         for task in asyncio.all_tasks(self.loop):
-            give_up(task)  # its coroutine would clean up when it is freed
+            abandon(task)  # its coroutine would clean up when it is freed
         self.loop.close()
 
     def teardown(self) -> None:

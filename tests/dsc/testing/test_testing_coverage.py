@@ -131,10 +131,10 @@ def test_states_of_one_name_in_different_plots_are_told_apart():
 
 def test_a_plot_that_stands_in_is_not_the_one_it_stands_in_for():
     coverage = Coverage(PLOTS)
-    stand_in = ends_with(PLOTS[2]).model_copy(
+    substituted = ends_with(PLOTS[2]).model_copy(
         update={"states": PLOTS[2].states, "about": "the same states, another plot"}
     )
-    coverage.add(*fetch(library=Library(PLOTS).substitute("pick", stand_in)).steps)
+    coverage.add(*fetch(library=Library(PLOTS).substitute("pick", substituted)).steps)
     assert coverage.count("pick", "state") == (0, 3)
     assert coverage.count("drive", "state") == (2, 3)
 

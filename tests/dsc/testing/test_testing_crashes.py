@@ -80,12 +80,12 @@ class Lives:
     def live(self, folder):
         self.begun += 1
         store, robot = folder / "run.kb", self.crashes.inject(self.robot(folder))
-        goes_on = is_unfinished(store)
-        if has_run(store) and not goes_on:
+        continues = is_unfinished(store)
+        if has_run(store) and not continues:
             return None
         with KnowledgeBase.open(SCHEMA, store) as kb:
             run_store = RunStore(kb, store)
-            kept = run_store.take_up(Library([CHART])) if goes_on else None
+            kept = run_store.load_unfinished(Library([CHART])) if continues else None
 
             async def main():
                 clock = LoopClock(kept.time if kept else 0.0)

@@ -40,7 +40,7 @@ def known(items: int) -> KnowledgeBase:
 def log():
     kb, log = known(100), RecordLog()
     world = {"version": kb.version, "schema": schema_form(kb.schema), **world_form(kb.snapshot())}
-    log.hear(Record(1, 0.0, "world", None, world))
+    log.receive(Record(1, 0.0, "world", None, world))
     return log
 
 

@@ -32,7 +32,9 @@ class Watched:
         self._changed = threading.Condition()
         self.control = Control(self._change)
         self.report = None
-        table = deploy(Scenario.parse("table: {cups: 2, cans: 1, crisp_cans: [small]}"), 1, 0.0, listener=self.log.hear)
+        table = deploy(
+            Scenario.parse("table: {cups: 2, cans: 1, crisp_cans: [small]}"), 1, 0.0, listener=self.log.receive
+        )
 
         def attach(sequencer) -> None:
             self.control.attach(sequencer)

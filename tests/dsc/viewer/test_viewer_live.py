@@ -69,7 +69,7 @@ def test_all_that_a_run_says_gets_there_as_its_trace_has_it(live):
     texts = ["äöü ☂ 🤖", "two\nlines\u2028or\x85three", '{"seq": ', "half a character: \ud83e", ""]
     heard = [note(seq, text) for seq, text in enumerate(texts, 1)]
     for record in [*heard, Record(len(texts) + 1, 0.5, "end", None)]:
-        live.hear(record)
+        live.receive(record)
     with socket(live) as connection:
         hello = said(connection)
         assert (hello["header"]["run"], hello["control"]) == ("test", False)
@@ -89,7 +89,7 @@ def test_a_page_that_stands_still_does_not_make_the_run_wait_and_misses_nothing(
         said(connection)
         os.kill(live._process.pid, signal.SIGSTOP)
         for seq in range(1, MUCH + 1):  # it would never end if it had to wait
-            live.hear(note(seq, LONG))
+            live.receive(note(seq, LONG))
         os.kill(live._process.pid, signal.SIGCONT)
         assert [record["seq"] for record in received(connection, MUCH)] == list(range(1, MUCH + 1))
 
@@ -98,17 +98,17 @@ def test_a_run_goes_on_without_its_page(live):
     live._process.kill()
     live.wait()
     for seq in range(1, MUCH + 1):
-        live.hear(note(seq, LONG))
+        live.receive(note(seq, LONG))
     for thread in live._threads:
         thread.join(timeout=60)
     before = live._lines.qsize()
-    live.hear(note(MUCH + 1))
+    live.receive(note(MUCH + 1))
     assert live._lines.qsize() == before  # nothing is kept for nobody
 
 
 def test_a_page_ends_with_the_program_that_it_belongs_to(live):
     process = live._process
-    live.hear(note(1))
+    live.receive(note(1))
     with socket(live) as connection:
         received(connection, 1)
         live.close()
@@ -129,7 +129,7 @@ def held():
     """A run that stands still before its first event, and a browser that may change it."""
     page = LivePage(header(), PageAddress.on(), control=True)
     page.start()
-    table = deploy(Scenario.parse("table: {cups: 1}"), 1, 0.0, listener=page.hear)
+    table = deploy(Scenario.parse("table: {cups: 1}"), 1, 0.0, listener=page.receive)
     page.control._steps = 0
 
     def run() -> None:

@@ -28,7 +28,7 @@ SCENARIO = "table: {cups: 2}\n"
 def run():
     """A recorded run, its knowledge at the end, and what the knowledge was at each version."""
     log = RecordLog(header(run="test"), live=True)
-    table = deploy(Scenario.parse(SCENARIO), seed=1, faults=0.0, listener=log.hear)
+    table = deploy(Scenario.parse(SCENARIO), seed=1, faults=0.0, listener=log.receive)
     with table as robot:
         table.report()
     log.end()

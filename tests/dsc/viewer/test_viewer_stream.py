@@ -51,7 +51,7 @@ class Browser:
 
 def feed(log: RecordLog, count: int) -> None:
     for _ in range(count):
-        log.hear(Record(len(log) + 1, 0.0, "log", None, {"text": "x"}))
+        log.receive(Record(len(log) + 1, 0.0, "log", None, {"text": "x"}))
 
 
 def streamed(use) -> None:

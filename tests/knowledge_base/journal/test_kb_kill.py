@@ -33,17 +33,17 @@ def killed_after(processes, path: Path, durability: str, versions: int) -> int:
 
     It goes on writing while they are read, so the moment is a random one of its work.
     """
-    hear, say = processes.Pipe(duplex=False)
+    receive, say = processes.Pipe(duplex=False)
     process = processes.Process(target=kb_writer.write, args=(str(path), durability, say))
     process.start()
     say.close()
-    last: int = [hear.recv() for _ in range(versions)][-1]
+    last: int = [receive.recv() for _ in range(versions)][-1]
     process.kill()
     try:
         while True:  # what it acknowledged before it died
-            last = hear.recv()
+            last = receive.recv()
     except EOFError:
-        hear.close()
+        receive.close()
     process.join()
     process.close()
     return last

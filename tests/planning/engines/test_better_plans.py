@@ -53,7 +53,7 @@ class Later:
         yield self.second
         self.weighed.set()  # who asks for a third plan has decided about the second
 
-    def hear(self, record):
+    def receive(self, record):
         if record.data.get("skill") == "robot.act":
             self.begun.set()
 
@@ -73,7 +73,7 @@ def test_the_cheaper_plan_is_carried_out_and_without_costs_the_shorter_one(text,
     robot = ObedientRobot(domain, seconds=0.0, until=planner.weighed)
     robot.knowledge = world
     program = Robot(domain, plots(domain), [robot], world, planner=planner)
-    program.listen(planner.hear)
+    program.listen(planner.receive)
     end = program.achieve("(at c)", simulated=False)
     assert (end.finished, end.emitted) == (True, ())
     assert robot.done == [f"({one})" for one in (second if taken else first)]

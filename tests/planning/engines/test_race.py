@@ -29,7 +29,7 @@ from hypothesis import strategies as st
 
 from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, able, chosen, engine, repeatable
-from planning.model.plan import EngineFailed, NobodyCan, PlanFound, ProvenUnsolvable, TimedOut
+from planning.model.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut, Unsupported
 
 FIRST, SECOND = ENGINES[:2]
 
@@ -166,7 +166,7 @@ def test_no_engine_that_can_is_an_outcome_that_says_how_to_get_one():
         return await PlannerRace(choose=lambda _: []).solve(PROBLEM, 1)
 
     found = asyncio.run(run())
-    assert isinstance(found, NobodyCan)
+    assert isinstance(found, Unsupported)
     assert found.message.startswith("the problem needs STRIPS; no installed engine can do that, fast-downward could")
 
 

@@ -22,7 +22,7 @@ def _impatient(monkeypatch):
     monkeypatch.setattr("planning.execution.planner_call.STOPPING", 0.1)
 
 
-async def goes_on():
+async def continues():
     """It cannot be cancelled."""
     while True:
         try:
@@ -37,7 +37,7 @@ class Stubborn:
 
     async def solve(self, problem, seconds):
         self.asked += 1
-        await goes_on()
+        await continues()
 
 
 class StubbornLater:
@@ -53,12 +53,12 @@ class StubbornLater:
         try:
             yield self.answer
             if self.where == "looking":
-                await goes_on()
+                await continues()
             elif self.where == "failing":
                 raise OSError("no room left")
         finally:
             if self.where == "ending":
-                await goes_on()
+                await continues()
 
 
 def run(planner, *, simulated=False, prepare=None):
@@ -139,7 +139,7 @@ def test_a_program_that_is_interrupted_ends_when_planners_have_stopped(monkeypat
     planner = Tidy()
 
     main: asyncio.Task[Any] | None = None
-    going_on: list[asyncio.Task[None]] = []
+    improving: list[asyncio.Task[None]] = []
 
     async def interrupted(sequencer):
         await planner.begun.wait()
@@ -149,7 +149,7 @@ def test_a_program_that_is_interrupted_ends_when_planners_have_stopped(monkeypat
     def prepare(sequencer):
         nonlocal main
         main = asyncio.current_task()
-        going_on.append(asyncio.get_running_loop().create_task(interrupted(sequencer)))
+        improving.append(asyncio.get_running_loop().create_task(interrupted(sequencer)))
 
     with caplog.at_level(logging.ERROR, "asyncio"), pytest.raises(asyncio.CancelledError):
         run(planner, prepare=prepare)

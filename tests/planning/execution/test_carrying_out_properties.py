@@ -109,7 +109,7 @@ CHANGES = st.lists(st.tuples(st.floats(0.05, 3.0), deltas()), max_size=4)
 """Seconds, each with what somebody else changes then."""
 
 
-def carry_out(domain, goal, facts, changes, failures):
+def execute(domain, goal, facts, changes, failures):
     knowledge = a_world(domain, facts)
     robot = ObedientRobot(domain, failing_calls=failures)
     robot.knowledge = knowledge
@@ -130,7 +130,7 @@ def carry_out(domain, goal, facts, changes, failures):
 @given(task=tasks(), changes=CHANGES, failures=st.sets(st.integers(1, 8), max_size=2))
 def test_a_run_ends_and_claims_only_what_holds_and_gets_there_if_it_can(task, changes, failures):
     domain, facts, goal = task
-    end, robot, records = carry_out(domain, goal, facts, changes, failures)
+    end, robot, records = execute(domain, goal, facts, changes, failures)
     assert end.problem is None
     assert end.finished
     wanted = parse_condition(goal)

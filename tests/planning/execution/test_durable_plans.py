@@ -197,8 +197,8 @@ def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, plan
     for copy in (seen[-2], copies[-2]):
         with executive(planner, copy) as robot:
             with pytest.raises(InputError, match="begun in simulated time and cannot be resumed in real time"):
-                run_real(robot.go_on())
-            assert run_simulated(robot.go_on()).reached
+                run_real(robot.resuming())
+            assert run_simulated(robot.resuming()).reached
 
 
 def test_a_store_brings_its_own_knowledge(planner, tmp_path):

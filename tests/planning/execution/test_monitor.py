@@ -132,7 +132,7 @@ def test_what_touches_no_link_is_not_looked_at(monkeypatch):
     plan.begin(1)
     looked = []
     monkeypatch.setattr("planning.execution.link_monitor.shortest_end", lambda *args: looked.append(args))
-    monkeypatch.setattr(PlanProgress, "stands", lambda *args: looked.append(args))
+    monkeypatch.setattr(PlanProgress, "is_valid", lambda *args: looked.append(args))
     plan.change("eve", now="painted hall, painted office, in p3 hall", values={fact("weight", "p1"): 3.0})
     assert looked == []
     assert plan.news == []
@@ -332,7 +332,7 @@ def test_what_a_step_that_is_done_needed_is_not_watched_any_more(monkeypatch):
     plan.do(1)
     plan.begin(2)
     looked = []
-    monkeypatch.setattr(PlanProgress, "stands", lambda *args: looked.append(args))
+    monkeypatch.setattr(PlanProgress, "is_valid", lambda *args: looked.append(args))
     plan.change("eve", now="in p1 store")
     plan.change("eve", gone="in p1 store")
     assert looked == []

@@ -15,7 +15,7 @@ HERE = Failure(STEP, "no_path", "here")
 
 
 @pytest.mark.parametrize(
-    ("stands", "others", "rungs"),
+    ("is_valid", "others", "rungs"),
     [
         (
             True,
@@ -32,21 +32,21 @@ HERE = Failure(STEP, "no_path", "here")
         (False, True, [EscalationStep.REPLAN, EscalationStep.EXCLUDE, EscalationStep.GIVE_UP]),
     ],
 )
-def test_the_same_failure_in_the_same_situation_gets_the_next_answer(stands, others, rungs):
+def test_the_same_failure_in_the_same_situation_gets_the_next_answer(is_valid, others, rungs):
     attempt = Attempt()
-    assert [attempt.failed(HERE, stands=stands, others=others) for _ in rungs] == rungs
+    assert [attempt.failed(HERE, is_valid=is_valid, others=others) for _ in rungs] == rungs
 
 
 def test_another_failure_or_another_situation_begins_anew():
     attempt = Attempt()
     for failure in (HERE, Failure(STEP, "no_path", "there"), Failure(STEP, "slipped", "here")):
-        assert attempt.failed(failure, stands=True, others=False) is EscalationStep.RESUME
+        assert attempt.failed(failure, is_valid=True, others=False) is EscalationStep.RESUME
 
 
 def test_going_on_at_the_same_step_is_bounded_whatever_the_situation():
     attempt = Attempt()
     attempt.resumed[STEP] = MOST_RESUMED
-    assert attempt.failed(HERE, stands=True, others=True) is EscalationStep.REPLAN
+    assert attempt.failed(HERE, is_valid=True, others=True) is EscalationStep.REPLAN
     assert attempt.interrupted(STEP) is EscalationStep.REPLAN
     assert attempt.interrupted(PlanStep("stay")) is EscalationStep.RESUME
     assert attempt.interrupted(None) is EscalationStep.REPLAN

@@ -7,7 +7,7 @@ from knowledge_base.language.syntax.text import parse_condition
 from planning import Robot
 from planning.engines.registry import Engine
 from planning.model.domain import PlanningDomain
-from planning.model.plan import NobodyCan
+from planning.model.plan import Unsupported
 from planning.problem.relevance import numeric_constructs, why_no_engine
 
 JARS = """(define (domain jars) (:types jar)
@@ -52,14 +52,14 @@ def test_numbers_that_nobody_changes_ask_nothing_of_an_engine(jars):
 
 def test_who_could_plan_is_said_with_how_to_get_it(jars):
     goal = parse_condition("(exists (?j - jar) (sealed ?j))")
-    said = why_no_engine(jars, goal, NobodyCan("", ("numeric",), (("enhsp", "pip install x"),)))
+    said = why_no_engine(jars, goal, Unsupported("", ("numeric",), (("enhsp", "pip install x"),)))
     assert said.endswith("(> (litres ?j) 2); no installed engine can do that, enhsp could (pip install x)")
-    said = why_no_engine(jars, goal, NobodyCan("pyperplan", ("numeric",), ()))
+    said = why_no_engine(jars, goal, Unsupported("pyperplan", ("numeric",), ()))
     assert said.endswith("(> (litres ?j) 2); pyperplan cannot do that, nor can any engine known here")
 
 
 def test_without_such_a_construct_it_is_said_what_is_needed(jars):
-    said = why_no_engine(jars, parse_condition("(washed a)"), NobodyCan("", (), (("enhsp", ""),)))
+    said = why_no_engine(jars, parse_condition("(washed a)"), Unsupported("", (), (("enhsp", ""),)))
     assert said == "the problem needs STRIPS; no installed engine can do that, enhsp could (name it as the planner)"
 
 

@@ -13,6 +13,7 @@ from knowledge_base.language.syntax.text import parse_condition, parse_term
 from knowledge_base.pddl.problem_text import Metric
 from planning import Plan, PlanningDomain, PlanStep, Robot, build_problem, plot_from_plan
 from planning.execution.regression import CausalNeeds, leaves, regressed
+from planning.robot.garbage import settled
 
 TEXT = """
 (define (domain shelves) (:types shelf box)
@@ -130,12 +131,18 @@ class Arm(Component):
 
 
 @pytest.mark.parametrize("simulated", [True, False])
-def test_in_real_time_the_collector_leaves_alone_what_was_there_before(simulated):
+def test_a_run_in_somebodys_program_leaves_its_garbage_collection_alone(simulated):
     world, robot, before = KnowledgeBase(DOMAIN.schema), Arm(), gc.get_freeze_count()
     threshold = gc.get_threshold()
     world.apply(Delta(nodes=dict.fromkeys(SHELVES, "shelf"), added=(fact("at", "s1"),)), "test")
     Robot(DOMAIN, plots(), [robot], world).run("do-go", {"from": "s1", "to": "s2"}, simulated=simulated)
-    assert (robot.left_alone > before) is not simulated
-    assert (robot.patience > threshold) is not simulated
-    assert gc.get_threshold() == threshold
-    assert gc.get_freeze_count() == 0 if not simulated else gc.get_freeze_count() == before
+    assert (robot.left_alone, robot.patience) == (before, threshold)
+    assert (gc.get_freeze_count(), gc.get_threshold()) == (before, threshold)
+
+
+def test_the_command_excludes_what_was_there_before_from_garbage_collection():
+    before, threshold = gc.get_freeze_count(), gc.get_threshold()
+    with settled(), settled():
+        assert gc.get_freeze_count() > before
+        assert gc.get_threshold() > threshold
+    assert (gc.get_freeze_count(), gc.get_threshold()) == (before, threshold)

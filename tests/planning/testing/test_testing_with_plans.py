@@ -100,8 +100,8 @@ def test_rules_that_answer_inside_a_plan_count_for_the_plot_that_has_them():
 
 
 def test_an_executive_runs_with_a_stand_in_for_one_of_its_plots():
-    stand_in = ends_with(LIGHT, tell="(on ?lamp)", after=1)
-    skills, steps, coverage = light_up("lit", PLOTS.substitute("light", stand_in))
+    substituted = ends_with(LIGHT, tell="(on ?lamp)", after=1)
+    skills, steps, coverage = light_up("lit", PLOTS.substitute("light", substituted))
     assert skills.calls == []
     assert entered(steps, "lit")
     assert entered(steps, "standing_in")

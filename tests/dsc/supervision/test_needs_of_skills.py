@@ -21,14 +21,14 @@ from dsc.supervision.skill_dependencies import SkillDependencies
 DRIVE = """
     plot: p
     variables: {why: text}
-    emits: {broken: {why: text}}
+    emits: {broken: {why: text}, bug: {why: text}}
     states:
       a:
         entry: {trigger: laser.scan, within: 20}
         on:
           arrived: e
           skill_error: {to: e, emit: broken, with: {why: ?event.reason}}
-          programming_error: {to: e, emit: broken, with: {why: ?event.reason}}
+          programming_error: {to: e, emit: bug, with: {why: ?event.reason}}
           timed_out: {to: e, emit: broken, with: {why: ?event.reason}}
       e: {final: true}
 """
@@ -51,9 +51,10 @@ class Laser(Component):
         return Arrived()
 
 
-def reason_of_scan(*components, meanwhile=None):
+def reason_of_scan(*components, meanwhile=None, outcome="broken"):
     end, _ = ran(DRIVE, *components, meanwhile=meanwhile)
     (event,) = end.emitted
+    assert event.name == outcome
     return event.attributes["why"]
 
 
@@ -72,7 +73,7 @@ def test_a_bug_in_the_start_of_a_needed_component_is_a_programming_error_of_the_
         async def start(self):
             raise KeyError("port")
 
-    why = reason_of_scan(Laser(), Wrong())
+    why = reason_of_scan(Laser(), Wrong(), outcome="bug")
     assert why.startswith("base.start: KeyError: 'port'")
 
 
@@ -86,7 +87,7 @@ def test_a_bug_that_ends_a_needed_component_is_the_cause_of_the_loss():
             if self.ticks > 1:
                 raise KeyError("port")
 
-    assert "KeyError: 'port'" in reason_of_scan(Laser(), Wrong())
+    assert "KeyError: 'port'" in reason_of_scan(Laser(), Wrong(), outcome="bug")
 
 
 def test_a_device_that_ends_a_needed_component_is_no_bug():
