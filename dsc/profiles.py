@@ -18,7 +18,7 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
 
     Args:
         components: the components of one robot; each instance has separate values.
-        profile: the settings; without a profile, each parameter has its default.
+        profile: the settings. A parameter that they omit has its default, or the value that the program has set.
 
     Raises:
         UnknownNameError: a component or parameter of the profile does not exist.

@@ -214,3 +214,12 @@ def test_the_first_robot_is_made_as_its_page_says(tmp_path):
             assert done.stdout == expected
     tested = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
     assert subprocess.run(tested, cwd=home, check=False, capture_output=True).returncode == 0
+
+
+@pytest.mark.parametrize("package", ["knowledge_base", "dsc", "planning", "domains"])
+def test_the_architecture_page_names_each_room(package):
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    inside = [one for one in (ROOT / package).iterdir() if not one.name.startswith("__")]
+    rooms = {one.stem for one in inside if one.suffix == ".py" or any(one.glob("*.py"))} - {"project_template"}
+    named = set(re.findall(rf"`(?:{package}\.)?(\w+)`", page))
+    assert rooms <= named, sorted(rooms - named)
