@@ -1,77 +1,51 @@
-"""Modules import each other without circles; imports for types only, and imports inside functions, count."""
+"""Modules import each other without circles; imports for types only, inside functions, and relative ones count."""
 
-import ast
+from __future__ import annotations
+
 import graphlib
-from collections.abc import Iterator
-from collections.abc import Set as AbstractSet
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-ROOMS = ("knowledge_base", "dsc", "planning", "domains")
+import house
+import pytest
 
-
-def imports_of_product() -> dict[str, set[str]]:
-    """Each module with the modules of the product that it imports."""
-    files = {_name(file): file for room in ROOMS for file in (ROOT / room).rglob("*.py")}
-    return {name: set(_imported(file, files.keys())) - {name} for name, file in files.items()}
+TEMPLATE = house.ROOT / "planning" / "project_template"
 
 
-def _name(file: Path) -> str:
-    return ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+@pytest.mark.parametrize(
+    "files", [house.modules(*house.SOURCES), sorted(TEMPLATE.rglob("*.py"))], ids=["product", "project template"]
+)
+def test_modules_have_no_import_circle(files):
+    assert house.circles(files) == []
+    below = {house.module_name(file): house.imported(file, {*map(house.module_name, files)}) for file in files}
+    assert len([*graphlib.TopologicalSorter(below).static_order()]) == len(files) > 1
 
 
-def _imported(file: Path, known: AbstractSet[str]) -> Iterator[str]:
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name in known)
-        elif isinstance(node, ast.ImportFrom) and node.module is not None:
-            inside = {f"{node.module}.{alias.name}" for alias in node.names}
-            yield from inside & known
-            if node.module in known and not inside <= known:
-                yield node.module
+@pytest.mark.parametrize("package", house.SOURCES)
+def test_rooms_have_no_import_circle(package):
+    """The import contracts omit imports for types only."""
+    below: dict[str, set[str]] = {}
+    for one, other in house.arrows(package):
+        below.setdefault(one, set()).add(other)
+    graphlib.TopologicalSorter(below).prepare()
 
 
-def circles(imports: dict[str, set[str]]) -> list[set[str]]:
-    """The strongly connected components of more than one module."""
-    reached = {name: _reached(name, imports) for name in imports}
-    found: list[set[str]] = []
-    for name in sorted(imports):
-        if name in reached[name] and not any(name in circle for circle in found):
-            found.append({other for other in reached[name] if name in reached[other]})
-    return found
+def test_a_circle_of_relative_imports_is_found(tmp_path, monkeypatch):
+    monkeypatch.setattr(house, "ROOT", tmp_path)
+    package = tmp_path / "robot"
+    package.mkdir()
+    texts = {"__init__": "", "skills": "def f():\n    from .world import World", "world": "from . import skills"}
+    for name, text in texts.items():
+        (package / f"{name}.py").write_text(text)
+    assert house.circles(sorted(package.glob("*.py"))) == [["robot.skills", "robot.world"]]
 
 
-def _reached(start: str, imports: dict[str, set[str]]) -> set[str]:
-    """All modules that one imports, directly or through others."""
-    found: set[str] = set()
-    left = [*imports[start]]
-    while left:
-        if (name := left.pop()) not in found:
-            found.add(name)
-            left += imports[name]
-    return found
+def test_lines_of_code_are_those_without_comments_docstrings_and_blank_lines():
+    assert house.code_lines('"""Doc."""\n\nA = 1  # one\n# two\n\n\ndef f():\n    """Doc."""\n    return (\n        A\n    )\n') == {
+        3, 7, 9, 10, 11,
+    }  # fmt: skip
 
 
-def test_modules_import_each_other_without_circles():
-    assert circles(imports_of_product()) == []
-
-
-def test_rooms_import_each_other_without_circles():
-    """The import contracts leave out imports for types only."""
-    rooms: dict[str, set[str]] = {}
-    for name, others in imports_of_product().items():
-        if name.count("."):
-            room = _room(name)
-            rooms.setdefault(room, set()).update(_room(other) for other in others if other.count("."))
-    for room, others in rooms.items():
-        others.discard(room)
-    graphlib.TopologicalSorter(rooms).prepare()
-
-
-def _room(module: str) -> str:
-    return ".".join(module.split(".")[:2])
-
-
-def test_a_circle_of_types_only_is_found():
-    imports = {"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}
-    assert circles(imports) == [{"b", "c"}]
+@pytest.mark.parametrize(
+    ("name", "banned"), [("_go_on", True), ("CarryOut", True), ("GAVE_UP", True), ("going", False)]
+)
+def test_names_with_words_that_the_prose_check_bans_are_found(name, banned):
+    assert house.is_banned(name) is banned
