@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import MappingProxyType
 from typing import IO, Any, NamedTuple
 
@@ -81,10 +82,16 @@ class Trace:
         self.cause: int | None = None
         self.blame: Callable[[Exception], None] | None = None
 
-    def listen(self, listener: Listener) -> None:
-        """Send `listener` every later record."""
+    def listen(self, listener: Listener) -> Callable[[], None]:
+        """Send `listener` every later record; return a function that ends this."""
         self._listeners.append(listener)
         self.heard = True
+        return partial(self._ignore, listener)
+
+    def _ignore(self, listener: Listener) -> None:
+        if listener in self._listeners:  # one with an error was removed before
+            self._listeners.remove(listener)
+        self.heard = bool(self._listeners)
 
     def record(self, type_: str, /, **data: Any) -> int:
         """Send a record with the current `cause` to the listeners; return its `seq`."""

@@ -302,6 +302,18 @@ class RunStore:
         }  # fmt: skip
         self.writing.end(self._run, text_of(ended), self._new_records())
 
+    def discard(self, reason: str) -> None:
+        """Write the end of the unfinished run, which was never resumed; call this method outside of `writing`.
+
+        Raises:
+            StoreError: there is no unfinished run, or the file cannot be written.
+        """
+        with archive(self.path, again=True) as runs:
+            run = unfinished(runs)
+        ended = {"finished": False, "problem": reason, "programming_error": None, "outputs": {}}
+        with self.writing:
+            self.writing.end(run.number, text_of(ended), "")
+
     def load_unfinished(self, library: Library) -> Kept:
         """Load the unfinished run, to be resumed; call this method outside of `writing`.
 

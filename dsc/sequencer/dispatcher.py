@@ -123,6 +123,10 @@ class Dispatcher:
         """Return the starts of skills that are running, or whose final answer was not handled yet."""
         return tuple([one.start for one in self._running.values()])
 
+    def running(self) -> tuple[tuple[RunningSkill, str], ...]:
+        """Return the running skills, each with the component that it waits for as text; empty if it executes."""
+        return tuple([(one, one.missing()) for one in self._running.values()])
+
     @property
     def in_use(self) -> frozenset[str]:
         """Names of the components with running skills, which the root of the activation tree needs."""

@@ -84,6 +84,7 @@ class RunningSkill:
         answered: whether the end was posted.
         configuring: deliveries of parameters and modes that end before the skill begins.
         claim: the claim to the component; `None` if the component is concurrent.
+        since: second of run time at which this program started the skill.
         begun: whether the skill may begin, since it has the turn of its component.
         credible: whether observations after the end are posted; false after an invalid report.
         missing: returns, as text, the component that the skill waits for; empty if it waits for none.
@@ -107,6 +108,7 @@ class RunningSkill:
         self.signature = signature
         self.within = within
         self.due = due
+        self.since = clock.now()
         self.reports: Reports | None = None
         self.stopped = False
         self.answered = False

@@ -27,7 +27,7 @@ from dsc.sequencer.inbox import Inbox, LivelockGuard
 from dsc.sequencer.phase_watch import PhaseWatch
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.recovery import recover, require_components
-from dsc.sequencer.signals import OnSignal, ending_signal, unfinished_at_second_signal
+from dsc.sequencer.signals import OnSignal, unfinished_at_second_signal
 from dsc.sequencer.watchdog import watched
 from dsc.trace import Trace
 from knowledge_base._notebook import table
@@ -91,6 +91,10 @@ class RunEnd(Generic[Outputs]):
         return table(title, ("output", "value"), cast("Mapping[str, object]", self.outputs).items())
 
 
+SUSPENDED = "the run is suspended and can be resumed"
+"""Problem of the end of a suspended run."""
+
+
 class Sequencer:
     """Executor of one plot, from its start to its end.
 
@@ -115,7 +119,7 @@ class Sequencer:
         clock: run time.
         trace: the trace of the run.
         store: the run store, or `None`.
-        on_signal: whether Ctrl-C, SIGTERM and SIGHUP suspend a run with a store, or end it.
+        on_signal: whether Ctrl-C, SIGTERM, SIGHUP and a cancellation of its task suspend a run with a store, or end it.
         dispatcher: sends actions to components.
     """
 
@@ -148,6 +152,7 @@ class Sequencer:
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of)
         self._open_ended = open_ended
         self._over = False
+        self._suspending = False
         self._reacts = False  # changes of knowledge are then the run's own
         self._wake_up: KnowledgeMessage | None = None  # the latest message for waiting guards
         self._until = until
@@ -248,6 +253,31 @@ class Sequencer:
         setting = message_checks.checked_setting(owner, name, value, self.dispatcher.components, self.library)
         self._hand_in(setting, after)
 
+    def stop(self, reason: str) -> None:
+        """End the run with a problem, after its exit actions, from any thread; a run that has ended stays unchanged."""
+        self.clock.calls.call(self._stop, reason)
+
+    def _stop(self, reason: str) -> None:
+        if not self._over:
+            self._reactor.problem = self._reactor.problem or reason
+            self._inbox.wake()
+
+    def suspend(self) -> None:
+        """Stop the components as at an end, so that another program can resume the run, from any thread.
+
+        The end of the run has the problem `SUSPENDED`; the store keeps the run as unfinished.
+
+        Raises:
+            StoreError: there is no store.
+        """
+        if self.store is None:
+            raise StoreError("only a run with a store can be suspended")
+        self.clock.calls.call(self._begin_suspension)
+
+    def _begin_suspension(self) -> None:
+        self._suspending = not self._over
+        self._inbox.wake()
+
     async def run(self, plot: str | PlotCall[Outputs], arguments: Mapping[str, Any] | None = None) -> RunEnd[Outputs]:
         """Run the plot until it ends, or until a deadlock; return the end of the run.
 
@@ -299,7 +329,7 @@ class Sequencer:
             self._over = True
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]], bugs: Iterable[str]) -> RunEnd:
-        reactor, machine, inbox = self._reactor, self._reactor.machine, self._inbox
+        reactor, machine = self._reactor, self._reactor.machine
         # The tracer subscribes before skills do, so that consequences of a change are recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
         livelock = LivelockGuard(self.clock) if self.clock.simulated else None
@@ -308,22 +338,13 @@ class Sequencer:
             await begin()
             self._reacts = False
             self._wake("another program")  # a resumed run may have missed a change
-            while not machine.state.finished and reactor.problem is None:
-                if not inbox.waiting:
-                    await self._news()
-                    continue
-                for wait in self._before_events:
-                    await wait()
-                message = inbox.waiting.popleft()
-                if livelock is not None and (problem := livelock.problem(message)):
-                    reactor.problem = problem
-                    break
-                self._reacts = True
-                self._take(message)
-                self._reacts = False
+            await self._take_messages(livelock)
+            if self._suspending and not machine.state.finished and reactor.problem is None:
+                reactor.problem = SUSPENDED
+                self._suspend()
         except asyncio.CancelledError:  # cancelled from outside; after a crash, this handler does not run
             reactor.problem = reactor.problem or "it was cancelled"
-            if self.store is not None and ending_signal() and self.on_signal == "suspend":
+            if self.store is not None and self.on_signal == "suspend":
                 self._suspend()
             else:
                 self._leave()
@@ -337,6 +358,8 @@ class Sequencer:
             finally:
                 untaken = await self.dispatcher.close()
                 unsubscribe()
+        if reactor.problem == SUSPENDED:
+            return RunEnd(finished=False, emitted=reactor.emitted, problem=SUSPENDED)
         self._take_late_observations()
         if (unheard := [*reactor.unheard, *untaken]) and reactor.problem is None:
             reactor.problem = "; ".join(unheard)
@@ -350,6 +373,23 @@ class Sequencer:
         )  # fmt: skip
         self._keep_end()
         return end
+
+    async def _take_messages(self, livelock: LivelockGuard | None) -> None:
+        """React to each message, until the plot ends, a problem ends the run, or the run is to be suspended."""
+        reactor, inbox = self._reactor, self._inbox
+        while not self.machine.state.finished and reactor.problem is None and not self._suspending:
+            if not inbox.waiting:
+                await self._news()
+                continue
+            for wait in self._before_events:
+                await wait()
+            message = inbox.waiting.popleft()
+            if livelock is not None and (problem := livelock.problem(message)):
+                reactor.problem = problem
+                break
+            self._reacts = True
+            self._take(message)
+            self._reacts = False
 
     def _take_late_observations(self) -> None:
         """Apply what skills observed during their clean-up after the last macrostep."""

@@ -80,12 +80,6 @@ def _is_free(handler: object) -> bool:
 _ending: ContextVar[_Ending | None] = ContextVar("ending", default=None)
 
 
-def ending_signal() -> str:
-    """Return the name of the signal that ends the present run; empty without a signal."""
-    ending = _ending.get()
-    return "" if ending is None else ending.received
-
-
 @contextmanager
 def unfinished_at_second_signal(unfinished: Callable[[], Iterable[str]]) -> Iterator[None]:
     """Return a context manager in which a second signal reports the texts that the function returns."""

@@ -60,6 +60,10 @@ class PlanRuns:
         """Return the plan of that name, or `None`."""
         return self._runs.get(name)
 
+    def monitored(self) -> list[PlanRun]:
+        """Return the plans whose steps are executed."""
+        return [one for one in self._runs.values() if one.on_begin is not None]
+
     def carrying(self, name: str) -> list[PlanRun]:
         """Return the plans in which running steps of the plan of that name may continue, the latest last."""
         return [one for one in self._runs.values() if one.carries(name)]

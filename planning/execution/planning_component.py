@@ -17,7 +17,7 @@ from dsc.skills import skill
 from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.explanation import explain
-from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning.analysis.explanation import unmet
 from planning.execution.attempt import Attempt
 from planning.execution.choices import Choices
@@ -109,6 +109,10 @@ class PlanningComponent(Component):
         self._escalation = Escalation(plotting, self._runs, self._choices, self._search, self._records)
         self._cancelled: set[asyncio.Task[None]] = set()  # searches that have been cancelled and have not ended
         self._answers: dict[str, Outcome] = {}  # outcomes by action id, until `forget`
+
+    def plans(self) -> dict[str, tuple[str, ...]]:
+        """Return the remaining steps of each plan in execution as text, by its goal."""
+        return {to_text(one.goal): tuple(map(str, one.progress.remaining_steps)) for one in self._runs.monitored()}
 
     async def over(self) -> None:
         """Wait until cancelled searches have ended; called before the event loop of the run ends.

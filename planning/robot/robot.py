@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import math
 import time
@@ -9,7 +10,8 @@ from collections.abc import Callable, Collection, Coroutine, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, cast
+from uuid import uuid4
 
 from pydantic import ValidationError
 
@@ -22,6 +24,7 @@ from dsc.events import SKILL_FAILURES
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Budget
 from dsc.profiles import configure
+from dsc.runs.archive import is_unfinished
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
@@ -48,11 +51,12 @@ from planning.robot.bundles import Bundle, components_of, domain_of, gathered, p
 from planning.robot.judgement import Judgement
 from planning.robot.progress import Tally
 from planning.robot.report import Report
+from planning.robot.run import Run, require_loop, require_no_loop
 from planning.robot.simulation import SceneWriter, Simulation
 from planning.robot.soundness import require_parts, require_sound
 from planning.robot.task import Task
 
-Prepare = Callable[[Sequencer], None]
+Prepare = Callable[[Sequencer], object]
 """Callback that is called before a run starts, e.g. to post events or to keep a reference to the sequencer."""
 _BUDGET = Budget()
 LONGEST_RUN = 604_800.0
@@ -158,6 +162,9 @@ class Robot:
         self._foresight = foresight
         self._failures = failures
         self._listeners: list[Listener] = []
+        self._runs: dict[Run[Any], None] = {}
+        self._started = 0
+        self._closed = False
         self.origin = origin
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
@@ -252,34 +259,68 @@ class Robot:
             header: plain data that the store keeps with the run.
 
         Raises:
-            InputError: the plot is unknown, or a parameter is missing or unknown.
+            InputError: the plot is unknown, or a parameter is missing or unknown. An event loop is running, the robot
+                is closed, or it runs already with its store.
             StoreError: the store cannot be written, or contains an unfinished run.
         """
-        running = self.execute(plot, arguments, open_ended=open_ended, until=until, prepare=prepare, header=header)
-        return run_simulated(running, speed=speed) if simulated else run_real(running)
+        require_no_loop("run", "start")
+        self._require_free()
 
-    async def execute(
+        async def main() -> RunEnd[Outputs]:
+            return await self.start(plot, arguments, open_ended=open_ended, until=until, prepare=prepare, header=header)
+
+        return run_simulated(main(), speed=speed) if simulated else run_real(main())
+
+    def start(
         self,
-        plot: str | PlotCall[Outputs],
+        goal_or_plot: str | PlotCall[Outputs],
         arguments: Mapping[str, Any] | None = None,
         *,
+        seconds: float = _BUDGET.seconds,
+        replans: int = _BUDGET.replans,
         open_ended: bool = False,
         until: float | None = None,
         prepare: Prepare | None = None,
         header: Mapping[str, Any] | None = None,
-    ) -> RunEnd[Outputs]:
-        """Run a plot inside an existing asyncio loop, e.g. with remote components, and return how the run ended.
+    ) -> Run[Outputs]:
+        """Start a goal or a plot in the running event loop, and return the run; `await` it for its end.
 
-        The loop determines whether time is real, or simulated by `run_simulated`. For the arguments see `run`.
+        The loop determines whether time is real, or simulated by `run_simulated`.
+
+        Args:
+            goal_or_plot: a goal, which begins with `(`, or the name or call of a plot.
+            arguments: values of the plot's parameters.
+            seconds: real time for each search for the goal.
+            replans: the maximum number of plans for the goal after the first plan.
+            open_ended: see `run`.
+            until: see `run`.
+            prepare: see `run`.
+            header: see `run`.
+
+        Raises:
+            InputError: no event loop is running, the robot is closed, or runs already with its store. Further errors
+                are those of `run` and `achieve`.
         """
+        require_loop("start", "run")
+        if isinstance(goal_or_plot, str) and goal_or_plot.lstrip().startswith("("):
+            arguments, goal_or_plot = self._goal(goal_or_plot, seconds, replans), ACHIEVE
+        self._require_free()
+        self.library.plot(goal_or_plot if isinstance(goal_or_plot, str) else goal_or_plot.plot)
         clock = LoopClock()
-        until = _limit(until, bounded=clock.simulated and not open_ended)
-        how = {"simulated": clock.simulated, "open_ended": open_ended, "until": until}
+        limit = _limit(until, bounded=clock.simulated and not open_ended)
+        number = self._new_id(simulated=clock.simulated)
+        how = {"id": number, "simulated": clock.simulated, "open_ended": open_ended, "until": limit}
         store = self._run_store({**(header or {}), **how})
-        sequencer, planning = self._wired(clock, 0, store, open_ended=open_ended, until=until)
+        sequencer, planning = self._wired(clock, 0, store, open_ended=open_ended, until=limit)
         if prepare is not None:
             prepare(sequencer)
-        return await _to_its_end(sequencer.run(plot, arguments), planning)
+        return self._begun(number, sequencer, planning, sequencer.run(goal_or_plot, arguments))
+
+    async def achieving(
+        self, goal: str, *, seconds: float = _BUDGET.seconds, replans: int = _BUDGET.replans, until: float | None = None
+    ) -> RunEnd:
+        """Plan for a goal and execute the plan inside the running event loop; see `achieve`."""
+        return await self.start(goal, seconds=seconds, replans=replans, until=until)
 
     def resume(self, *, speed: float = math.inf, prepare: Prepare | None = None) -> RunEnd:
         """Resume the unfinished run of the store at its last macrostep, and run it to its end; for `speed` see `run`.
@@ -288,27 +329,58 @@ class Robot:
         are still pending are kept and need not be posted again.
 
         Raises:
+            InputError: an event loop is running, or the robot is closed.
             StoreError: there is no store or no unfinished run, or the store cannot be read or written.
             ChangedError: plots or domain differ from their versions at the start of the run; the message lists the
                 differences.
         """
+        require_no_loop("resume", "resuming")
         store, kept = self._unfinished()
-        resumption = self._resume(store, kept, prepare)
+        resumption = self._to_its_end(store, kept, prepare)
         return run_simulated(resumption, kept.time, speed) if kept.run.header["simulated"] else run_real(resumption)
 
-    async def resuming(self, *, prepare: Prepare | None = None) -> RunEnd:
-        """Resume the unfinished run inside an existing asyncio loop, see `resume`.
+    def resuming(self, *, prepare: Prepare | None = None) -> Run:
+        """Resume the unfinished run of the store in the running event loop, and return the run; see `resume`.
 
         Raises:
             InputError: the run uses simulated time and the loop real time, or the run uses real time and the loop
                 simulated time.
         """
+        require_loop("resuming", "resume")
         store, kept = self._unfinished()
         simulated = LoopClock().simulated
         if simulated != kept.run.header["simulated"]:
             was, now = ("real", "simulated") if simulated else ("simulated", "real")
             raise InputError(f"the run was begun in {was} time and cannot be resumed in {now} time")
-        return await self._resume(store, kept, prepare)
+        return self._resume(store, kept, prepare)
+
+    def resume_or_start(
+        self, goal_or_plot: str | PlotCall[Outputs], arguments: Mapping[str, Any] | None = None, **how: Any
+    ) -> Run[Outputs]:
+        """Resume the unfinished run of the store in the running event loop; without one, start a goal or plot.
+
+        Raises:
+            StoreError: there is no store, or it cannot be read or written. Further errors are those of `start` and
+                `resuming`.
+        """
+        if self.store is None:
+            raise StoreError("only a run with a store can be resumed: give the robot a store, or call `start`")
+        if is_unfinished(self.store):
+            return cast("Run[Outputs]", self.resuming(prepare=how.get("prepare")))
+        return self.start(goal_or_plot, arguments, **how)
+
+    def discard(self, reason: str = "discarded") -> None:
+        """End the unfinished run of the store, so that another run can start; its kept end has the reason.
+
+        Raises:
+            InputError: the run is in progress in this robot, or the robot is closed.
+            StoreError: there is no store or no unfinished run, or the store cannot be written.
+        """
+        self._require_free()
+        store = self._run_store({})
+        if store is None:
+            raise StoreError("only a run with a store can be discarded")
+        store.discard(reason)
 
     def achieve(
         self,
@@ -342,12 +414,10 @@ class Robot:
         Raises:
             InputError: the goal is not a condition or contains an undeclared name, or a limit is out of range.
         """
-        check_goal(parse_condition(goal), self.knowledge)
-        budget = _budget(seconds, replans)
-        arguments = {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
+        require_no_loop("achieve", "achieving")
         return self.run(
             ACHIEVE,
-            arguments,
+            self._goal(goal, seconds, replans),
             simulated=simulated,
             speed=speed,
             open_ended=open_ended,
@@ -422,13 +492,34 @@ class Robot:
             raise InputError("a task is a plot or a goal: Task(plot=...) or Task(goal=...)")
         return self.achieve(task.goal, simulated=simulated, speed=speed, until=until, prepare=prepare, header=header)
 
+    def _goal(self, goal: str, seconds: float, replans: int) -> dict[str, Any]:
+        """Return the arguments of the plot `achieve` for a goal."""
+        check_goal(parse_condition(goal), self.knowledge)
+        budget = _budget(seconds, replans)
+        return {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
+
+    def _new_id(self, *, simulated: bool) -> str:
+        self._started += 1
+        return str(self._started) if simulated else uuid4().hex
+
+    def _require_free(self) -> None:
+        """Raise `InputError` if the robot is closed, or runs already with its store."""
+        if self._closed:
+            raise InputError("the robot is closed; it starts no further run")
+        if self.store is not None and self._runs:
+            raise InputError(f"the robot already has a run in '{self.store.name}': await or suspend it first")
+
     def _unfinished(self) -> tuple[RunStore, Kept]:
+        self._require_free()
         store = self._run_store({})
         if store is None:
             raise StoreError("only a run with a store can be resumed")
         return store, store.load_unfinished(self.library)
 
-    async def _resume(self, store: RunStore, kept: Kept, prepare: Prepare | None) -> RunEnd:
+    async def _to_its_end(self, store: RunStore, kept: Kept, prepare: Prepare | None) -> RunEnd:
+        return await self._resume(store, kept, prepare)
+
+    def _resume(self, store: RunStore, kept: Kept, prepare: Prepare | None) -> Run:
         for record in kept.records:
             for listener in self._listeners:
                 listener(record)
@@ -437,7 +528,16 @@ class Robot:
         sequencer, planning = self._wired(clock, kept.last_record, store, open_ended=open_ended, until=until)
         if prepare is not None:
             prepare(sequencer)
-        return await _to_its_end(sequencer.resume(kept), planning)
+        return self._begun(str(kept.run.header.get("id", kept.run.number)), sequencer, planning, sequencer.resume(kept))
+
+    def _begun(
+        self, number: str, sequencer: Sequencer, planning: PlanningComponent,
+        main: Coroutine[Any, Any, RunEnd[Outputs]],
+    ) -> Run[Outputs]:  # fmt: skip
+        run = Run(number, sequencer, planning, _closing(main, planning))
+        self._runs[run] = None
+        run.task.add_done_callback(lambda _: self._runs.pop(run))
+        return run
 
     def _wired(
         self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool, until: float | None
@@ -465,8 +565,36 @@ class Robot:
             return None
         return RunStore(self.knowledge, self.store, header, self.domain.statements())
 
+    async def aclose(self) -> None:
+        """Suspend the runs in progress, or end them without a store; then close the robot, see `close`."""
+        self._closed = True
+        for run in [*self._runs]:
+            if self.store is None:
+                run.cancel("the robot is closed")
+            else:
+                run.suspend()
+        await asyncio.wait([run.task for run in self._runs]) if self._runs else None
+        self.close()
+
     def close(self) -> None:
-        """Close the store and the simulated world, and terminate the processes of the default planners."""
+        """Close the store and the simulated world, and terminate the processes of the default planners.
+
+        Later calls that start a run raise `InputError`. Runs in progress are cancelled, which suspends a run with a
+        store; `async with` or `aclose` waits for them.
+        """
+        self._closed = True
+        if self._runs:
+            for run in self._runs:
+                run.task.cancel()
+                run.task.add_done_callback(self._release_after)
+        else:
+            self._release()
+
+    def _release_after(self, _: object) -> None:
+        if not self._runs:
+            self._release()
+
+    def _release(self) -> None:
         if self.store is not None:
             self.knowledge.close()
         if self.simulation is not None:
@@ -482,6 +610,14 @@ class Robot:
             self._own_planners[clock.simulated] = CachingPlanner(planner)
         return self._own_planners[clock.simulated]
 
+    async def __aenter__(self) -> Self:
+        """Return the robot; the end of the `async with` block calls `aclose`."""
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        """Close the robot, see `aclose`."""
+        await self.aclose()
+
     def __enter__(self) -> Self:
         """Return the robot; the end of the `with` block calls `close`."""
         return self
@@ -491,7 +627,7 @@ class Robot:
         self.close()
 
 
-async def _to_its_end(running: Coroutine[Any, Any, RunEnd[Outputs]], planning: PlanningComponent) -> RunEnd[Outputs]:
+async def _closing(running: Coroutine[Any, Any, RunEnd[Outputs]], planning: PlanningComponent) -> RunEnd[Outputs]:
     try:
         return await running
     finally:

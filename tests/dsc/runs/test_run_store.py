@@ -306,18 +306,23 @@ def test_a_run_ends_with_an_error_when_it_cannot_be_kept_and_nothing_is_started(
     assert Run(tmp_path, [TWICE], done=robot.done, resume=True).end == RunEnd(finished=True)
 
 
-def test_a_run_that_is_cancelled_has_ended_with_its_components_at_rest(tmp_path):
+@pytest.mark.parametrize(
+    ("on_signal", "problem"), [("end", "it was cancelled"), ("suspend", None)], ids=["end", "suspend"]
+)
+def test_components_of_a_cancelled_run_are_stopped_and_a_suspended_one_can_be_resumed(tmp_path, on_signal, problem):
     chart = "{plot: p, states: {a: {entry: [{trigger: robot.work}], exit: [{switch: robot, to: neutral}], on: {did: e}}, e: {final: true}}}"
     robot = Robot()
 
-    def cancel(_):
+    def cancel(sequencer):
+        sequencer.on_signal = on_signal
         asyncio.get_running_loop().call_later(1, asyncio.current_task().cancel)
 
     with pytest.raises(asyncio.CancelledError):
         run_with(tmp_path, chart, robot, prepare=cancel)
     assert robot.told == [("mode", "neutral")]
     with archive(tmp_path / "run.kb") as runs:
-        assert (runs.run().ended or {})["problem"] == "it was cancelled"
+        assert (runs.run().ended or {}).get("problem") == problem
+    assert is_unfinished(tmp_path / "run.kb") is (on_signal == "suspend")
 
 
 def test_texts_with_any_kind_of_line_break_are_kept_in_their_records(tmp_path):

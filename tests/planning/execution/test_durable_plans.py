@@ -182,8 +182,11 @@ def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, plan
             sequencer.listen(lambda _: seen.append(copied(copy.parent, tmp_path / f"inside{len(seen)}")))
 
         arguments = {"goal": "(on a)", "holder": "", "replans": 3, "seconds": 5}
-        assert (await robot.execute("achieve", arguments, prepare=prepare)).reached
+        assert (await robot.start("achieve", arguments, prepare=prepare)).reached
         return seen
+
+    async def resumed(robot):
+        return await robot.resuming()
 
     (tmp_path / "in").mkdir()
     with executive(planner, tmp_path / "in" / "run.kb") as robot:
@@ -197,8 +200,8 @@ def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, plan
     for copy in (seen[-2], copies[-2]):
         with executive(planner, copy) as robot:
             with pytest.raises(InputError, match="begun in simulated time and cannot be resumed in real time"):
-                run_real(robot.resuming())
-            assert run_simulated(robot.resuming()).reached
+                run_real(resumed(robot))
+            assert run_simulated(resumed(robot)).reached
 
 
 def test_a_store_brings_its_own_knowledge(planner, tmp_path):

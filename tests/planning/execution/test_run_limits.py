@@ -98,7 +98,7 @@ def test_a_plot_that_goes_round_ends_too(until):
 def test_an_open_ended_run_has_no_limit_of_its_own():
     async def main(robot, **how):
         sequencers: list[Sequencer] = []
-        run = asyncio.ensure_future(robot.execute("round", open_ended=True, prepare=sequencers.append, **how))
+        run = asyncio.ensure_future(robot.start("round", open_ended=True, prepare=sequencers.append, **how))
         await asyncio.sleep(2 * LONGEST_RUN)
         ended = run.done()
         run.cancel()

@@ -109,7 +109,7 @@ def test_in_a_killed_and_resumed_run(port: Port, tmp_path: Path) -> None:
     killed = deploy(robot(Gripper(port)), store=tmp_path / "run.kb")
 
     async def begin() -> None:
-        kept.append(asyncio.ensure_future(killed.execute("turn", header=killed.header())))
+        kept.append(asyncio.ensure_future(killed.start("turn", header=killed.header())))
         await asyncio.sleep(0.6)
 
     kept: list[asyncio.Future[object]] = []  # a killed program cleans nothing up
@@ -134,15 +134,15 @@ def test_in_a_notebook(port: Port) -> None:
 
     async def cells() -> None:
         with deploy(robot(Gripper(port))) as deployed:
-            await deployed.execute("turn")
+            await deployed.start("turn")
             assert port.take() == GOOD
-            interrupted = asyncio.ensure_future(deployed.execute("turn"))
+            interrupted = asyncio.ensure_future(deployed.start("turn"))
             await asyncio.sleep(0.2)
             interrupted.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await interrupted
             assert port.take() == ["on", "turn -90", "off"]
-            await deployed.execute("turn")
+            await deployed.start("turn")
             assert port.take() == GOOD
 
     run_simulated(cells())

@@ -174,7 +174,7 @@ def test_a_signal_that_the_program_handles_remains_its_own() -> None:
 
 def test_another_cancellation_is_no_signal() -> None:
     async def main() -> None:
-        running = asyncio.ensure_future(deployed.execute("go"))
+        running = asyncio.ensure_future(deployed.start("go"))
         await asyncio.sleep(0)
         running.cancel()
         await running

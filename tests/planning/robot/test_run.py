@@ -1,0 +1,278 @@
+"""The handle of a run: awaited, watched, steered, cancelled, suspended and resumed by a program with its own loop."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from obedient_robot import ObedientRobot, plots
+
+from dsc import Event, Record, is_unfinished, parse_plot
+from dsc.sequencer.clock import run_real, run_simulated
+from knowledge_base import Delta, InputError, StoreError, UnknownNameError, fact
+from planning import PlanningDomain, Robot
+
+DOMAIN = PlanningDomain.parse("""(define (domain trip) (:types place)
+  (:predicates (at ?p - place) (road ?a ?b - place) (closed))
+  (:action drive :parameters (?a ?b - place) :precondition (and (at ?a) (road ?a ?b) (not (closed)))
+    :effect (and (not (at ?a)) (at ?b))))""")
+WORLD = Delta(
+    nodes=dict.fromkeys("abc", "place"), added=(fact("at", "a"), fact("road", "a", "b"), fact("road", "b", "c"))
+)
+WAIT = parse_plot("""
+plot: wait
+receives: {order: {place: place}}
+variables: {where: {type: place, initial: a}}
+outputs: {went: {type: text, initial: nowhere}}
+states:
+  idle: {on: {order: {to: go, assign: {where: ?event.place}}}}
+  go: {after: {seconds: 2, to: over, assign: {went: ?where}}}
+  over: {final: true}
+""")
+
+
+def robot(store=None, seconds=1.0):
+    device = ObedientRobot(DOMAIN, seconds=seconds)
+    made = Robot(DOMAIN, [*plots(DOMAIN), WAIT], [device], store=store)
+    device.knowledge = made.knowledge
+    if not made.knowledge.nodes():
+        made.knowledge.apply(WORLD, "me")
+    return made
+
+
+def simulated(main, **how):
+    """Run a coroutine function with an open robot in simulated time."""
+
+    async def opened():
+        async with robot(**how) as one:
+            return await main(one)
+
+    return run_simulated(opened())
+
+
+def done(one):
+    return one.components[0].done
+
+
+# -- starting and awaiting -----------------------------------------------------------------------------------
+
+
+def test_a_goal_and_a_plot_are_started_and_awaited():
+    async def main(one):
+        assert (await one.start("(at b)")).reached
+        assert (await one.achieving("(at c)")).reached
+        run = one.start("wait")
+        run.post("order", {"place": "b"})
+        end = await run
+        return end.outputs, done(one)
+
+    assert simulated(main) == ({"went": "b"}, ["(drive a b)", "(drive b c)"])
+
+
+def test_several_runs_without_a_store_share_the_robot():
+    async def main(one):
+        runs = one.start("(at b)"), one.start("wait", open_ended=True)
+        runs[1].post("order", {"place": "c"}, after=5)
+        return [bool(end) for end in await asyncio.gather(*runs)]
+
+    assert simulated(main) == [True, True]
+
+
+@pytest.mark.parametrize(
+    ("start", "error", "said"),
+    [
+        (lambda one: one.start("wiat"), UnknownNameError, "did you mean 'wait'"),
+        (lambda one: one.start("(att b)"), InputError, "did you mean 'at'"),
+        (lambda one: one.run("wait"), InputError, "await robot.start"),
+        (lambda one: one.achieve("(at b)"), InputError, "await robot.achieving"),
+        (lambda one: one.resume(), InputError, "await robot.resuming"),
+        (lambda one: one.resume_or_start("wait"), StoreError, "give the robot a store"),
+        (lambda one: one.discard(), StoreError, "only a run with a store"),
+    ],
+)
+def test_what_cannot_start_is_refused_before_it_starts(start, error, said):
+    async def main(one):
+        with pytest.raises(error, match=said):
+            start(one)
+
+    simulated(main)
+
+
+def test_a_run_is_not_started_without_a_loop():
+    with robot() as one, pytest.raises(InputError, match=r"call `robot\.run"):
+        one.start("wait")
+
+
+# -- watching ------------------------------------------------------------------------------------------------
+
+
+def test_the_state_of_a_run_names_its_states_plans_and_skills():
+    async def main(one):
+        run = one.start("(at c)")
+        await asyncio.sleep(0.5)
+        now = run.state
+        end = await run
+        return now, run.state.over, end.reached
+
+    now, over, reached = simulated(main)
+    assert (over, reached, now.over) == (True, True, False)
+    assert now.plans == {"(at c)": ("(drive a b)", "(drive b c)")}
+    acting = next(one for one in now.waiting if one.skill == "robot.act")
+    assert acting.waits_for == ""
+    assert acting.since == pytest.approx(now.time - 0.5, abs=0.4)
+    assert any(path.endswith("step_1") for path in now.active)
+
+
+def test_the_records_of_a_run_end_with_it_for_each_reader():
+    async def main(one):
+        run = one.start("(at b)")
+        first, second = run.records(), run.records()
+        seen = [record.type async for record in first]
+        return seen, [record.type async for record in second], [record async for record in first], run.task.done()
+
+    first, second, again, over = simulated(main)
+    assert first == second
+    assert (first[-1], again, over) == ("end", [], True)
+    assert "plan.found" in first
+
+
+def test_a_listener_can_be_removed():
+    async def main(one):
+        seen: list[Record] = []
+        run = one.start("(at c)")
+        ignore = run.listen(seen.append)
+        await asyncio.sleep(0.5)
+        ignore()
+        before = len(seen)
+        await run
+        return before, len(seen)
+
+    before, after = simulated(main)
+    assert before == after > 0
+
+
+# -- steering ------------------------------------------------------------------------------------------------
+
+
+def test_a_change_from_outside_reaches_the_run():
+    async def main(one):
+        run = one.start("(at c)", replans=0)
+        run.change(Delta(added=(fact("closed"),)), "police", after=0.5)
+        return await run
+
+    end = simulated(main)
+    assert not end.reached
+
+
+def test_a_cancelled_run_ends_with_the_reason_after_its_exit_actions():
+    async def main(one):
+        run = one.start("(at c)")
+        await asyncio.sleep(0.5)
+        end = await run.cancel("the customer has left")
+        again = await one.start("(at b)")
+        with pytest.raises(InputError, match="has ended"):
+            run.post("order")
+        return end, again
+
+    end, again = simulated(main)
+    assert (end.problem, end.reached, again.reached) == ("the customer has left", False, True)
+
+
+# -- with a store --------------------------------------------------------------------------------------------
+
+
+def test_a_suspended_run_is_resumed_with_its_id(tmp_path):
+    store = tmp_path / "run.kb"
+
+    async def first(one):
+        run = one.resume_or_start("(at c)")
+        await asyncio.sleep(1.5)
+        end = await run.suspend()
+        return run.id, end.problem, done(one)
+
+    async def second(one):
+        with pytest.raises(StoreError, match="unfinished run"):
+            await one.start("(at b)")
+        run = one.resume_or_start("(at c)")
+        return run.id, (await run).reached, done(one)
+
+    number, problem, before = simulated(first, store=store)
+    assert (problem, before) == ("the run is suspended and can be resumed", ["(drive a b)"])
+    assert is_unfinished(store)
+    resumed, reached, after = simulated(second, store=store)
+    assert (resumed, reached, after) == (number, True, ["(drive b c)"])
+
+
+@pytest.mark.parametrize("how", ["cancel the task", "leave the block", "close"])
+def test_a_program_that_ends_suspends_its_run(tmp_path, how):
+    async def main():
+        async with robot(tmp_path / "run.kb") as one:
+            run = one.start("(at c)")
+            await asyncio.sleep(0.5)
+            if how == "cancel the task":
+                run.task.cancel()
+            elif how == "close":
+                one.close()
+            if how != "leave the block":
+                with pytest.raises(asyncio.CancelledError):
+                    await run
+        return run.task.done()
+
+    assert run_simulated(main())
+    assert is_unfinished(tmp_path / "run.kb")
+
+
+def test_a_second_run_in_one_store_is_refused_by_the_name_of_the_store(tmp_path):
+    async def main(one):
+        run = one.start("(at b)")
+        await asyncio.sleep(0.1)
+        with pytest.raises(InputError, match=r"already has a run in 'run\.kb'"):
+            one.start("(at c)")
+        return (await run).reached, (await one.start("(at c)")).reached
+
+    assert simulated(main, store=tmp_path / "run.kb") == (True, True)
+
+
+def test_a_discarded_run_lets_the_next_one_start(tmp_path):
+    async def first(one):
+        run = one.start("(at c)")
+        await asyncio.sleep(0.5)
+        await run.suspend()
+
+    async def second(one):
+        one.discard("the customer has left")
+        return (await one.start("(at b)")).reached
+
+    simulated(first, store=tmp_path / "run.kb")
+    assert simulated(second, store=tmp_path / "run.kb")
+    assert not is_unfinished(tmp_path / "run.kb")
+
+
+def test_a_closed_robot_starts_nothing(tmp_path):
+    one = robot(tmp_path / "run.kb")
+    one.close()
+    for start in (lambda: one.run("wait"), lambda: one.achieve("(at b)"), one.resume, one.discard):
+        with pytest.raises((InputError, StoreError), match="closed"):
+            start()
+
+
+def test_runs_in_real_time_have_different_ids():
+    async def main():
+        async with robot(seconds=0.0) as one:
+            runs = [one.start("wait") for _ in range(2)]
+            for run in runs:
+                run.cancel("enough")
+            await asyncio.gather(*runs)
+            return {run.id for run in runs}
+
+    assert len(run_real(main())) == 2
+
+
+def test_an_event_that_no_plot_receives_is_refused_with_the_nearest():
+    async def main(one):
+        run = one.start("wait")
+        with pytest.raises(UnknownNameError, match="did you mean 'order'"):
+            run.post(Event("odrer"))
+        return await run.cancel("enough")
+
+    simulated(main)
