@@ -41,7 +41,7 @@ from dsc.sequencer.clock import LoopClock as LoopClock
 from dsc.sequencer.clock import run_real as run_real
 from dsc.sequencer.clock import run_simulated as run_simulated
 from dsc.sequencer.replay import replay as replay
-from dsc.sequencer.sequencer import RunEnd as RunEnd
+from dsc.sequencer.run_end import RunEnd as RunEnd
 from dsc.sequencer.sequencer import Sequencer as Sequencer
 from dsc.skills import primitive_plot as primitive_plot
 from dsc.skills import skill as skill

@@ -29,6 +29,9 @@ from planning.robot.bringup import resume as resume
 from planning.robot.bundles import Bundle as Bundle
 from planning.robot.report import Report as Report
 from planning.robot.robot import Robot as Robot
+from planning.robot.run import Run as Run
+from planning.robot.run import RunState as RunState
+from planning.robot.run import Waiting as Waiting
 from planning.robot.simulation import Fault as Fault
 from planning.robot.simulation import Left as Left
 from planning.robot.simulation import Setup as Setup

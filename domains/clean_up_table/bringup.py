@@ -17,7 +17,7 @@ from domains.clean_up_table.scenario import Scenario
 from domains.clean_up_table.table_world import TableWorld
 from domains.clean_up_table.world_faults import NOTHING_FOUND
 from dsc.components.component import Component
-from dsc.sequencer.sequencer import RunEnd
+from dsc.sequencer.run_end import RunEnd
 from dsc.text.profiles import Profile
 from dsc.trace import Listener
 from knowledge_base.errors import UnknownNameError

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dsc.sequencer.sequencer import RunEnd
+from dsc.sequencer.run_end import RunEnd
 from knowledge_base.store import KnowledgeBase
 from planning.robot.report import reason_of_end
 

@@ -1,4 +1,4 @@
-"""Commands `dsc runs` and `dsc view`: inspect kept runs, and show a run in the browser; they only read the store.
+"""Commands `dsc runs` and `dsc view`: inspect or end kept runs, and show a run in the browser.
 
 Function `page` also shows the page of `dsc run --view`: it prints the address before the run has begun.
 """
@@ -88,6 +88,19 @@ def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
     else:
         typer.echo(f"run {done.run}: {done.steps} steps as they were, then {found}")
     raise typer.Exit(DIVERGED if found else 0)
+
+
+@app.command()
+def end(
+    file: Store, reason: Annotated[str, typer.Option(help="The problem with which the run ends.")] = "discarded"
+) -> None:
+    """End the unfinished run of a store, which then cannot be resumed; its robot can start the next run."""
+    from dsc.runs.store import RunStore
+    from knowledge_base.store import KnowledgeBase
+
+    with KnowledgeBase.open(None, file) as knowledge:
+        RunStore(knowledge, file).discard(reason)
+    typer.echo(f"the run has ended: {reason}")
 
 
 @app.command()

@@ -13,7 +13,8 @@ from dsc.engine.steps import Step
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, run_simulated
-from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.sequencer.run_end import RunEnd
+from dsc.sequencer.sequencer import Sequencer
 from dsc.testing.fixtures import change_of, world
 from dsc.testing.scripted import Call, Replies, ScriptedSkills
 from dsc.trace import Record, Trace

@@ -25,7 +25,8 @@ from planning.engines.planner import Planner
 from planning.execution.achieve import achieve_plot
 from planning.problem.construction import check_goal
 from planning.robot.bundles import Bundle, components_of, gathered, plots_of
-from planning.robot.robot import Origin, Robot
+from planning.robot.program import Origin
+from planning.robot.robot import Robot
 from planning.robot.simulation import Setup, Simulation
 from planning.robot.task import Task, own_task
 

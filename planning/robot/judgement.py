@@ -8,7 +8,7 @@ from typing import Any
 
 from dsc.components.hooks import contained
 from dsc.errors import ProgrammingError
-from dsc.sequencer.sequencer import RunEnd
+from dsc.sequencer.run_end import RunEnd
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.tracebacks import place_of

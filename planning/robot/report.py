@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from dsc.sequencer.sequencer import RunEnd
+from dsc.sequencer.run_end import RunEnd
 from knowledge_base._notebook import text
 from planning.robot.progress import Tally
 from planning.robot.simulation import Fault, Left

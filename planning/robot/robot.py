@@ -1,59 +1,37 @@
-"""A robot, deployed: domain, plots, components, knowledge and planner, and its simulated world if it has one."""
+"""A robot, deployed: a program that runs plots and achieves goals, and reports on its task."""
 
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import math
 import time
-from collections.abc import Callable, Collection, Coroutine, Iterable, Mapping
-from dataclasses import dataclass, field
-from functools import partial
-from pathlib import Path
+from collections.abc import Callable, Coroutine, Mapping
 from typing import Any, Self, cast
 from uuid import uuid4
 
 from pydantic import ValidationError
 
 from dsc.calls import Outputs, PlotCall
-from dsc.components.assembly import require_deployed, require_instances, require_wired
-from dsc.components.component import Component
 from dsc.dynamic.knowledge_situation import ACHIEVE
-from dsc.dynamic.library import Library
-from dsc.events import SKILL_FAILURES
-from dsc.model.plot import ActionPlot
 from dsc.model.states import Budget
-from dsc.profiles import configure
 from dsc.runs.archive import is_unfinished
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
-from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.sequencer.run_end import RunEnd
+from dsc.sequencer.sequencer import Sequencer
 from dsc.sequencer.signals import OnSignal
-from dsc.skills import signatures
-from dsc.text.profiles import Profile
-from dsc.trace import Listener, Trace
-from knowledge_base.errors import InputError, SchemaError, StoreError
-from knowledge_base.journal.file import Durability, located
+from knowledge_base.errors import InputError, StoreError
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.text import parse_condition
-from knowledge_base.store import KnowledgeBase
-from knowledge_base.world.schema_compatibility import require_extension
-from planning.engines.planner import Planner
-from planning.engines.race import CachingPlanner, PlannerRace
-from planning.engines.registry import repeatable
-from planning.execution.achieve import achieve_plot
 from planning.execution.planning_component import PlanningComponent
-from planning.execution.search import Foresight
-from planning.model.domain import PlanningDomain
 from planning.problem.construction import check_goal
-from planning.robot.bundles import Bundle, components_of, domain_of, gathered, plots_of, shipped_by
 from planning.robot.judgement import Judgement
+from planning.robot.program import RobotProgram
 from planning.robot.progress import Tally
 from planning.robot.report import Report
 from planning.robot.run import Run, require_loop, require_no_loop
-from planning.robot.simulation import SceneWriter, Simulation
-from planning.robot.soundness import require_parts, require_sound
+from planning.robot.simulation import SceneWriter
 from planning.robot.task import Task
 
 Prepare = Callable[[Sequencer], object]
@@ -66,28 +44,7 @@ In real time, and for an open-ended run, there is no default limit.
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Origin:
-    """Origin of a robot: the bundle that was deployed.
-
-    Attributes:
-        bundle: the bundle.
-        task: the task of the robot's reports.
-        simulation: the simulated world; `None` without a simulation.
-        profile: the settings profile; `None` without a profile.
-        kept: plain data that the store keeps with a run.
-        resumes: whether the robot resumes the run in its store.
-    """
-
-    bundle: Bundle
-    task: Task
-    simulation: Simulation | None = None
-    profile: Profile | None = None
-    kept: Mapping[str, Any] = field(default_factory=dict)
-    resumes: bool = False
-
-
-class Robot:
+class Robot(RobotProgram):
     """A robot that can run plots and achieve goals. `deploy` makes one from a `Bundle`.
 
     Args:
@@ -124,113 +81,6 @@ class Robot:
         SchemaMismatchError: the schema of `knowledge` lacks declarations of the domain.
         StoreError: the store cannot be opened, or another process has opened it for writing.
     """
-
-    def __init__(
-        self,
-        domain: PlanningDomain | Path | str,
-        plots: Iterable[ActionPlot],
-        components: Iterable[Component],
-        knowledge: KnowledgeBase | None = None,
-        planner: Planner | None = None,
-        *,
-        parallel: bool = True,
-        foresight: Foresight | None = None,
-        store: Path | str | None = None,
-        durability: Durability = "process",
-        failures: Collection[str] = (),
-        origin: Origin | None = None,
-    ) -> None:
-        require_parts(knowledge, planner, foresight, store)
-        self.components = require_instances(components)
-        configure(self.components)
-        require_deployed(self.components, [PlanningComponent.name])
-        require_wired(self.components)
-        self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
-        if any(component.name == PlanningComponent.name for component in self.components):
-            raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)
-        if knowledge is not None and store is not None:
-            raise InputError("a store provides the knowledge: give a store or knowledge, not both")
-        if knowledge is not None:
-            require_extension(self.domain.schema, knowledge.schema)
-        self.store = None if store is None else located(store)
-        self.library = plots if isinstance(plots, Library) else Library(plots)
-        if ACHIEVE not in self.library:
-            self.library.add(achieve_plot())
-        self._own_planners: dict[bool, CachingPlanner] = {}
-        self._planner = planner
-        self._parallel = parallel
-        self._foresight = foresight
-        self._failures = failures
-        self._listeners: list[Listener] = []
-        self._runs: dict[Run[Any], None] = {}
-        self._started = 0
-        self._closed = False
-        self.origin = origin
-        skills = [s for c in self.components for s in c.skills().values()]
-        skills += signatures(PlanningComponent, PlanningComponent.name).values()
-        declared = {
-            PlanningComponent.name: {},
-            **{c.name: c.parameters.declared for c in self.components},
-        }
-        schema = self.domain.schema if knowledge is None else knowledge.schema
-        require_sound(self.library, self.domain, schema, skills, declared)
-        if knowledge is not None:
-            self.knowledge = knowledge
-        else:  # last, since the caller must close an opened knowledge base
-            kept = None if store is None else durability
-            self.knowledge = KnowledgeBase.open(self.domain.schema, self.store, kept)
-
-    @classmethod
-    def of_bundles(
-        cls,
-        bundles: Iterable[Bundle | str],
-        plots: Iterable[ActionPlot] = (),
-        components: Iterable[Component] = (),
-        **how: Any,
-    ) -> Self:
-        """Return a robot for bundles, the bundles that they need, and further plots and components.
-
-        Args:
-            bundles: each a `Bundle`, or the name of an installed bundle.
-            plots: further plots.
-            components: further components.
-            how: the keyword arguments of `Robot` (`knowledge`, `planner`, `store`, ...).
-
-        Raises:
-            UnknownNameError: a bundle is missing.
-            InputError: two bundles contradict each other, or `Robot` raises the error.
-        """
-        found = gathered(bundles)
-        how.setdefault("failures", frozenset[str]().union(*(bundle.failures for bundle in found)))
-        return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
-
-    @property
-    def failures(self) -> frozenset[str]:
-        """The outcomes that report failures: `failure_events` of the plots, and the argument `failures`."""
-        return failure_events(self.library).union(self._failures)
-
-    @property
-    def simulation(self) -> Simulation | None:
-        """The simulated world; `None` without a simulation."""
-        return None if self.origin is None else self.origin.simulation
-
-    def header(self) -> dict[str, Any]:
-        """Return the inputs that determine a run, for the first line of the trace."""
-        plots = "".join(sorted(plot.digest for plot in self.library))
-        domain = "\n".join(f"{name}\n{text}" for name, text in sorted(self.domain.statements().items()))
-        origin, world = self.origin, self.simulation
-        return {
-            **({} if origin is None else {"run": origin.bundle.name}),
-            **({} if world is None else {"seed": world.seed, "faults": world.chance}),
-            **({} if origin is None or origin.profile is None else {"profile": origin.profile.digest}),
-            "chart": hashlib.sha256(plots.encode()).hexdigest()[:12],
-            "domain": hashlib.sha256(domain.encode()).hexdigest()[:12],
-        }
-
-    def listen(self, listener: Listener) -> Callable[[], None]:
-        """Call `listener` with every later record of every run; return a function that ends this."""
-        self._listeners.append(listener)
-        return partial(self._listeners.remove, listener)
 
     def run(
         self,
@@ -298,8 +148,8 @@ class Robot:
             header: see `run`.
 
         Raises:
-            InputError: no event loop is running, the robot is closed, or runs already with its store. Further errors
-                are those of `run` and `achieve`.
+            InputError: no event loop is running, the robot is closed, or runs already with its store. Further errors as
+                for `run` and `achieve`.
         """
         require_loop("start", "run")
         if isinstance(goal_or_plot, str) and goal_or_plot.lstrip().startswith("("):
@@ -310,11 +160,11 @@ class Robot:
         limit = _limit(until, bounded=clock.simulated and not open_ended)
         number = self._new_id(simulated=clock.simulated)
         how = {"id": number, "simulated": clock.simulated, "open_ended": open_ended, "until": limit}
-        store = self._run_store({**(header or {}), **how})
-        sequencer, planning = self._wired(clock, 0, store, open_ended=open_ended, until=limit)
+        store = self.run_store({**(header or {}), **how})
+        sequencer, planning = self.wire(clock, 0, store, open_ended=open_ended, until=limit)
         if prepare is not None:
             prepare(sequencer)
-        return self._begun(number, sequencer, planning, sequencer.run(goal_or_plot, arguments))
+        return self._begin(number, sequencer, planning, sequencer.run(goal_or_plot, arguments))
 
     async def achieving(
         self, goal: str, *, seconds: float = _BUDGET.seconds, replans: int = _BUDGET.replans, until: float | None = None
@@ -360,7 +210,7 @@ class Robot:
         """Resume the unfinished run of the store in the running event loop; without one, start a goal or plot.
 
         Raises:
-            StoreError: there is no store, or it cannot be read or written. Further errors are those of `start` and
+            StoreError: there is no store, or it cannot be read or written. Further errors as for `start` and
                 `resuming`.
         """
         if self.store is None:
@@ -377,7 +227,7 @@ class Robot:
             StoreError: there is no store or no unfinished run, or the store cannot be written.
         """
         self._require_free()
-        store = self._run_store({})
+        store = self.run_store({})
         if store is None:
             raise StoreError("only a run with a store can be discarded")
         store.discard(reason)
@@ -511,7 +361,7 @@ class Robot:
 
     def _unfinished(self) -> tuple[RunStore, Kept]:
         self._require_free()
-        store = self._run_store({})
+        store = self.run_store({})
         if store is None:
             raise StoreError("only a run with a store can be resumed")
         return store, store.load_unfinished(self.library)
@@ -525,12 +375,12 @@ class Robot:
                 listener(record)
         clock = LoopClock(kept.time)
         open_ended, until = bool(kept.run.header["open_ended"]), kept.run.header["until"]
-        sequencer, planning = self._wired(clock, kept.last_record, store, open_ended=open_ended, until=until)
+        sequencer, planning = self.wire(clock, kept.last_record, store, open_ended=open_ended, until=until)
         if prepare is not None:
             prepare(sequencer)
-        return self._begun(str(kept.run.header.get("id", kept.run.number)), sequencer, planning, sequencer.resume(kept))
+        return self._begin(str(kept.run.header.get("id", kept.run.number)), sequencer, planning, sequencer.resume(kept))
 
-    def _begun(
+    def _begin(
         self, number: str, sequencer: Sequencer, planning: PlanningComponent,
         main: Coroutine[Any, Any, RunEnd[Outputs]],
     ) -> Run[Outputs]:  # fmt: skip
@@ -538,32 +388,6 @@ class Robot:
         self._runs[run] = None
         run.task.add_done_callback(lambda _: self._runs.pop(run))
         return run
-
-    def _wired(
-        self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool, until: float | None
-    ) -> tuple[Sequencer, PlanningComponent]:
-        trace = Trace(clock.now, last)
-        for listener in self._listeners:
-            trace.listen(listener)
-        components: list[Component] = list(self.components)
-        sequencer = Sequencer(
-            self.library, self.knowledge, components, clock, trace, open_ended=open_ended, store=store,
-            until=math.inf if until is None else until, failures=self.failures,
-        )  # fmt: skip
-        planning = PlanningComponent(
-            self.domain, self.library, self.knowledge, self._planner_for(clock), clock, trace,
-            components=sequencer.dispatcher.components, working_for=sequencer.working_for, parallel=self._parallel,
-            shared=[component.name for component in components if component.concurrent],
-            foresight=self._foresight,
-        )  # fmt: skip
-        sequencer.listen(planning.note)
-        sequencer.dispatcher.deploy(planning)
-        return sequencer, planning
-
-    def _run_store(self, header: Mapping[str, Any]) -> RunStore | None:
-        if self.store is None:
-            return None
-        return RunStore(self.knowledge, self.store, header, self.domain.statements())
 
     async def aclose(self) -> None:
         """Suspend the runs in progress, or end them without a store; then close the robot, see `close`."""
@@ -588,27 +412,11 @@ class Robot:
                 run.task.cancel()
                 run.task.add_done_callback(self._release_after)
         else:
-            self._release()
+            self.release()
 
     def _release_after(self, _: object) -> None:
         if not self._runs:
-            self._release()
-
-    def _release(self) -> None:
-        if self.store is not None:
-            self.knowledge.close()
-        if self.simulation is not None:
-            self.simulation.close()
-        for planner in self._own_planners.values():
-            planner.kill()
-
-    def _planner_for(self, clock: LoopClock) -> Planner:
-        if self._planner is not None:
-            return self._planner
-        if clock.simulated not in self._own_planners:
-            planner = PlannerRace(choose=repeatable) if clock.simulated else PlannerRace()
-            self._own_planners[clock.simulated] = CachingPlanner(planner)
-        return self._own_planners[clock.simulated]
+            self.release()
 
     async def __aenter__(self) -> Self:
         """Return the robot; the end of the `async with` block calls `aclose`."""
@@ -656,10 +464,3 @@ def _interrupted(name: str = "SIGINT", *, suspended: bool) -> str:
     """Return how a run ended at the signal of that name."""
     who = "the operator" if name == "SIGINT" else name
     return f"{who} suspended the run, which can be resumed" if suspended else f"{who} ended the run"
-
-
-def failure_events(library: Library) -> frozenset[str]:
-    """Return the failures of all skills, the outcomes of plots for planning actions, and the events of rules."""
-    emitted = {event for plot in library if plot.implements for event in plot.emits}
-    answered = {rule.on for plot in library for rule in plot.rules if rule.on is not None}
-    return frozenset({*SKILL_FAILURES, *emitted, *answered})

@@ -9,7 +9,8 @@ from typing import Any, Generic, Self
 
 from dsc.calls import Outputs
 from dsc.events import Event
-from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.sequencer.run_end import RunEnd
+from dsc.sequencer.sequencer import Sequencer
 from dsc.trace import Listener, Record
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
@@ -81,7 +82,7 @@ class Run(Generic[Outputs]):
         self.task = asyncio.get_running_loop().create_task(main, name=f"run {id}")
 
     def __await__(self) -> Generator[Any, None, RunEnd[Outputs]]:
-        """Wait for the end of the run, and return the end; errors are those of `Robot.run`."""
+        """Wait for the end of the run, and return the end; errors as for `Robot.run`."""
         return self.task.__await__()
 
     @property
@@ -136,7 +137,7 @@ class Run(Generic[Outputs]):
 
 
 class Records:
-    """An asynchronous iterator of the records of a run; records that nobody awaits are kept until then."""
+    """An asynchronous iterator of the records of a run; unread records are kept."""
 
     def __init__(self, run: Run[Any]) -> None:
         self._records: asyncio.Queue[Record | None] = asyncio.Queue()

@@ -15,7 +15,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 
 if TYPE_CHECKING:
-    from dsc.sequencer.sequencer import RunEnd
+    from dsc.sequencer.run_end import RunEnd
     from dsc.trace import Record, Trace
     from knowledge_base.store import KnowledgeBase
 

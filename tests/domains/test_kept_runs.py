@@ -197,6 +197,15 @@ def test_the_command_keeps_a_run_resumes_it_and_tells_what_happened(whole, tmp_p
     assert dsc("run", "--resume", path) == (2, "", f"dsc: {path}: there is no unfinished run in this store\n")
 
 
+def test_the_command_ends_an_unfinished_run(whole, tmp_path):
+    path = copied(whole[3][3].parent, tmp_path / "copy")
+    assert dsc("runs", "end", path, "--reason", "no longer wanted")[:2] == (0, "the run has ended: no longer wanted\n")
+    assert "ended early: no longer wanted" in dsc("runs", "list", path)[1]
+    status, _, refused = dsc("runs", "end", path)
+    assert status == 2
+    assert "no unfinished run" in refused
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -12,7 +12,7 @@ from dsc.runs import store
 from dsc.runs.store import RunStore, RunWriter
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.sequencer import Sequencer
-from planning.robot.robot import failure_events
+from planning.robot.program import failure_events
 
 FAILURES = failure_events(Library(bundle().plots)).union(bundle().failures)
 

@@ -9,7 +9,6 @@ from knowledge_base import Delta, fact
 from planning import Left, Setup, Simulation
 
 from .skills import Base, Gripper
-from .world import World
 
 ROOMS = ("hall", "kitchen", "office")
 BELONGS = {"letter": "office", "bread": "kitchen", "book": "office"}
@@ -20,25 +19,26 @@ class House(Simulation):
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
-        self.world = World(robot_in="kitchen", place=dict.fromkeys(BELONGS, "hall"))
+        self.robot_in = "kitchen"
+        self.place = dict.fromkeys(BELONGS, "hall")
 
     def components(self) -> Sequence[Component]:
         """Return the components that act on this house."""
-        return [Base(self.world, self.fault), Gripper(self.world)]
+        return [Base(self), Gripper(self)]
 
     def knowledge(self) -> Delta:
         """Return what the robot knows at the start."""
         return Delta(
             nodes={**dict.fromkeys(ROOMS, "room"), **dict.fromkeys(BELONGS, "parcel")},
             added=(
-                fact("robot-in", self.world.robot_in),
+                fact("robot-in", self.robot_in),
                 fact("empty"),
-                *(fact("lies-in", parcel, room) for parcel, room in self.world.place.items()),
+                *(fact("lies-in", parcel, room) for parcel, room in self.place.items()),
                 *(fact("belongs-in", parcel, room) for parcel, room in BELONGS.items()),
             ),
         )
 
     def left(self) -> Sequence[Left]:
         """Return the parcels that are in a wrong place, in truth: `goal_reached` does not depend on beliefs."""
-        wrong = [parcel for parcel, room in BELONGS.items() if self.world.place[parcel] != room]
-        return [Left(parcel, where=self.world.place[parcel]) for parcel in wrong]
+        wrong = [parcel for parcel, room in BELONGS.items() if self.place[parcel] != room]
+        return [Left(parcel, where=self.place[parcel]) for parcel in wrong]

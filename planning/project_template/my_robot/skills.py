@@ -1,14 +1,15 @@
-"""Skills of the robot. A real robot replaces the lines that use the world by calls of its drivers."""
+"""Skills of the robot. A real robot replaces the lines that use the house by calls of its drivers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NewType
+from typing import TYPE_CHECKING, NewType
 
 from dsc import Component, Outcome, Parameters, SkillCall, parameter, skill
 from knowledge_base import Delta, fact
 
-from .world import World
+if TYPE_CHECKING:
+    from .world import World
+
 
 Room = NewType("Room", str)  # objects of the type `room` of the domain
 Parcel = NewType("Parcel", str)
@@ -38,17 +39,16 @@ class Base(Component):
     name = "base"
     parameters: BaseParameters
 
-    def __init__(self, world: World, fault: Callable[[str, str], str | None]) -> None:
+    def __init__(self, house: World) -> None:
         super().__init__()
-        self.world = world
-        self.fault = fault
+        self.house = house
 
     @skill
     async def drive(self, call: SkillCall, start: Room, to: Room) -> Arrived | DoorClosed:
         await call.clock.sleep(10.0 / self.parameters.speed)  # run time: simulated, or real with --real-time
-        if self.fault(call.action_id, "door_closed"):
+        if self.house.fault(call.action_id, "door_closed"):
             return DoorClosed()
-        self.world.robot_in = to
+        self.house.robot_in = to
         # Observations become knowledge, which conditions and plans read.
         return Arrived(observed=Delta(removed=(fact("robot-in", start),), added=(fact("robot-in", to),)))
 
@@ -58,20 +58,20 @@ class Gripper(Component):
 
     name = "gripper"
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, house: World) -> None:
         super().__init__()
-        self.world = world
+        self.house = house
 
     @skill
     async def pick_up(self, call: SkillCall, parcel: Parcel, room: Room) -> PickedUp:
         await call.clock.sleep(3.0)
-        self.world.place[parcel] = "gripper"
+        self.house.place[parcel] = "gripper"
         gone = (fact("lies-in", parcel, room), fact("empty"))
         return PickedUp(observed=Delta(removed=gone, added=(fact("carries", parcel),)))
 
     @skill
     async def put_down(self, call: SkillCall, parcel: Parcel, room: Room) -> PutDown:
         await call.clock.sleep(3.0)
-        self.world.place[parcel] = room
+        self.house.place[parcel] = room
         seen = (fact("lies-in", parcel, room), fact("empty"))
         return PutDown(observed=Delta(removed=(fact("carries", parcel),), added=seen))

@@ -13,7 +13,7 @@ from dsc_base import Base
 from dsc import Component, Library, Outcome, Parameters, Sequencer, parameter, parse_plot, skill, validate_plot
 from dsc.profiles import configure
 from dsc.sequencer.clock import LoopClock, run_simulated
-from dsc.sequencer.sequencer import RunEnd
+from dsc.sequencer.run_end import RunEnd
 from dsc.text.profiles import parse_profile
 from knowledge_base import InputError, KnowledgeBase
 from knowledge_base.world.schema import Schema

@@ -17,7 +17,7 @@ from dsc.components.component import Component
 from dsc.components.ports import query
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import run_simulated
-from dsc.sequencer.sequencer import RunEnd
+from dsc.sequencer.run_end import RunEnd
 from dsc.skills import check_arguments, skill
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta, fact

@@ -20,7 +20,8 @@ from dsc.runs import store as store_module
 from dsc.runs.archive import archive, has_run, is_unfinished, records_of
 from dsc.runs.store import RunStore, RunWriter
 from dsc.sequencer.replay import replay
-from dsc.sequencer.sequencer import RunEnd, Sequencer
+from dsc.sequencer.run_end import RunEnd
+from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from knowledge_base.errors import Place, StoreError, UnknownNameError
 from knowledge_base.facts import Delta, fact

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from dsc.sequencer.sequencer import RunEnd
+from dsc.sequencer.run_end import RunEnd
 
 pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 

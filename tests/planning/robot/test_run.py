@@ -90,7 +90,7 @@ def test_several_runs_without_a_store_share_the_robot():
         (lambda one: one.discard(), StoreError, "only a run with a store"),
     ],
 )
-def test_what_cannot_start_is_refused_before_it_starts(start, error, said):
+def test_an_impossible_start_is_refused_before_it_starts(start, error, said):
     async def main(one):
         with pytest.raises(error, match=said):
             start(one)

@@ -1,0 +1,226 @@
+"""The program of a robot: domain, plots, components, knowledge and planner, checked and wired for each run."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Self
+
+from dsc.components.assembly import require_deployed, require_instances, require_wired
+from dsc.components.component import Component
+from dsc.dynamic.knowledge_situation import ACHIEVE
+from dsc.dynamic.library import Library
+from dsc.events import SKILL_FAILURES
+from dsc.model.plot import ActionPlot
+from dsc.profiles import configure
+from dsc.runs.store import RunStore
+from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.sequencer import Sequencer
+from dsc.skills import signatures
+from dsc.text.profiles import Profile
+from dsc.trace import Listener, Trace
+from knowledge_base.errors import InputError, SchemaError
+from knowledge_base.journal.file import Durability, located
+from knowledge_base.store import KnowledgeBase
+from knowledge_base.world.schema_compatibility import require_extension
+from planning.engines.planner import Planner
+from planning.engines.race import CachingPlanner, PlannerRace
+from planning.engines.registry import repeatable
+from planning.execution.achieve import achieve_plot
+from planning.execution.planning_component import PlanningComponent
+from planning.execution.search import Foresight
+from planning.model.domain import PlanningDomain
+from planning.robot.bundles import Bundle, components_of, domain_of, gathered, plots_of, shipped_by
+from planning.robot.run import Run
+from planning.robot.simulation import Simulation
+from planning.robot.soundness import require_parts, require_sound
+from planning.robot.task import Task
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Origin of a robot: the bundle that was deployed.
+
+    Attributes:
+        bundle: the bundle.
+        task: the task of the robot's reports.
+        simulation: the simulated world; `None` without a simulation.
+        profile: the settings profile; `None` without a profile.
+        kept: plain data that the store keeps with a run.
+        resumes: whether the robot resumes the run in its store.
+    """
+
+    bundle: Bundle
+    task: Task
+    simulation: Simulation | None = None
+    profile: Profile | None = None
+    kept: Mapping[str, Any] = field(default_factory=dict)
+    resumes: bool = False
+
+
+class RobotProgram:
+    """The parts of a robot, checked together; for the arguments see `Robot`."""
+
+    def __init__(
+        self,
+        domain: PlanningDomain | Path | str,
+        plots: Iterable[ActionPlot],
+        components: Iterable[Component],
+        knowledge: KnowledgeBase | None = None,
+        planner: Planner | None = None,
+        *,
+        parallel: bool = True,
+        foresight: Foresight | None = None,
+        store: Path | str | None = None,
+        durability: Durability = "process",
+        failures: Collection[str] = (),
+        origin: Origin | None = None,
+    ) -> None:
+        require_parts(knowledge, planner, foresight, store)
+        self.components = require_instances(components)
+        configure(self.components)
+        require_deployed(self.components, [PlanningComponent.name])
+        require_wired(self.components)
+        self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
+        if any(component.name == PlanningComponent.name for component in self.components):
+            raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)
+        if knowledge is not None and store is not None:
+            raise InputError("a store provides the knowledge: give a store or knowledge, not both")
+        if knowledge is not None:
+            require_extension(self.domain.schema, knowledge.schema)
+        self.store = None if store is None else located(store)
+        self.library = plots if isinstance(plots, Library) else Library(plots)
+        if ACHIEVE not in self.library:
+            self.library.add(achieve_plot())
+        self._own_planners: dict[bool, CachingPlanner] = {}
+        self._planner = planner
+        self._parallel = parallel
+        self._foresight = foresight
+        self._failures = failures
+        self._listeners: list[Listener] = []
+        self._runs: dict[Run[Any], None] = {}
+        self._started = 0
+        self._closed = False
+        self.origin = origin
+        skills = [s for c in self.components for s in c.skills().values()]
+        skills += signatures(PlanningComponent, PlanningComponent.name).values()
+        declared = {
+            PlanningComponent.name: {},
+            **{c.name: c.parameters.declared for c in self.components},
+        }
+        schema = self.domain.schema if knowledge is None else knowledge.schema
+        require_sound(self.library, self.domain, schema, skills, declared)
+        if knowledge is not None:
+            self.knowledge = knowledge
+        else:  # last, since the caller must close an opened knowledge base
+            kept = None if store is None else durability
+            self.knowledge = KnowledgeBase.open(self.domain.schema, self.store, kept)
+
+    @classmethod
+    def of_bundles(
+        cls,
+        bundles: Iterable[Bundle | str],
+        plots: Iterable[ActionPlot] = (),
+        components: Iterable[Component] = (),
+        **how: Any,
+    ) -> Self:
+        """Return a robot for bundles, the bundles that they need, and further plots and components.
+
+        Args:
+            bundles: each a `Bundle`, or the name of an installed bundle.
+            plots: further plots.
+            components: further components.
+            how: the keyword arguments of `Robot` (`knowledge`, `planner`, `store`, ...).
+
+        Raises:
+            UnknownNameError: a bundle is missing.
+            InputError: two bundles contradict each other, or `Robot` raises the error.
+        """
+        found = gathered(bundles)
+        how.setdefault("failures", frozenset[str]().union(*(bundle.failures for bundle in found)))
+        return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
+
+    @property
+    def failures(self) -> frozenset[str]:
+        """The outcomes that report failures: `failure_events` of the plots, and the argument `failures`."""
+        return failure_events(self.library).union(self._failures)
+
+    @property
+    def simulation(self) -> Simulation | None:
+        """The simulated world; `None` without a simulation."""
+        return None if self.origin is None else self.origin.simulation
+
+    def header(self) -> dict[str, Any]:
+        """Return the inputs that determine a run, for the first line of the trace."""
+        plots = "".join(sorted(plot.digest for plot in self.library))
+        domain = "\n".join(f"{name}\n{text}" for name, text in sorted(self.domain.statements().items()))
+        origin, world = self.origin, self.simulation
+        return {
+            **({} if origin is None else {"run": origin.bundle.name}),
+            **({} if world is None else {"seed": world.seed, "faults": world.chance}),
+            **({} if origin is None or origin.profile is None else {"profile": origin.profile.digest}),
+            "chart": hashlib.sha256(plots.encode()).hexdigest()[:12],
+            "domain": hashlib.sha256(domain.encode()).hexdigest()[:12],
+        }
+
+    def listen(self, listener: Listener) -> Callable[[], None]:
+        """Call `listener` with every later record of every run; return a function that ends this."""
+        self._listeners.append(listener)
+        return partial(self._listeners.remove, listener)
+
+    def wire(
+        self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool, until: float | None
+    ) -> tuple[Sequencer, PlanningComponent]:
+        """Return a sequencer for one run with its planning component; `last` is the number of the last kept record."""
+        trace = Trace(clock.now, last)
+        for listener in self._listeners:
+            trace.listen(listener)
+        components: list[Component] = list(self.components)
+        sequencer = Sequencer(
+            self.library, self.knowledge, components, clock, trace, open_ended=open_ended, store=store,
+            until=math.inf if until is None else until, failures=self.failures,
+        )  # fmt: skip
+        planning = PlanningComponent(
+            self.domain, self.library, self.knowledge, self.planner_for(clock), clock, trace,
+            components=sequencer.dispatcher.components, working_for=sequencer.working_for, parallel=self._parallel,
+            shared=[component.name for component in components if component.concurrent],
+            foresight=self._foresight,
+        )  # fmt: skip
+        sequencer.listen(planning.note)
+        sequencer.dispatcher.deploy(planning)
+        return sequencer, planning
+
+    def run_store(self, header: Mapping[str, Any]) -> RunStore | None:
+        """Return the store of a run with these plain data, or `None` without a store."""
+        if self.store is None:
+            return None
+        return RunStore(self.knowledge, self.store, header, self.domain.statements())
+
+    def release(self) -> None:
+        """Close the store and the simulated world, and terminate the processes of the default planners."""
+        if self.store is not None:
+            self.knowledge.close()
+        if self.simulation is not None:
+            self.simulation.close()
+        for planner in self._own_planners.values():
+            planner.kill()
+
+    def planner_for(self, clock: LoopClock) -> Planner:
+        """Return the planner for the kind of time of a clock."""
+        if self._planner is not None:
+            return self._planner
+        if clock.simulated not in self._own_planners:
+            planner = PlannerRace(choose=repeatable) if clock.simulated else PlannerRace()
+            self._own_planners[clock.simulated] = CachingPlanner(planner)
+        return self._own_planners[clock.simulated]
+
+
+def failure_events(library: Library) -> frozenset[str]:
+    """Return the failures of all skills, the outcomes of plots for planning actions, and the events of rules."""
+    emitted = {event for plot in library if plot.implements for event in plot.emits}
+    answered = {rule.on for plot in library for rule in plot.rules if rule.on is not None}
+    return frozenset({*SKILL_FAILURES, *emitted, *answered})
