@@ -93,7 +93,9 @@ class ChangedError(InputError):
 
     def __init__(self, differences: Sequence[str], *, place: Place | None = None) -> None:
         more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
-        super().__init__(f"the run was begun with others: {'; '.join(differences[:3])}{more}", place=place)
+        choices = "resume it with the earlier version, or end it: Robot.discard() or `dsc runs end`"
+        said = f"the run was begun with others: {'; '.join(differences[:3])}{more}; {choices}"
+        super().__init__(said, place=place)
         self.differences = tuple(differences)
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
 
 from knowledge_base._notebook import svg_by
-from knowledge_base.errors import ConflictError, InputError
+from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.exchange import to_json
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.checking.inputs import shown
+from knowledge_base.language.checking.vocabulary import Signature
 from knowledge_base.language.evaluation.explanation import Explanation, explain
 from knowledge_base.language.evaluation.query_plan import QueryPlan, plan_query
 from knowledge_base.language.evaluation.world_protocol import BoundedWorld, Bounds, Meter
@@ -41,6 +42,7 @@ class View:
         self._version = version
         self._questions = Questions()
         self._graph: WorldGraph | None = None
+        self._checked: set[tuple[str, int]] = set()
 
     @property
     def schema(self) -> Schema:
@@ -222,20 +224,37 @@ class View:
             return dict(self._state.values)
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
-        """Return whether the fact is true."""
+        """Return whether the fact is true; the name of a type asks for the type of an object.
+
+        Raises:
+            UnknownNameError: there is no such predicate or type.
+            SchemaError: a wrong number of arguments.
+            InputError: the arguments are not a tuple.
+        """
+        is_type = self._check(predicate, args)
         with self._lock:
+            if is_type:
+                found = self._state.type_of(str(args[0]))
+                return found is not None and self.schema.is_a(found, predicate)
             return self._state.holds(predicate, args)
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> list[tuple[Value, ...]]:
         """Return the arguments of all facts that match `pattern`, in order of insertion.
 
-        `None` in `pattern` matches every argument.
+        `None` in `pattern` matches every argument. Errors are as for `holds`.
         """
+        is_type = self._check(predicate, pattern)
         with self._lock:
+            if is_type:
+                return [(name,) for name in self._state.objects(predicate) if pattern[0] in (None, name)]
             return list(self._state.match(predicate, pattern))
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
-        """Return an upper bound of the number of facts that match `pattern`, without reading the facts."""
+        """Return an upper bound of the number of facts that match `pattern`, without reading the facts.
+
+        Errors are as for `holds`.
+        """
+        self._check(predicate, pattern)
         with self._lock:
             return self._state.estimate(predicate, pattern)
 
@@ -246,9 +265,28 @@ class View:
 
         Raises:
             UnknownNameError: the function is not declared.
+            SchemaError: a wrong number of arguments.
+            InputError: the arguments are not a tuple.
         """
+        self._check(function, args, self.schema.function)
         with self._lock:
             return self._state.value(function, args)
+
+    def _check(
+        self, name: str, args: tuple[Value | None, ...], declared: Callable[[str], Signature] | None = None
+    ) -> bool:
+        """Raise the errors of `holds`, and return whether a type has that name; each name is checked once."""
+        if not isinstance(args, tuple | list):
+            raise InputError(f"the arguments of '{name}' are a tuple, e.g. ({shown(args)},), not {shown(args)}")
+        if (name, len(args)) in self._checked:
+            return False
+        if declared is None and self.schema.is_type(name, len(args)):
+            return True
+        parameters = (declared or self.schema.predicate)(name).parameters
+        if len(parameters) != len(args):
+            raise SchemaError(f"'{name}' has {len(parameters)} arguments, not {len(args)}", found=name)
+        self._checked.add((name, len(args)))
+        return False
 
     def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
         """Return the reference of the source that is bound to the function, or `None`."""

@@ -7,12 +7,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
 from dsc.engine.machine_state import MachineState
 from dsc.errors import ChangedError
 from dsc.events import Event
 from dsc.messages import ParameterMessage
 from dsc.model.plot import ActionPlot
+from dsc.model.states import DynamicState, SubmachineState
 from dsc.runs.archive import RunArchive, RunRow
 from dsc.runs.encoding import Awaited, awaited_of, events_of, frame_form
 from dsc.runs.tables import SnapshotRow
@@ -133,7 +135,7 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
 
 
 def require_unchanged(runs: RunArchive, run: RunRow, library: Library, domain: Mapping[str, str]) -> None:
-    """Raise `ChangedError` if a plot, or a definition that plots depend on, has changed since the run began."""
+    """Raise `ChangedError` if a plot that the run may use, or a definition, has changed since the run began."""
     found = [*_changed_plots(runs, run, library), *_changed_statements(run.domain, domain)]
     if found:
         raise ChangedError(found, place=Place(str(runs.path)))
@@ -148,15 +150,42 @@ def _changed_plots(runs: RunArchive, run: RunRow, library: Library) -> Iterator[
     from dsc.text.plot_difference import differences  # noqa: PLC0415  loads the drawing, too; only a changed plot needs it
 
     before = plots_of(runs, run)
+    reachable = _reachable(run.plot, before) | _reachable(run.plot, library)
     for plot in before:
+        if plot.name not in reachable:
+            continue
         if plot.name not in library:
             yield f"the plot '{plot.name}' is missing"
         elif plot != library.plot(plot.name):
             what = ", ".join(map(str, differences(plot, library.plot(plot.name))))
             yield f"the plot '{plot.name}' has changed: {what or 'its description'}"
     for plot in library:
-        if plot.name not in before:
+        if plot.name in reachable and plot.name not in before:
             yield f"the plot '{plot.name}' is new"
+
+
+def _reachable(first: str, library: Library) -> set[str]:
+    """Return the names of the plots that a run of the plot `first` may use, with plans for its goals.
+
+    A state that runs the plot in a variable may run every plot, apart from the state of `achieve`, which runs plans.
+    """
+    found: set[str] = set()
+    agenda = [first]
+    while agenda:
+        name = agenda.pop()
+        if name in found or name not in library:
+            continue
+        found.add(name)
+        plot = library.plot(name)
+        agenda += plot.uses()
+        states = [state for _, state, _ in plot.walk()]
+        if any(isinstance(state, DynamicState) and state.goal is not None for state in states):
+            agenda.append(ACHIEVE)
+        if name == ACHIEVE:
+            agenda += [one.name for one in library if one.implements]
+        elif any(isinstance(state, SubmachineState) and state.use.startswith("?") for state in states):
+            agenda += [one.name for one in library]
+    return found
 
 
 def _changed_statements(before: Mapping[str, str], now: Mapping[str, str]) -> Iterator[str]:

@@ -229,7 +229,9 @@ class RunStore:
         self.writing.require_right()
         (open_runs,) = self.writing.connection.execute("SELECT count(*) FROM runs WHERE ended IS NULL").fetchone()
         if open_runs:
-            raise StoreError("the store has an unfinished run, which can be resumed", place=Place(str(self.path)))
+            choices = "`Robot.resume_or_start`, or `dsc run --resume`; `Robot.discard` or `dsc runs end` ends it"
+            said = f"the store has an unfinished run, which can be resumed: {choices}"
+            raise StoreError(said, place=Place(str(self.path)))
         self._number, self._state = 0, RunState(self._short)
         plots = {one.name: self._short.hash(one.to_form()) for one in library}
         row = (

@@ -298,3 +298,28 @@ def test_transaction_verbs() -> None:
             tx.set("time", "now")
         with pytest.raises(UnknownNameError, match="no type"):
             kb.objects("cups")
+
+
+@pytest.mark.parametrize(
+    ("ask", "error", "said"),
+    [
+        (lambda kb: kb.holds("on", "cup1"), InputError, r"the arguments of 'on' are a tuple, e\.g\. \('cup1',\)"),
+        (lambda kb: kb.match("on", "cup1"), InputError, "are a tuple"),
+        (lambda kb: kb.holds("onn", ("cup1", "table")), UnknownNameError, "did you mean 'on'"),
+        (lambda kb: kb.match("onn", (None,)), UnknownNameError, "did you mean 'on'"),
+        (lambda kb: kb.estimate("onn", (None,)), UnknownNameError, "did you mean 'on'"),
+        (lambda kb: kb.holds("on", ("cup1",)), SchemaError, "'on' has 2 arguments, not 1"),
+        (lambda kb: kb.value("weight", ()), SchemaError, "'weight' has 1 arguments, not 0"),
+        (lambda kb: kb.value("wieght", ("cup1",)), UnknownNameError, "did you mean 'weight'"),
+    ],
+)
+def test_a_wrong_question_about_facts_is_refused_instead_of_answered(ask, error, said):
+    text = "(define (domain d) (:types item) (:predicates (on ?a ?b - item)) (:functions (weight ?i - item)))"
+    kb = KnowledgeBase(Schema.parse(text))
+    kb.apply(Delta(nodes={"cup1": "item", "table": "item"}, added=(fact("on", "cup1", "table"),)), "me")
+    assert kb.holds("on", ("cup1", "table"))
+    assert kb.holds("item", ("cup1",))
+    assert kb.match("item", (None,)) == [("cup1",), ("table",)]
+    assert not kb.holds("item", ("cup2",))
+    with pytest.raises(error, match=said):
+        ask(kb)

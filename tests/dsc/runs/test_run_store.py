@@ -424,8 +424,7 @@ CHANGES = {
         (),
         "the plot 'p' has changed: ~ state b",
     ),
-    "a plot that is new": (TWICE, ("{plot: q, states: {a: {final: true}}}",), "the plot 'q' is new"),
-    "another plot": (TWICE.replace("plot: p", "plot: r"), (), "the plot 'p' is missing; the plot 'r' is new"),
+    "a plot that is missing": (TWICE.replace("plot: p", "plot: r"), (), "the plot 'p' is missing"),
 }
 
 
@@ -436,6 +435,40 @@ def test_a_changed_chart_is_refused_with_the_difference(tmp_path, chart, more, d
     with pytest.raises(ChangedError, match=difference):
         Run(folder, [chart, *more], done=done, resume=True)
     assert Run(folder, [TWICE], done=done, resume=True).end == crashes.whole.end
+
+
+USING = (
+    "{plot: p, states: {a: {entry: {trigger: robot.work}, on: {did: b}}, b: {use: q, on: {done: e}}, e: {final: true}}}"
+)
+USED = "{plot: q, states: {a: {entry: {trigger: robot.work}, on: {did: e}}, e: {final: true}}}"
+UNUSED = "{plot: other, states: {a: {final: true}}}"
+
+
+@pytest.mark.parametrize(
+    ("now", "difference"),
+    [
+        ([USING, USED, UNUSED], None),
+        ([USING, USED], None),
+        ([USING, USED, UNUSED.replace("a:", "b:")], None),
+        ([USING, USED.replace("e:", "f:").replace("did: e", "did: f"), UNUSED], "the plot 'q' has changed"),
+        ([USING, UNUSED], "'q'"),
+    ],
+    ids=["the same", "an unused plot fewer", "an unused plot changed", "a used plot changed", "a used plot fewer"],
+)
+def test_plots_that_the_run_cannot_reach_may_change(tmp_path, now, difference):
+    crashes = Crashes(tmp_path, USING, USED, UNUSED)
+    _, done, folder = crashes.copies[2]
+    if difference is None:
+        assert Run(folder, now, done=done, resume=True).end == crashes.whole.end
+        return
+    with pytest.raises((ChangedError, UnknownNameError), match=difference):
+        Run(folder, now, done=done, resume=True)
+
+
+def test_the_error_about_changes_names_the_choices(tmp_path):
+    _, done, folder = Crashes(tmp_path, TWICE).copies[2]
+    with pytest.raises(ChangedError, match=r"resume it with the earlier version, or end it: .*dsc runs end"):
+        Run(folder, [TWICE.replace("seconds: 1.5", "seconds: 2.5")], done=done, resume=True)
 
 
 def action(name):
