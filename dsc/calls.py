@@ -61,7 +61,7 @@ class SkillCall(Generic[Reported_contra]):
     """One execution of a skill; `SkillCall[Progress]` is the call of a skill that reports `Progress`.
 
     Attributes:
-        action_id: identifies this execution; the id is stable across restarts and never used for another execution.
+        action_id: identifies this execution in its run; the id is stable across restarts.
         clock: the only clock that a skill may use.
         report: posts an intermediate event while the skill continues (e.g. progress, a perception).
         deadline: second of run time at which the skill is cancelled.
@@ -69,6 +69,7 @@ class SkillCall(Generic[Reported_contra]):
         rank: the rank of the skill among those that wait for its component.
         waits: reports, as text, the skill of another program for which the component lets this skill wait; empty when
             the wait ends.
+        run: identifies the run, see `key`; empty in a run without an id.
 
     After a crash, a resumed run may repeat a call with an equal id. The clock of the repeated call begins at the start
     of the action, and repeated reports are dropped. So a skill that acts only one time for each id executes the same
@@ -82,6 +83,15 @@ class SkillCall(Generic[Reported_contra]):
     abandon: Callable[[str], None] = lambda _: None
     rank: Rank = ORDINARY
     waits: Callable[[str], None] = lambda _: None
+    run: str = ""
+
+    @property
+    def key(self) -> str:
+        """A text that no other execution has, e.g. for the header `Idempotency-Key`; a restart repeats the key.
+
+        In real time it is unique; in simulated time it is unique for the robot, so that traces stay comparable.
+        """
+        return f"{self.run}/{self.action_id}" if self.run else self.action_id
 
     def observe(self, observed: Delta) -> None:
         """Report observed facts immediately, before the outcome and without an event for the chart."""

@@ -284,12 +284,15 @@ class HostedActions:
     async def _execute(self, said: dict[str, Any], action: _Action, reports: Reports) -> None:
         end: dict[str, Any]
         try:
-            seconds = {}
+            seconds: dict[str, Any] = {}
             if said["seconds"] is not None:
                 require_time(said["seconds"])
                 seconds["deadline"] = self._clock.now() + said["seconds"]
             rank = _rank_of(said.get("rank"))
-            call = SkillCall(said["id"], self._clock, lambda one: reports.put(_plain(one)), rank=rank, **seconds)
+            run = str(said.get("of_run", ""))
+            call = SkillCall(
+                said["id"], self._clock, lambda one: reports.put(_plain(one)), rank=rank, run=run, **seconds
+            )
             async with asyncio.timeout(said["seconds"]), self._turn(said, action, rank), self._alive():
                 with contained(f"{self._component.name}.{said['skill']}", self._component.device_errors):
                     outcome = await self._component.execute(said["skill"], call, said["arguments"])

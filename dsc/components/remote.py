@@ -248,6 +248,7 @@ class RemoteComponent(Component):
                 "arguments": dict(arguments),
                 "seconds": seconds,
                 "rank": list(call.rank),
+                "of_run": call.run,
             }
             await self._ask_about(call.action_id, "start", **said)
             return await self._end_of(call, news)

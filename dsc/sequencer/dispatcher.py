@@ -65,6 +65,7 @@ class Dispatcher:
         post: receives skills' answers and timers' messages, in the order of their arrival.
         observer: names the states of skills, and records which skills wait.
         part_of: a prefix of the action ids that components receive.
+        run_id: identifies the run, see `SkillCall.key`.
 
     Attributes:
         activation: keeps required components alive and active.
@@ -79,9 +80,11 @@ class Dispatcher:
         post: Callable[[SkillMessage | TimerMessage | steps.SendLater | LateMessage | Event], None],
         observer: WaitObserver,
         part_of: str = "",
+        run_id: str = "",
     ) -> None:
         self._observer = observer
         self._part_of = part_of
+        self._run_id = run_id
         self._components = {component.name: component for component in require_instances(components)}
         self.activation = ComponentActivation(ComponentRegistry(self._components), self._in_use)
         self.outbox = Outbox(self._refused)
@@ -448,7 +451,7 @@ class Dispatcher:
         began = None if interrupted is None else interrupted.began
         clock: Clock = self._clock if began is None else PastClock(self._clock, began)
         action_id = self._part_of + start.action_id
-        call = SkillCall(action_id, clock, report, running.due, self._fault, start.rank, running.held)
+        call = SkillCall(action_id, clock, report, running.due, self._fault, start.rank, running.held, self._run_id)
         if not running.begun:
             await running.turn()
         await self.outbox.configured(component, running.configuring)

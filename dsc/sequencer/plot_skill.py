@@ -79,7 +79,9 @@ class PlotComponent(Component):
             raise UnknownNameError(message, found=skill_name, valid=self._signatures)
         check_arguments(self._signatures[skill_name], arguments)
         part_of = f"{call.action_id}/"
-        sequencer = Sequencer(self._library, self._knowledge(), self._components, LoopClock(), part_of=part_of)
+        sequencer = Sequencer(
+            self._library, self._knowledge(), self._components, LoopClock(), part_of=part_of, run_id=call.run
+        )
         ended: list[Outcome] = []
 
         def receive(step: Step) -> None:

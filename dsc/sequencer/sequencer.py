@@ -53,6 +53,7 @@ class Sequencer:
             such a run ends with a problem.
         store: keeps the run, so that the run can resume after a crash; the store must belong to `knowledge`.
         part_of: a prefix of the action ids that components receive: an id from the run of which this run is a part.
+        run_id: identifies the run for the services that skills call, see `SkillCall.key`.
         until: second of run time at which a run that has not ended ends with a problem; `math.inf` means never.
         phases: reports coordination phases that take long.
         failures: outcome events with which the plot does not reach its goal, although it finishes.
@@ -78,6 +79,7 @@ class Sequencer:
         open_ended: bool = False,
         store: RunStore | None = None,
         part_of: str = "",
+        run_id: str = "",
         until: float = math.inf,
         phases: PhaseWatch | None = None,
         failures: Collection[str] = (),
@@ -93,7 +95,7 @@ class Sequencer:
         if store is not None:
             self.trace.listen(store.receive)
         self._inbox = Inbox()
-        self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of)
+        self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id)
         self._open_ended = open_ended
         self._over = False
         self._suspending = False

@@ -173,16 +173,16 @@ class RobotProgram:
         return partial(self._listeners.remove, listener)
 
     def wire(
-        self, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool, until: float | None
+        self, run: str, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool, until: float | None
     ) -> tuple[Sequencer, PlanningComponent]:
-        """Return a sequencer for one run with its planning component; `last` is the number of the last kept record."""
+        """Return a sequencer for the run of that id, with its planning component; `last` is the last kept record."""
         trace = Trace(clock.now, last)
         for listener in self._listeners:
             trace.listen(listener)
         components: list[Component] = list(self.components)
         sequencer = Sequencer(
             self.library, self.knowledge, components, clock, trace, open_ended=open_ended, store=store,
-            until=math.inf if until is None else until, failures=self.failures,
+            until=math.inf if until is None else until, failures=self.failures, run_id=run,
         )  # fmt: skip
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self.planner_for(clock), clock, trace,

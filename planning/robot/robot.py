@@ -161,7 +161,7 @@ class Robot(RobotProgram):
         number = self._new_id(simulated=clock.simulated)
         how = {"id": number, "simulated": clock.simulated, "open_ended": open_ended, "until": limit}
         store = self.run_store({**(header or {}), **how})
-        sequencer, planning = self.wire(clock, 0, store, open_ended=open_ended, until=limit)
+        sequencer, planning = self.wire(number, clock, 0, store, open_ended=open_ended, until=limit)
         if prepare is not None:
             prepare(sequencer)
         return self._begin(number, sequencer, planning, sequencer.run(goal_or_plot, arguments))
@@ -375,10 +375,11 @@ class Robot(RobotProgram):
                 listener(record)
         clock = LoopClock(kept.time)
         open_ended, until = bool(kept.run.header["open_ended"]), kept.run.header["until"]
-        sequencer, planning = self.wire(clock, kept.last_record, store, open_ended=open_ended, until=until)
+        number = str(kept.run.header.get("id", kept.run.number))
+        sequencer, planning = self.wire(number, clock, kept.last_record, store, open_ended=open_ended, until=until)
         if prepare is not None:
             prepare(sequencer)
-        return self._begin(str(kept.run.header.get("id", kept.run.number)), sequencer, planning, sequencer.resume(kept))
+        return self._begin(number, sequencer, planning, sequencer.resume(kept))
 
     def _begin(
         self, number: str, sequencer: Sequencer, planning: PlanningComponent,

@@ -276,3 +276,54 @@ def test_an_event_that_no_plot_receives_is_refused_with_the_nearest():
         return await run.cancel("enough")
 
     simulated(main)
+
+
+class Noting(ObedientRobot):
+    keys: asyncio.Queue[str]
+
+    async def execute(self, skill_name, call, arguments):
+        self.keys.put_nowait(call.key)
+        return await super().execute(skill_name, call, arguments)
+
+
+def keyed(store, keys):
+    device = Noting(DOMAIN)
+    device.keys = keys
+    made = Robot(DOMAIN, plots(DOMAIN), [device], store=store)
+    device.knowledge = made.knowledge
+    if not made.knowledge.nodes():
+        made.knowledge.apply(WORLD, "me")
+    return made
+
+
+def test_the_key_of_a_call_is_unique_in_real_time_and_begins_with_the_id_of_the_run(tmp_path):
+    async def life(store, begin):
+        keys: asyncio.Queue[str] = asyncio.Queue()
+        async with keyed(tmp_path / store, keys) as one:
+            run = begin(one)
+            key = await keys.get()
+            await run.suspend()
+        return run.id, key
+
+    async def main():
+        return [
+            await life("a.kb", lambda one: one.start("(at c)")),
+            await life("b.kb", lambda one: one.start("(at c)")),
+        ]
+
+    (first, key), (second, other) = run_real(main())
+    assert [key.split("/")[0], other.split("/")[0]] == [first, second]
+    assert key != other
+
+
+def test_the_key_of_a_call_is_equal_in_equal_runs_in_simulated_time():
+    async def main():
+        keys: asyncio.Queue[str] = asyncio.Queue()
+        async with keyed(None, keys) as one:
+            await one.start("(at b)")
+            await one.start("(at c)")
+        return [keys.get_nowait(), keys.get_nowait()]
+
+    first = run_simulated(main())
+    assert first == run_simulated(main())
+    assert len({*first}) == len(first) == 2
