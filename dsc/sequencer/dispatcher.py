@@ -395,10 +395,10 @@ class Dispatcher:
         component = self.component(start.component)
         signature = component.skills().get(start.skill, UNKNOWN_SKILL)
         within = start.within or (math.inf if signature.unlimited or signature.pattern == "event" else DEFAULT_WITHIN)
-        due = within + (self._clock.now() if interrupted is None else interrupted.asked)
+        since = self._clock.now() if interrupted is None else interrupted.asked
         raises = component.device_errors
         running = RunningSkill(
-            start, signature, raises, within, due, self._clock, self._post, self._fault, self._observer
+            start, signature, raises, within, since, self._clock, self._post, self._fault, self._observer
         )
         running.configuring = self.outbox.configuring
         if component.takes_turns(signature):

@@ -71,7 +71,7 @@ class RunningSkill:
         signature: the skill's signature.
         raises: the exceptions that the component declares.
         within: maximum duration, in seconds.
-        due: second of run time of the deadline; `math.inf` means no deadline.
+        since: second of run time of the start; a resumed skill has that of its first start.
         clock: run time.
         post: receives the messages of the skill.
         fault: receives a fault of the run.
@@ -84,7 +84,8 @@ class RunningSkill:
         answered: whether the end was posted.
         configuring: deliveries of parameters and modes that end before the skill begins.
         claim: the claim to the component; `None` if the component is concurrent.
-        since: second of run time at which this program started the skill.
+        since: second of run time of the start.
+        due: second of run time of the deadline; `math.inf` means no deadline.
         begun: whether the skill may begin, since it has the turn of its component.
         credible: whether observations after the end are posted; false after an invalid report.
         missing: returns, as text, the component that the skill waits for; empty if it waits for none.
@@ -98,7 +99,7 @@ class RunningSkill:
         signature: SkillSignature,
         raises: Classes,
         within: float,
-        due: float,
+        since: float,
         clock: LoopClock,
         post: Callable[[SkillMessage], None],
         fault: Callable[[str], None],
@@ -107,8 +108,8 @@ class RunningSkill:
         self.start = start
         self.signature = signature
         self.within = within
-        self.due = due
-        self.since = clock.now()
+        self.since = since
+        self.due = since + within
         self.reports: Reports | None = None
         self.stopped = False
         self.answered = False

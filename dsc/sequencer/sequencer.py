@@ -98,7 +98,6 @@ class Sequencer:
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id)
         self._open_ended = open_ended
         self._over = False
-        self._suspending = False
         self._reacts = False  # changes of knowledge are then the run's own
         self._wake_up: KnowledgeMessage | None = None  # the latest message for waiting guards
         self._until = until
@@ -204,7 +203,7 @@ class Sequencer:
         self.clock.calls.call(self._stop, reason)
 
     def _stop(self, reason: str) -> None:
-        if not self._over:
+        if not self._over and not self.machine.state.finished:
             self._reactor.problem = self._reactor.problem or reason
             self._inbox.wake()
 
@@ -218,11 +217,7 @@ class Sequencer:
         """
         if self.store is None:
             raise StoreError("only a run with a store can be suspended")
-        self.clock.calls.call(self._begin_suspension)
-
-    def _begin_suspension(self) -> None:
-        self._suspending = not self._over
-        self._inbox.wake()
+        self.clock.calls.call(self._stop, SUSPENDED)
 
     async def run(self, plot: str | PlotCall[Outputs], arguments: Mapping[str, Any] | None = None) -> RunEnd[Outputs]:
         """Run the plot until it ends, or until a deadlock; return the end of the run.
@@ -275,7 +270,7 @@ class Sequencer:
             self._over = True
 
     async def _until_end(self, begin: Callable[[], Awaitable[None]], bugs: Iterable[str]) -> RunEnd:
-        reactor, machine = self._reactor, self._reactor.machine
+        reactor, machine, inbox = self._reactor, self._reactor.machine, self._inbox
         # The tracer subscribes before skills do, so that consequences of a change are recorded after it.
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
         livelock = LivelockGuard(self.clock) if self.clock.simulated else None
@@ -284,9 +279,20 @@ class Sequencer:
             await begin()
             self._reacts = False
             self._wake("another program")  # a resumed run may have missed a change
-            await self._take_messages(livelock)
-            if self._suspending and not machine.state.finished and reactor.problem is None:
-                reactor.problem = SUSPENDED
+            while not machine.state.finished and reactor.problem is None:
+                if not inbox.waiting:
+                    await self._news()
+                    continue
+                for wait in self._before_events:
+                    await wait()
+                message = inbox.waiting.popleft()
+                if livelock is not None and (problem := livelock.problem(message)):
+                    reactor.problem = problem
+                    break
+                self._reacts = True
+                self._take(message)
+                self._reacts = False
+            if reactor.problem == SUSPENDED:
                 self._suspend()
         except asyncio.CancelledError:  # cancelled from outside; after a crash, this handler does not run
             reactor.problem = reactor.problem or "it was cancelled"
@@ -304,6 +310,11 @@ class Sequencer:
             finally:
                 untaken = await self.dispatcher.close()
                 unsubscribe()
+        return self._end([*bugs], untaken)
+
+    def _end(self, bugs: list[str], untaken: Iterable[str]) -> RunEnd:
+        """Record, keep and return the end of the run; a suspended run has none in the store."""
+        reactor = self._reactor
         if reactor.problem == SUSPENDED:
             return RunEnd(finished=False, emitted=reactor.emitted, problem=SUSPENDED)
         self._take_late_observations()
@@ -319,23 +330,6 @@ class Sequencer:
         )  # fmt: skip
         self._keep_end()
         return end
-
-    async def _take_messages(self, livelock: LivelockGuard | None) -> None:
-        """React to each message, until the plot ends, a problem ends the run, or the run is to be suspended."""
-        reactor, inbox = self._reactor, self._inbox
-        while not self.machine.state.finished and reactor.problem is None and not self._suspending:
-            if not inbox.waiting:
-                await self._news()
-                continue
-            for wait in self._before_events:
-                await wait()
-            message = inbox.waiting.popleft()
-            if livelock is not None and (problem := livelock.problem(message)):
-                reactor.problem = problem
-                break
-            self._reacts = True
-            self._take(message)
-            self._reacts = False
 
     def _take_late_observations(self) -> None:
         """Apply what skills observed during their clean-up after the last macrostep."""

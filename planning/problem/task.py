@@ -96,7 +96,8 @@ class Numbering:
             if predicate in computed:
                 held.update([number + (not is_so(Fact(predicate, args), world)) for number, args in listed])
             else:  # one query for all facts, since most facts of the predicate have a number
-                known = set(world.match(predicate, (None,) * len(listed[0][1])))
+                declared = predicate in world.schema.predicates  # others are bookkeeping of the problem
+                known = set(world.match(predicate, (None,) * len(listed[0][1]))) if declared else set()
                 for number, args in listed:
                     held.add(number + (args not in known))
         return held

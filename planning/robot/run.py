@@ -24,7 +24,7 @@ class Waiting:
     Attributes:
         skill: the skill, as `component.skill`.
         action_id: the id of the execution.
-        since: second of run time at which the skill was started, in this program.
+        since: second of run time at which the skill was started.
         waits_for: the component or skill that this skill waits for before it begins; empty if it is executing.
     """
 
