@@ -27,6 +27,8 @@ from planning.problem.construction import build_problem as build_problem
 from planning.robot.bringup import deploy as deploy
 from planning.robot.bringup import resume as resume
 from planning.robot.bundles import Bundle as Bundle
+from planning.robot.goals import GoalQueue as GoalQueue
+from planning.robot.goals import QueuedGoal as QueuedGoal
 from planning.robot.report import Report as Report
 from planning.robot.robot import Robot as Robot
 from planning.robot.run import Run as Run

@@ -28,7 +28,7 @@ CALLS = ROOT / "benchmarks" / "calls.json"
 _BANNED = re.compile("|".join(rf"\b(?:{pattern})\b" for pattern in WORDS))
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _PARTICIPLE = re.compile(
-    r"_?(?:[a-z]+ed|given|taken|made|found|said|told|held|known|shown|drawn|written|begun|kept|left|put|sent)"
+    r"_?(?:[a-z]+ed|given|taken|made|found|said|told|held|known|shown|drawn|written|begun|kept|left|sent)"
 )
 _CLAUSE = re.compile(r"test_(?:what|who|whom|whose|whoever|whatever|how|where|that)_")
 

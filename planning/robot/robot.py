@@ -6,6 +6,7 @@ import asyncio
 import math
 import time
 from collections.abc import Callable, Coroutine, Mapping
+from functools import cached_property
 from typing import Any, Self, cast
 from uuid import uuid4
 
@@ -18,7 +19,7 @@ from dsc.runs.archive import is_unfinished
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
-from dsc.sequencer.run_end import RunEnd
+from dsc.sequencer.run_end import SUSPENDED, RunEnd
 from dsc.sequencer.sequencer import Sequencer
 from dsc.sequencer.signals import OnSignal
 from knowledge_base.errors import InputError, StoreError
@@ -26,6 +27,7 @@ from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.text import parse_condition
 from planning.execution.planning_component import PlanningComponent
 from planning.problem.construction import check_goal
+from planning.robot.goals import GoalQueue, QueuedGoal
 from planning.robot.judgement import Judgement
 from planning.robot.program import RobotProgram
 from planning.robot.progress import Tally
@@ -218,6 +220,68 @@ class Robot(RobotProgram):
         if is_unfinished(self.store):
             return cast("Run[Outputs]", self.resuming(prepare=how.get("prepare")))
         return self.start(goal_or_plot, arguments, **how)
+
+    @property
+    def runs(self) -> tuple[Run[Any], ...]:
+        """The runs in progress, the oldest first."""
+        return tuple(self._runs)
+
+    @cached_property
+    def goals(self) -> GoalQueue:
+        """The queue of goals that `serve` serves; with a store, the store keeps it."""
+        return GoalQueue(self.knowledge, kept=self.store is not None)
+
+    async def serve(
+        self, *, seconds: float = _BUDGET.seconds, replans: int = _BUDGET.replans, until_empty: bool = False
+    ) -> None:
+        """Serve the queue of goals one after the other; first resume the goal that an interruption has left.
+
+        A goal that cannot be planned for, or whose deadline passes, fails with the reason, and the next goal follows.
+
+        Args:
+            seconds: real time for each search.
+            replans: the maximum number of plans for a goal after the first plan.
+            until_empty: whether to return when no goal waits. Otherwise the robot waits for goals until the caller
+                cancels this coroutine, or suspends the run of a goal.
+
+        Raises:
+            StoreError: the store cannot be read or written, or has an unfinished run that serves no goal.
+            ChangedError: as for `resume`.
+        """
+        goals = self.goals
+        for left in goals.list("running"):
+            resumed = self.store is not None and is_unfinished(self.store)
+            if resumed and not await self._serve(left, self.resuming()):
+                return
+            if not resumed:  # the program ended before the run began, or before the end of the goal was kept
+                reached = self.knowledge.ask(left.goal)
+                goals.end(left.id, reached=True, reason="reached") if reached else goals.wait_again(left.id)
+        while (queued := await goals.next(waits=not until_empty)) is not None:
+            try:
+                run = self.start(queued.goal, seconds=seconds, replans=replans, header={"goal": queued.id})
+            except InputError as error:
+                if isinstance(error, StoreError):
+                    raise
+                goals.end(queued.id, reached=False, reason=str(error))
+                continue
+            if not await self._serve(queued, run):
+                return
+
+    async def _serve(self, queued: QueuedGoal, run: Run) -> bool:
+        """Wait for the end of the run of a goal, and keep the end; return `False` for a suspended run."""
+        remaining = self.goals.begin(queued.id, run.cancel)
+        late = None
+        if remaining is not None:
+            late = asyncio.get_running_loop().call_later(remaining, run.cancel, "its deadline has passed")
+        try:
+            end = await run
+        finally:
+            if late is not None:
+                late.cancel()
+        if end.problem == SUSPENDED:
+            return False
+        self.goals.end(queued.id, reached=end.reached, reason="reached" if end.reached else end.reason)
+        return True
 
     def discard(self, reason: str = "discarded") -> None:
         """End the unfinished run of the store, so that another run can start; its kept end has the reason.
