@@ -86,9 +86,10 @@ class Trace:
         """Send `listener` every later record; return a function that ends this."""
         self._listeners.append(listener)
         self.heard = True
-        return partial(self._ignore, listener)
+        return partial(self.ignore, listener)
 
-    def _ignore(self, listener: Listener) -> None:
+    def ignore(self, listener: Listener) -> None:
+        """Send `listener` no further record; a listener that was removed before is ignored."""
         if listener in self._listeners:  # one with an error was removed before
             self._listeners.remove(listener)
         self.heard = bool(self._listeners)

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 import tutorial
 
-EXAMPLES = sorted((Path(__file__).parent.parent / "examples").rglob("*.py"))
+FOLDER = Path(__file__).parent.parent / "examples"
+EXAMPLES = sorted({*FOLDER.rglob("*.py")} - {FOLDER / "service.py"})  # the service has a test of its own
 MARK = "# Expected output:\n"
 
 

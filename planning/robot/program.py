@@ -168,9 +168,17 @@ class RobotProgram:
         }
 
     def listen(self, listener: Listener) -> Callable[[], None]:
-        """Call `listener` with every later record of every run; return a function that ends this."""
+        """Call `listener` with every later record of all runs; return a function that ends this."""
         self._listeners.append(listener)
-        return partial(self._listeners.remove, listener)
+        for run in self._runs:
+            run.listen(listener)
+        return partial(self._ignore, listener)
+
+    def _ignore(self, listener: Listener) -> None:
+        if listener in self._listeners:
+            self._listeners.remove(listener)
+        for run in self._runs:
+            run.ignore(listener)
 
     def wire(
         self, run: str, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool, until: float | None

@@ -258,7 +258,9 @@ class Robot(RobotProgram):
                 goals.end(left.id, reached=True, reason="reached") if reached else goals.wait_again(left.id)
         while (queued := await goals.next(waits=not until_empty)) is not None:
             try:
-                run = self.start(queued.goal, seconds=seconds, replans=replans, header={"goal": queued.id})
+                run = self.start(
+                    queued.goal, seconds=seconds, replans=replans, open_ended=True, header={"goal": queued.id}
+                )
             except InputError as error:
                 if isinstance(error, StoreError):
                     raise

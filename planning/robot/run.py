@@ -131,6 +131,10 @@ class Run(Generic[Outputs]):
         """Call `listener` with every later record of this run; return a function that ends this."""
         return self._sequencer.trace.listen(listener)
 
+    def ignore(self, listener: Listener) -> None:
+        """Call `listener` no longer."""
+        self._sequencer.trace.ignore(listener)
+
     def records(self) -> Records:
         """Return an asynchronous iterator of the records from this call on, which ends with the run."""
         return Records(self)

@@ -151,6 +151,23 @@ def test_a_listener_can_be_removed():
     assert before == after > 0
 
 
+def test_a_listener_of_the_robot_receives_records_of_the_runs_in_progress_until_it_is_removed():
+    async def main(one):
+        seen: list[Record] = []
+        run = one.start("(at c)")
+        await asyncio.sleep(0.5)
+        ignore = one.listen(seen.append)
+        await asyncio.sleep(1.0)
+        ignore()
+        before = [record.type for record in seen]
+        await run
+        return before, len(seen)
+
+    before, after = simulated(main)
+    assert "action" in before
+    assert after == len(before)
+
+
 # -- steering ------------------------------------------------------------------------------------------------
 
 
