@@ -82,6 +82,9 @@ def test_the_words_to_use_pass_the_check(instead: str) -> None:
 def test_a_sentence_has_a_bound_of_words() -> None:
     assert rules("word " * MOST_WORDS) == []
     assert rules(LONG) == ["length"]
+    assert [rule for rule, _ in broken_rules(f"claim: {LONG}", source=True)] == []
+    assert [rule for rule, _ in broken_rules(LONG, source=True)] == ["length"]
+    assert [rule for rule, _ in broken_rules(f"claim: {LONG} {'word ' * 9}", source=True)] == ["length"]
 
 
 @pytest.mark.parametrize("text", [
