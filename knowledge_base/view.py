@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
 
-from knowledge_base._notebook import svg_by
 from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.exchange import to_json
 from knowledge_base.facts import Content, Fact, Value
@@ -15,6 +14,7 @@ from knowledge_base.language.evaluation.explanation import Explanation, explain
 from knowledge_base.language.evaluation.query_plan import QueryPlan, plan_query
 from knowledge_base.language.evaluation.world_protocol import BoundedWorld, Bounds, Meter
 from knowledge_base.language.syntax.expression import TRUE, Expression
+from knowledge_base.notebook import svg_by
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.pddl.writer import problem_to_text
 from knowledge_base.questions import Binding, Prepared, Questions

@@ -39,11 +39,18 @@ PIPE_WIDTH = 160
 """Columns of a tree that is not printed on a terminal."""
 
 
-def components_of_robot(target: str) -> tuple[Component, ...]:
-    """Return the components at `MODULE:NAME`; packages that know more kinds of targets replace this function."""
+_find: list[Callable[[str], tuple[Component, ...]]] = []
+
+
+def register_targets(find: Callable[[str], tuple[Component, ...]]) -> None:
+    """Let `--robot` accept the targets for which `find` returns components; otherwise it accepts `MODULE:NAME`."""
+    _find.append(find)
+
+
+def _components_of(target: str) -> tuple[Component, ...]:
     from dsc.components.assembly import robot_of
 
-    return robot_of(target)
+    return (_find[-1] if _find else robot_of)(target)
 
 
 @app.command()
@@ -76,7 +83,7 @@ def check(
     from dsc.text.plot_files import Neighbours
 
     neighbours = Neighbours()
-    components = None if robot is None else components_of_robot(robot)
+    components = None if robot is None else _components_of(robot)
     found = [(file, finding) for file in files for finding in _findings(file, domain, neighbours, components)]
     print_findings(
         found, as_json=json, nothing=f"{len(files)} plot{'s' * (len(files) != 1)} checked, no mistakes found"

@@ -12,7 +12,6 @@ from typing import Any, Protocol
 
 from dsc.engine.tables import CompiledPlot
 from dsc.model.states import DynamicState
-from knowledge_base._notebook import table
 from knowledge_base.facts import Delta
 from knowledge_base.language.syntax.effect import Effect
 from knowledge_base.language.syntax.expression import (
@@ -29,6 +28,7 @@ from knowledge_base.language.syntax.expression import (
     Term,
     parts_of,
 )
+from knowledge_base.notebook import table
 
 IN_STATE = "in-state"
 """Name of the predicate that tests whether a state is active."""

@@ -25,8 +25,8 @@ from dsc.model.states import (
     State,
     SubmachineState,
 )
-from knowledge_base._notebook import svg_by
 from knowledge_base.errors import UnknownNameError
+from knowledge_base.notebook import svg_by
 from knowledge_base.spelling import is_plain_name
 
 Path = FormPath

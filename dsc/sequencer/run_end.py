@@ -8,7 +8,7 @@ from typing import Generic, cast
 
 from dsc.calls import Outputs
 from dsc.events import GAVE_UP, NO_PLAN, Event
-from knowledge_base._notebook import table
+from knowledge_base.notebook import table
 
 SUSPENDED = "the run is suspended and can be resumed"
 """Problem of the end of a suspended run."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from knowledge_base.cli import changes, queries
-from knowledge_base.cli.console import readers as readers
+from knowledge_base.cli.console import register_reader as register_reader
 
 app = typer.Typer(
     rich_markup_mode=None,

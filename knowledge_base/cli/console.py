@@ -41,8 +41,12 @@ _MARK = b"\xef\xbb\xbf"  # byte order mark, in UTF-8
 _MOST_DIGITS = 15
 """Maximum number of digits of a version: more than any store needs, and few enough to parse quickly."""
 
-readers: list[Callable[[Path], KnowledgeBase | None]] = []
-"""Readers of other sources, which other packages add; each returns `None` for a source of another kind."""
+_readers: list[Callable[[Path], KnowledgeBase | None]] = []
+
+
+def register_reader(reader: Callable[[Path], KnowledgeBase | None]) -> None:
+    """Let commands read further sources by `reader`, which returns `None` for a source of another kind."""
+    _readers.append(reader)
 
 
 class Opened(NamedTuple):
@@ -100,7 +104,7 @@ def _opened(source: Path, domain: Path | None) -> Opened:
 
     if is_database(source):
         return Opened(KnowledgeBase.open(None, source, read_only=True))
-    for reader in readers:
+    for reader in _readers:
         if (world := reader(source)) is not None:
             return Opened(world)
     data = read_bytes(source, MAX_WORLD_BYTES)  # read only once, as a pipe allows

@@ -17,7 +17,7 @@ from dsc.cli.logs import PROGRAMMING_ERROR
 from dsc.cli.runs import app as runs_app
 from dsc.cli.runs import view_command
 from knowledge_base.cli import app as kb_app
-from knowledge_base.cli import readers
+from knowledge_base.cli import register_reader
 from planning.cli import bundles_command, plan_command
 from planning.cli.check import check_command
 from planning.cli.doctor import doctor_command
@@ -62,8 +62,8 @@ app.command("plan")(plan_command)
 app.command("doctor")(doctor_command)
 app.command("bundles")(bundles_command)
 app.command("view")(view_command)
-readers.append(robot_knowledge)
-plots.components_of_robot = components_of_target
+register_reader(robot_knowledge)
+plots.register_targets(components_of_target)
 
 
 def _show_version(wanted: bool) -> None:

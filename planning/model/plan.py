@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from knowledge_base._notebook import table
 from knowledge_base.errors import InputError
+from knowledge_base.notebook import table
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from dsc.sequencer.run_end import RunEnd
-from knowledge_base._notebook import text
+from knowledge_base.notebook import text
 from planning.robot.progress import Tally
 from planning.robot.simulation import Fault, Left
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from knowledge_base._notebook import text
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
 from knowledge_base.language.checking.binding import check_bound
@@ -33,6 +32,7 @@ from knowledge_base.language.syntax.expression import (
     substitute,
 )
 from knowledge_base.language.syntax.text import to_text
+from knowledge_base.notebook import text
 from knowledge_base.spelling import value_text
 
 _Explained = tuple["Explanation", InputError | None]
