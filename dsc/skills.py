@@ -25,6 +25,7 @@ class Gripper(Component):
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -72,6 +73,8 @@ class SkillSignature:
         pattern: see `Pattern`.
         after_crash: see `AfterCrash`.
         unlimited: whether the skill has no time limit, unless the trigger declares one.
+        within: seconds after which the skill is cancelled and ends with `timed_out`, unless the trigger declares other
+            seconds; `None` means 300 s.
         place: file and line of the body; empty if unknown.
     """
 
@@ -84,6 +87,7 @@ class SkillSignature:
     after_crash: AfterCrash = "sense"
     unlimited: bool = False
     place: str = ""
+    within: float | None = None
 
 
 Execution = Callable[[Any, SkillBody, SkillCall[Any], Mapping[str, Any]], Awaitable[Outcome]]
@@ -102,6 +106,7 @@ class Declared:
         pattern: see `Pattern`.
         after_crash: see `AfterCrash`.
         unlimited: as in `SkillSignature`.
+        within: as in `SkillSignature`.
     """
 
     types: Mapping[str, str | None]
@@ -111,6 +116,7 @@ class Declared:
     pattern: Pattern = "skill"
     after_crash: AfterCrash = "sense"
     unlimited: bool = False
+    within: float | None = None
 
     def __call__(self, body: _Body) -> _Body:
         """Attach this declaration to `body`, and return `body`.
@@ -156,9 +162,13 @@ DECLARED = "__dsc_skill__"
 @overload
 def skill(body: _Coroutine, /) -> _Coroutine: ...
 @overload
-def skill(*, after_crash: AfterCrash = ..., unlimited: bool = ...) -> Callable[[_Coroutine], _Coroutine]: ...
+def skill(
+    *, after_crash: AfterCrash = ..., unlimited: bool = ..., within: float | None = ...
+) -> Callable[[_Coroutine], _Coroutine]: ...
 @overload
-def skill(*, blocking: Literal["thread", "process"], after_crash: AfterCrash = ...) -> Callable[[_Plain], _Plain]: ...
+def skill(
+    *, blocking: Literal["thread", "process"], after_crash: AfterCrash = ..., within: float | None = ...
+) -> Callable[[_Plain], _Plain]: ...
 def skill(
     body: SkillBody | None = None,
     /,
@@ -166,6 +176,7 @@ def skill(
     blocking: Literal["thread", "process"] | None = None,
     after_crash: AfterCrash = "sense",
     unlimited: bool = False,
+    within: float | None = None,
 ) -> SkillBody:
     """Declare a component's method, or a function (see `dsc.components.assembly`), as a skill.
 
@@ -180,9 +191,11 @@ def skill(
         after_crash: the reaction if a run is resumed and the component cannot report the action's result.
         unlimited: whether the skill has no time limit without `within`, e.g. as it watches something. A run in
             simulated time ends with a deadlock if nothing else can happen.
+        within: seconds after which the skill is cancelled and ends with `timed_out`; a trigger with `within` declares
+            other seconds. The default is 300 s.
 
     Raises:
-        InputError: `blocking` has an invalid value.
+        InputError: `blocking` or `within` has an invalid value, or a skill with `within` is `unlimited`.
         SchemaError: the annotations do not declare outcomes, or name something that does not exist, or the body does
             not have the form of a skill.
     """
@@ -191,6 +204,8 @@ def skill(
     if blocking not in _EXECUTIONS:
         message = f"a skill blocks in a thread or a process, not {shown(blocking)}"
         raise InputError(message, found=str(blocking), valid=("thread", "process"))
+    if within is not None:
+        _require_limit(within, unlimited=unlimited)
 
     def declare(body: SkillBody) -> SkillBody:
         own, names = 2 if "." in named(body) else 1, names_around(body.__globals__)
@@ -200,7 +215,10 @@ def skill(
             outcomes |= _reported(body, own, names)
         with refused_at(body):
             types |= parameter_types(body, own, names)
-        return Declared(types, outcomes, _EXECUTIONS[blocking], after_crash=after_crash, unlimited=unlimited)(body)
+        declared = Declared(
+            types, outcomes, _EXECUTIONS[blocking], after_crash=after_crash, unlimited=unlimited, within=within
+        )
+        return declared(body)
 
     return declare if body is None else declare(body)
 
@@ -302,7 +320,15 @@ def signature_of(component: str, name: str, body: SkillBody, declared: Declared)
         after_crash=declared.after_crash,
         unlimited=declared.unlimited,
         place=_place_of(body),
+        within=declared.within,
     )
+
+
+def _require_limit(within: float, *, unlimited: bool) -> None:
+    if isinstance(within, bool) or not isinstance(within, int | float) or not 0 < within < math.inf:
+        raise InputError(f"`within` is a positive number of seconds, not {shown(within)}")
+    if unlimited:
+        raise InputError("a skill has `within` seconds, or is `unlimited`, not both")
 
 
 def _place_of(body: SkillBody) -> str:

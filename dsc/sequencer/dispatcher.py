@@ -394,7 +394,8 @@ class Dispatcher:
     def _start(self, start: steps.Start, interrupted: InterruptedSkill | None = None) -> None:
         component = self.component(start.component)
         signature = component.skills().get(start.skill, UNKNOWN_SKILL)
-        within = start.within or (math.inf if signature.unlimited or signature.pattern == "event" else DEFAULT_WITHIN)
+        endless = signature.unlimited or signature.pattern == "event"
+        within = start.within or signature.within or (math.inf if endless else DEFAULT_WITHIN)
         since = self._clock.now() if interrupted is None else interrupted.asked
         raises = component.device_errors
         running = RunningSkill(

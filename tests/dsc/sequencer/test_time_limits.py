@@ -6,13 +6,13 @@ import asyncio
 
 import pytest
 from dsc_charts import plot
-from dsc_runs import SCHEMA, Arm, Ran
+from dsc_runs import SCHEMA, Arm, Ran, ran
 
 from dsc import Component, Outcome, SkillCall, query, skill
 from dsc.dynamic.library import Library
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.sequencer import Sequencer
-from knowledge_base import Delta, KnowledgeBase, fact
+from knowledge_base import Delta, InputError, KnowledgeBase, fact
 
 LIMITED = """
     plot: p
@@ -169,3 +169,43 @@ def test_an_outcome_that_was_due_before_a_limit_is_received_first(state):
 )
 def test_a_limit_that_passed_ends_what_is_not_done(state):
     assert ended_after_sleep(state) == ["bad"]
+
+
+class Ripe(Outcome): ...
+
+
+class Oven(Component):
+    """Skills that take an hour."""
+
+    name = "oven"
+
+    @skill(within=7200)
+    async def bake(self, call: SkillCall) -> Ripe:
+        await call.clock.sleep(3600)
+        return Ripe()
+
+    @skill
+    async def roast(self, call: SkillCall) -> Ripe:
+        await call.clock.sleep(3600)
+        return Ripe()
+
+
+@pytest.mark.parametrize(
+    ("skill_name", "within", "seconds"),
+    [("bake", "", 3600), ("roast", "", 300), ("bake", ", within: 60", 60), ("roast", ", within: 4000", 3600)],
+)
+def test_the_time_limit_of_a_skill_is_that_of_its_trigger_or_of_its_declaration(skill_name, within, seconds):
+    text = "{plot: p, states: {a: {entry: {trigger: oven.SKILL}, on: {ripe: e, timed_out: e}}, e: {final: true}}}"
+    end, at = ran(text.replace("SKILL", f"{skill_name}{within}"), Oven())
+    assert (end.finished, at) == (True, seconds)
+
+
+@pytest.mark.parametrize("within", [0, -1, float("inf"), float("nan"), "9", True])
+def test_a_time_limit_that_is_not_a_positive_number_is_refused(within):
+    with pytest.raises(InputError, match="`within` is a positive number of seconds"):
+        skill(within=within)
+
+
+def test_a_skill_has_a_time_limit_or_none():
+    with pytest.raises(InputError, match="not both"):
+        skill(within=9, unlimited=True)
