@@ -42,7 +42,9 @@ def test_a_plan_is_steps_and_durations():
 
 
 def test_no_plan_is_an_outcome():
-    assert isinstance(outcome(answering('{"actions": null}')), ProvenUnsolvable)
+    found = outcome(answering('{"actions": null}'))
+    assert isinstance(found, ProvenUnsolvable)
+    assert found.reason == "the search was exhausted"
 
 
 def test_what_is_unreachable_is_not_even_asked():
@@ -53,7 +55,9 @@ def test_what_is_unreachable_is_not_even_asked():
 
 
 def test_a_goal_that_holds_is_not_even_asked():
-    assert outcome("raise SystemExit(1)", Problem("d", {}, (), (), ())).plan == Plan()
+    problem = Problem("d", {}, (), (), ())
+    found = outcome("raise SystemExit(1)", problem)
+    assert found == PlanFound(Plan(), planner("").engine, 0.0, problem.simulated_seconds)
 
 
 @pytest.mark.parametrize(
@@ -76,6 +80,11 @@ def test_an_engine_that_fails_is_told_apart(script, said):
     found = outcome(script)
     assert isinstance(found, EngineFailed)
     assert said in found.message
+    assert found.engine == planner("").engine
+
+
+def test_the_message_of_a_failed_engine_is_its_own():
+    assert outcome(answering('{"failed": "MemoryError: no room"}')).message == "MemoryError: no room"
 
 
 def test_a_command_that_does_not_exist_is_a_failure():
