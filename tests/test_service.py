@@ -30,6 +30,7 @@ class Servers(ThreadingHTTPServer):
         self.acted: dict[str, str] = {}
         self.requests: Counter[str] = Counter()
         self.slow = threading.Event()
+        self.clients: list[subprocess.Popen[bytes]] = []
         threading.Thread(target=self.serve_forever, daemon=True).start()
 
 
@@ -64,6 +65,7 @@ class Service:
         environment = {**os.environ, "STORES": str(folder), "SERVERS": address, "PYTHONPATH": str(EXAMPLES)}
         command = [sys.executable, "-m", "uvicorn", "--app-dir", str(folder), "--port", str(self.port), app]
         self.process = subprocess.Popen([*command, "--log-level", "warning"], env=environment, stderr=subprocess.PIPE)
+        servers.clients.append(self.process)
         self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=PATIENCE_S)
         until(self.is_there)
 
@@ -95,6 +97,9 @@ def until(condition) -> None:
 def servers():
     served = Servers()
     yield served
+    for process in served.clients:
+        process.kill()  # of a test that has failed
+        process.wait()
     served.shutdown()
     served.server_close()
 
