@@ -171,7 +171,8 @@ def test_only_the_skill_reports_a_failure_while_it_runs():
         states:
           a:
             entry: {trigger: camera.look}
-            on: {component_failed: {emit: heard}, looked: e, skill_error: e}
+            on: {component_failed: {emit: heard}, looked: e, skill_error: b}
+          b: {on: {component_failed: {emit: heard}}, after: {seconds: 5, to: e}}
           e: {final: true}
     """
     camera = Device("camera", [])
@@ -181,7 +182,7 @@ def test_only_the_skill_reports_a_failure_while_it_runs():
         camera.life.become(Life.FATAL_ERROR, "unplugged")
 
     end, _ = ran(text, camera, meanwhile=crash)
-    assert (end.finished, end.emitted) == (True, ())
+    assert (end.finished, end.emitted, end.programming_error) == (True, (), None)
 
 
 def test_a_component_that_cannot_stop_is_in_the_end_of_the_run():
