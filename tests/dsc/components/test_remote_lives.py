@@ -182,3 +182,26 @@ def test_slow_hooks_are_no_loss(transport, remote):
     assert arm.log == [("speed", 2), "fast", "move"]
     assert 61 <= at <= 66
     assert [name for _, name, _ in found] == (["moved"] if remote else [])
+
+
+def test_a_skill_at_a_host_has_the_key_of_its_run():
+    keys: list[str] = []
+
+    class Keyed(Arm):
+        async def execute(self, skill_name, call, arguments):
+            keys.append(call.key)
+            return await super().execute(skill_name, call, arguments)
+
+    async def main():
+        transport = LocalTransport()
+        host = Host(Keyed(), transport, LoopClock())
+        remote = await RemoteComponent.connect("arm", transport)
+        text = (
+            "{plot: p, states: {a: {entry: {trigger: arm.move, with: {seconds: 1}}, on: {moved: e}}, e: {final: true}}}"
+        )
+        library = Library([plot(text)])
+        await Sequencer(library, KnowledgeBase(Schema()), [remote], LoopClock(), run_id="r7").run("p")
+        await host.close()
+
+    run_simulated(main())
+    assert [key.split("/")[0] for key in keys] == ["r7"]
