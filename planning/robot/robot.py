@@ -464,7 +464,8 @@ class Robot(RobotProgram):
                 run.cancel("the robot is closed")
             else:
                 run.suspend()
-        await asyncio.wait([run.task for run in self._runs]) if self._runs else None
+        if self._runs:
+            await asyncio.wait([run.task for run in self._runs])
         self.close()
 
     def close(self) -> None:
