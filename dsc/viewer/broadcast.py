@@ -129,7 +129,7 @@ class Broadcast:
         """Offer new records to this stream during the block; call it in the loop's thread, like `wake`."""
         self._served.append(one)
         if self._going is None:
-            self._going = asyncio.create_task(self._resume())
+            self._going = asyncio.create_task(self._send_rounds())
         self.wake()
         try:
             yield
@@ -143,7 +143,7 @@ class Broadcast:
         """Start a round after new records, or after a socket has finished sending."""
         self._more.set()
 
-    async def _resume(self) -> None:
+    async def _send_rounds(self) -> None:
         loop = asyncio.get_running_loop()
 
         def heard() -> None:

@@ -26,9 +26,9 @@ _V = TypeVar("_V")
 class LazyTable(dict[int, _V]):
     """A mapping that computes each value on first access."""
 
-    def __init__(self, compute_kinds: Callable[[int], _V]) -> None:
+    def __init__(self, compute: Callable[[int], _V]) -> None:
         super().__init__()
-        self._compute = compute_kinds
+        self._compute = compute
 
     def __missing__(self, number: int) -> _V:
         made = self[number] = self._compute(number)
@@ -180,9 +180,9 @@ class OperatorIndex:
         self.all = ways
         self._known: dict[Hashable, Any] = {}
 
-    def known(self, key: Hashable, compute_kinds: Callable[[], _T]) -> _T:
-        """Return the cached result for `key`, or compute and cache the result of `compute_kinds`."""
-        found: _T = self._known.pop(key) if key in self._known else compute_kinds()
+    def known(self, key: Hashable, compute: Callable[[], _T]) -> _T:
+        """Return the cached result for `key`, or compute and cache the result of `compute`."""
+        found: _T = self._known.pop(key) if key in self._known else compute()
         self._known[key] = found  # at the end, so that the least recently used result is evicted first
         if len(self._known) > _MOST_KNOWN:
             del self._known[next(iter(self._known))]

@@ -116,7 +116,6 @@ class Robot(RobotProgram):
             StoreError: the store cannot be written, or contains an unfinished run.
         """
         require_no_loop("run", "start")
-        self._require_free()
 
         async def main() -> RunEnd[Outputs]:
             return await self.start(plot, arguments, open_ended=open_ended, until=until, prepare=prepare, header=header)
@@ -188,8 +187,11 @@ class Robot(RobotProgram):
         """
         require_no_loop("resume", "resuming")
         store, kept = self._unfinished()
-        resumption = self._to_its_end(store, kept, prepare)
-        return run_simulated(resumption, kept.time, speed) if kept.run.header["simulated"] else run_real(resumption)
+
+        async def main() -> RunEnd:
+            return await self._resume(store, kept, prepare)
+
+        return run_simulated(main(), kept.time, speed) if kept.run.header["simulated"] else run_real(main())
 
     def resuming(self, *, prepare: Prepare | None = None) -> Run:
         """Resume the unfinished run of the store in the running event loop, and return the run; see `resume`.
@@ -431,9 +433,6 @@ class Robot(RobotProgram):
         if store is None:
             raise StoreError("only a run with a store can be resumed")
         return store, store.load_unfinished(self.library)
-
-    async def _to_its_end(self, store: RunStore, kept: Kept, prepare: Prepare | None) -> RunEnd:
-        return await self._resume(store, kept, prepare)
 
     def _resume(self, store: RunStore, kept: Kept, prepare: Prepare | None) -> Run:
         for record in kept.records:
