@@ -324,7 +324,7 @@ class _Table:
         world = set_table.world(ITEMS)
         self._planner.rewind()
         robot = _TableRobot(self._domain, world, counter, disturbed=self._replanned)
-        with Robot(self._domain, self._library, [robot], world, planner=self._planner) as program:
+        with Robot(self._domain, self._library, [robot], world, planner=self._planner, clock="simulated") as program:
             end = program.run("clear")
         assert end.finished
         assert robot.counted

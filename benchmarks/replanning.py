@@ -49,8 +49,8 @@ def measured(items: int) -> dict[str, float]:
     robot = _Robot(domain, world, planner)
     with _clocked(planner.spent), settled():  # as `dsc run --real-time` does
         plots = [_plot(action) for action in domain.actions.values()]
-        program = Robot(domain, plots, [robot], world, planner=planner)
-        program.achieve(to_text(set_table.GOAL), simulated=False)
+        program = Robot(domain, plots, [robot], world, planner=planner, clock="real")
+        program.achieve(to_text(set_table.GOAL))
     planner.race.kill()
     if robot.found is None:
         raise SystemExit(f"no plan for {items} items stacks anything twice")

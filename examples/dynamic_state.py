@@ -84,7 +84,7 @@ def main() -> None:
         primitive_plot(drive, name="take_the_lift", done="arrived", when="(lift-ready)"),
         primitive_plot(drive, name="move", done="arrived", implements="move"),
     ]
-    with Robot(DOMAIN, plots, [base]) as robot:
+    with Robot(DOMAIN, plots, [base], clock="simulated") as robot:
         robot.listen(show)
         with robot.knowledge.transaction(author="map") as world:
             for room in ("hall", "office", "lab", "archive"):

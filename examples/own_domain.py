@@ -76,7 +76,7 @@ robot = Bundle(
 
 
 def main() -> None:
-    with deploy(robot) as deployed:
+    with deploy(robot, clock="simulated") as deployed:
         report = deployed.report()
         print(report.lines()[0])
 
@@ -88,4 +88,4 @@ if __name__ == "__main__":
 #   5.1 s  watered the basil
 #  25.1 s  in the balcony
 #  30.1 s  watered the rose
-# Goal reached (judge: knowledge), 30 s of run time.
+# Goal reached (judge: knowledge), 30 s of simulated time.

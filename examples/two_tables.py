@@ -92,7 +92,7 @@ def team(items: dict[str, int], *, parallel: bool = True, seed: int = 0, planner
     """Both robots at the bin; `items` says how many things lie on each robot's table."""
     every_plot = [plot for robot in ROBOTS for plot in plots(robot)]
     robots = [Arm(name, seed) for name in ROBOTS]
-    executive = Robot(DOMAIN, every_plot, robots, planner=planner, parallel=parallel)
+    executive = Robot(DOMAIN, every_plot, robots, planner=planner, parallel=parallel, clock="simulated")
     with executive.knowledge.transaction(author="map") as world:
         world.add_node("bin", "bin")
         world.tell("closed", "bin")

@@ -17,13 +17,15 @@ from collections.abc import Callable, Coroutine, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import Context, ContextVar, copy_context
 from functools import partial
-from typing import Any, NamedTuple, TypeVar, TypeVarTuple, Unpack
+from typing import Any, Literal, NamedTuple, TypeVar, TypeVarTuple, Unpack
 
 from dsc.loop_calls import LoopCalls
 from dsc.sequencer.real_input import RealInput, TasksOf
 from dsc.sequencer.signals import run_until_signal
 from knowledge_base.errors import InputError
 
+ClockKind = Literal["real", "simulated"]
+"""The kind of time of a run."""
 _Result = TypeVar("_Result")
 _Args = TypeVarTuple("_Args")
 _DIGITS = 9
@@ -80,6 +82,11 @@ class LoopClock:
     def simulated(self) -> bool:
         """Whether time is simulated and jumps."""
         return isinstance(asyncio.get_running_loop(), SimulatedEventLoop)
+
+    @property
+    def kind(self) -> ClockKind:
+        """The kind of time."""
+        return "simulated" if self.simulated else "real"
 
     async def settled(self) -> None:
         """Wait until the loop has no more work at the present simulated time; in real time, for one loop iteration."""

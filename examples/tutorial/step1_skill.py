@@ -31,7 +31,7 @@ class Base(Component):
 def main() -> None:
     base = Base()
     drive = primitive_plot(base.skills()["drive"], done="arrived")  # the smallest plot around one skill
-    with Robot(DOMAIN, [drive], [base]) as robot:
+    with Robot(DOMAIN, [drive], [base], clock="simulated") as robot:
         robot.knowledge.apply(Delta(nodes={"hall": "room", "office": "room"}, added=(fact("robot-in", "hall"),)), "map")
         end = robot.run("drive", {"start": "hall", "to": "office"})
         print("finished:", end.finished, "| known:", *robot.knowledge.query("(robot-in ?room)"))

@@ -65,7 +65,7 @@ KNOWN = Delta(
 def main() -> None:
     base = Base()
     drive = primitive_plot(base.skills()["drive"], done="arrived")
-    with Robot(DOMAIN, [FETCH, drive], [base, Gripper("letter")]) as robot:
+    with Robot(DOMAIN, [FETCH, drive], [base, Gripper("letter")], clock="simulated") as robot:
         robot.knowledge.apply(KNOWN, "map")
         for parcel, start, to in (("letter", "hall", "office"), ("book", "office", "hall")):
             end = robot.run("fetch", {"parcel": parcel, "from": start, "to": to})

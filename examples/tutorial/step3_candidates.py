@@ -37,7 +37,7 @@ def main() -> None:
         primitive_plot(drive, name="through_the_door", done="arrived", when="(door-open ?to)"),
         primitive_plot(drive, name="by_lift", done="arrived", when="(lift-works)"),
     ]
-    with Robot(DOMAIN, plots, [base]) as robot:
+    with Robot(DOMAIN, plots, [base], clock="simulated") as robot:
         robot.listen(show)
         rooms = {"hall": "room", "office": "room", "lab": "room"}
         robot.knowledge.apply(Delta(nodes=rooms, added=(fact("robot-in", "hall"), fact("door-open", "office"))), "map")

@@ -38,7 +38,7 @@ def main() -> None:
         primitive_plot(base.skills()["drive"], done="arrived", implements="drive"),
         primitive_plot(gripper.skills()["pick_up"], done="picked_up", implements="pick-up"),
     ]
-    with Robot(DOMAIN, plots, [base, gripper]) as robot:
+    with Robot(DOMAIN, plots, [base, gripper], clock="simulated") as robot:
         robot.listen(show)
         robot.knowledge.apply(KNOWN, "map")
         end = robot.achieve("(and (carries letter) (robot-in hall))")

@@ -48,7 +48,7 @@ class Battery(Component):
 def main() -> None:
     base = Base()
     plots = [PATROL, CHARGE, primitive_plot(base.skills()["drive"], done="arrived")]
-    with Robot(DOMAIN, plots, [base, Battery()]) as robot:
+    with Robot(DOMAIN, plots, [base, Battery()], clock="simulated") as robot:
         robot.knowledge.apply(Delta(nodes={"hall": "room", "office": "room"}, added=(fact("robot-in", "hall"),)), "map")
 
         def battery_falls(sequencer: Sequencer) -> None:

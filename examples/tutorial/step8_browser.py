@@ -25,7 +25,7 @@ robot = Bundle(
 
 
 def main() -> None:
-    with deploy(robot) as deployed:
+    with deploy(robot, clock="simulated") as deployed:
         print("\n".join(deployed.report().lines()))
 
 
@@ -40,7 +40,7 @@ if __name__ == "__main__":
 #   35 s  holds the letter
 #   45 s  in the stairs
 #   55 s  in the hall
-# Goal reached (judge: knowledge), 55 s of run time.
+# Goal reached (judge: knowledge), 55 s of simulated time.
 #   plans 1, replans 0
 #   skill failures: door_closed 1
 #   rules used: door_closed: knock, retry 1

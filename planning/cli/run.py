@@ -16,6 +16,7 @@ from dsc.cli.runs import NoOpen, Port
 
 if TYPE_CHECKING:
     from dsc.components.component import Component
+    from dsc.sequencer.clock import ClockKind
     from dsc.sequencer.sequencer import Sequencer
     from knowledge_base.output_files import Output
     from knowledge_base.store import KnowledgeBase
@@ -136,8 +137,8 @@ def run_command(
     else:
         bundle = _bundle(target)
         robot = _robot(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
-                             durability, target, planner)  # fmt: skip
-    follow = partial(_followed, robot, simulated=not real_time, speed=inf if speed is None else speed, until=until,
+                             durability, target, planner, "real" if real_time else "simulated")  # fmt: skip
+    follow = partial(_followed, robot, speed=inf if speed is None else speed, until=until,
                      on_signal=on_signal, quiet=json or quiet, trace=output)  # fmt: skip
     with robot:
         if not view:
@@ -194,6 +195,7 @@ def _robot(
     durability: Durability,
     target: str | None,
     planner: Planner | None,
+    clock: ClockKind,
 ) -> Robot:
     from dsc.text.profiles import find_profile
     from planning.robot.bringup import deploy
@@ -203,6 +205,7 @@ def _robot(
     return deploy(
         bundle, task, seed=seed, faults=faults, scenario=scenario, profile=settings, store=store,
         durability=durability.value, planner=planner, target=None if target is None else full_target(target),
+        clock=clock,
     )  # fmt: skip
 
 
@@ -260,7 +263,6 @@ def _viewed(
 def _followed(
     robot: Robot,
     *,
-    simulated: bool,
     speed: float,
     until: float | None,
     on_signal: OnSignal,
@@ -296,9 +298,9 @@ def _followed(
             robot.listen(PlainProgress(typer.echo))
         else:
             stack.enter_context(redirect_stdout(sys.stderr))
-        if not simulated:
+        if robot.clock == "real":
             stack.enter_context(settled())
-        report = robot.report(simulated=simulated, speed=speed, until=until, on_signal=on_signal.value, prepare=prepare)
+        report = robot.report(speed=speed, until=until, on_signal=on_signal.value, prepare=prepare)
     if not quiet:
         typer.echo("")  # between the progress and the report
     return report

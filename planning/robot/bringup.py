@@ -13,6 +13,7 @@ from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
 from dsc.profiles import adapted, configure
 from dsc.runs.archive import RunRow, archive, has_run, unfinished
+from dsc.sequencer.clock import ClockKind
 from dsc.text.profiles import Profile
 from dsc.trace import Listener
 from knowledge_base.errors import InputError, Place, StoreError
@@ -44,6 +45,7 @@ def deploy(
     planner: Planner | None = None,
     listener: Listener | None = None,
     target: str | None = None,
+    clock: ClockKind | None = None,
 ) -> Robot:
     """Return the robot of a bundle, with its simulated world; the caller must close it.
 
@@ -59,6 +61,7 @@ def deploy(
         planner: the planner; by default the one of `Robot`.
         listener: called with every record of the run.
         target: the text that `dsc run --resume` uses to find the bundle again.
+        clock: the kind of time; by default simulated if the bundle has a simulation, otherwise see `Robot`.
 
     Raises:
         InputError: the bundle has no task, or no simulation for an option. The task does not fit the bundle, a file
@@ -76,7 +79,9 @@ def deploy(
     task = task or own_task(bundle)
     if bundle.goal is not None and task.goal is None:
         kept["goal"] = bundle.goal
-    return _deployed(bundle, setup, task, durability, planner, listener, kept)
+    if clock is None and bundle.simulation is not None:
+        clock = "simulated"
+    return _deployed(bundle, setup, task, durability, planner, listener, kept, clock)
 
 
 def resume(
@@ -113,7 +118,8 @@ def resume(
         task = Task(goal=str(run.arguments["goal"]))
     elif run.plot == bundle.main and not run.arguments:
         task = Task(plot=bundle.main)
-    return _deployed(bundle, setup, task, durability, planner, listener, {})
+    clock: ClockKind = "simulated" if run.header["simulated"] else "real"
+    return _deployed(bundle, setup, task, durability, planner, listener, {}, clock)
 
 
 def kept_run(store: Path) -> RunRow:
@@ -144,6 +150,7 @@ def _deployed(
     planner: Planner | None,
     listener: Listener | None,
     kept: Mapping[str, Any],
+    clock: ClockKind | None,
 ) -> Robot:
     simulation = simulated(bundle, setup)
     try:
@@ -151,7 +158,7 @@ def _deployed(
         configure(components, setup.profile)
         robot = Robot(
             bundle.planning_domain, _library(bundle, setup.profile), components, None, planner,
-            foresight=bundle.foresight, store=setup.store, durability=durability, failures=bundle.failures,
+            clock=clock, foresight=bundle.foresight, store=setup.store, durability=durability, failures=bundle.failures,
             origin=Origin(bundle, task, simulation, setup.profile, kept, setup.resumes),
         )  # fmt: skip
     except BaseException:

@@ -8,6 +8,7 @@ from typing import Any
 
 from dsc.components.hooks import contained
 from dsc.errors import ProgrammingError
+from dsc.sequencer.clock import ClockKind
 from dsc.sequencer.run_end import RunEnd
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
@@ -45,7 +46,9 @@ class Judgement:
         found = self._left_in_world()
         return None if found is None else len(found)
 
-    def report(self, name: str, end: RunEnd, tally: Tally, failures: frozenset[str], wall_s: float) -> Report:
+    def report(
+        self, name: str, end: RunEnd, tally: Tally, failures: frozenset[str], wall_s: float, clock: ClockKind
+    ) -> Report:
         """Return the report of a run that has ended.
 
         Args:
@@ -54,9 +57,10 @@ class Judgement:
             tally: the counts of the run.
             failures: the outcomes of skills that count as failures, see `Robot.failures`.
             wall_s: the duration in real time, in seconds.
+            clock: the kind of time of the run.
         """
         judge, left = self._verdict(end, tally.gave_up)
-        report = summarise(name, judge, left, tally, end, failures, wall_s)
+        report = summarise(name, judge, left, tally, end, failures, wall_s, clock)
         world = self.simulation
         if world is None:
             return report

@@ -18,7 +18,7 @@ from dsc.events import SKILL_FAILURES
 from dsc.model.plot import ActionPlot
 from dsc.profiles import configure
 from dsc.runs.store import RunStore
-from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.clock import ClockKind, LoopClock
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import signatures
 from dsc.text.profiles import Profile
@@ -73,6 +73,7 @@ class RobotProgram:
         knowledge: KnowledgeBase | None = None,
         planner: Planner | None = None,
         *,
+        clock: ClockKind | None = None,
         parallel: bool = True,
         foresight: Foresight | None = None,
         store: Path | str | None = None,
@@ -96,6 +97,7 @@ class RobotProgram:
         self.library = plots if isinstance(plots, Library) else Library(plots)
         if ACHIEVE not in self.library:
             self.library.add(achieve_plot())
+        self.clock = clock
         self._own_planners: dict[bool, CachingPlanner] = {}
         self._planner = planner
         self._parallel = parallel

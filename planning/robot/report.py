@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
+from dsc.sequencer.clock import ClockKind
 from dsc.sequencer.run_end import RunEnd
 from knowledge_base.notebook import text
 from planning.robot.progress import Tally
@@ -35,6 +36,7 @@ class Report:
         excluded: the number of exclusions of each plan step after failures.
         not_observed: the number of times that the effects of each planning action were not observed.
         faults: the faults of the simulation, in order.
+        clock: the kind of time of the run.
         simulated_s, wall_s: the duration of the run in run time and in real time, in seconds.
         problem: the reason why the run ended early; `None` otherwise.
         programming_error: as in `RunEnd`.
@@ -58,6 +60,7 @@ class Report:
     excluded: Mapping[str, int]
     not_observed: Mapping[str, int]
     faults: tuple[Fault, ...]
+    clock: ClockKind
     simulated_s: float
     wall_s: float
     problem: str | None
@@ -76,7 +79,7 @@ class Report:
     def lines(self) -> list[str]:
         """Return the report as lines of text."""
         lines = [
-            f"{self.headline}, {self.simulated_s:.0f} s of run time.",
+            f"{self.headline}, {self.simulated_s:.0f} s of {self.clock} time.",
             *([] if self._names_bug else [f"  programming error in {self.programming_error}"]),
             *map(self._left_line, self.left),
             f"  plans {self.plans}, replans {self.replans}"
@@ -116,6 +119,7 @@ def summarise(
     end: RunEnd,
     failures: Collection[str],
     wall_s: float,
+    clock: ClockKind,
 ) -> Report:
     """Return the report of a run that has ended, without the robot's own fields and faults.
 
@@ -127,6 +131,7 @@ def summarise(
         end: the end of the run.
         failures: the outcomes of skills that count as failures, see `Robot.failures`.
         wall_s: the duration in real time, in seconds.
+        clock: the kind of time of the run.
     """
     reached = end.reached if judge == "outcome" else end.finished and end.failure is None and not left
     said = "Goal reached" if reached else "Goal not reached"
@@ -146,6 +151,7 @@ def summarise(
         excluded=dict(sorted(tally.excluded.items())),
         not_observed=dict(sorted(tally.unobserved.items())),
         faults=(),
+        clock=clock,
         simulated_s=round(tally.seconds, 3),
         wall_s=round(wall_s, 3),
         problem=end.problem,

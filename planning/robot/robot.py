@@ -18,7 +18,7 @@ from dsc.model.states import Budget
 from dsc.runs.archive import is_unfinished
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
-from dsc.sequencer.clock import LoopClock, run_real, run_simulated
+from dsc.sequencer.clock import ClockKind, LoopClock, run_real, run_simulated
 from dsc.sequencer.run_end import SUSPENDED, RunEnd
 from dsc.sequencer.sequencer import Sequencer
 from dsc.sequencer.signals import OnSignal
@@ -59,6 +59,8 @@ class Robot(RobotProgram):
         planner: the planner. The default in simulated time is pyperplan, or an installed deterministic engine for
             problems that pyperplan cannot solve, so that a run is repeatable. The default in
             real time is a race of the engines that suit a problem.
+        clock: "real", or "simulated" time that jumps from event to event. Without it, the event loop of `start`
+            determines the kind; `run`, `achieve`, `resume` and `report` then raise an error.
         parallel: whether independent steps of a plan are executed concurrently.
         foresight: simulates each plan before its execution.
         store: a file for the knowledge base and the runs, so that a run can be resumed after a crash. A missing file is
@@ -68,6 +70,7 @@ class Robot(RobotProgram):
         origin: the deployed bundle; `None` for a robot that was not made by `deploy`.
 
     Attributes:
+        clock: the kind of time; `None` for that of the event loop.
         components: the components.
         domain: the merged planning domain.
         library: the plots.
@@ -89,7 +92,6 @@ class Robot(RobotProgram):
         plot: str | PlotCall[Outputs],
         arguments: Mapping[str, Any] | None = None,
         *,
-        simulated: bool = True,
         speed: float = math.inf,
         open_ended: bool = False,
         until: float | None = None,
@@ -101,7 +103,6 @@ class Robot(RobotProgram):
         Args:
             plot: the name of the plot, or a call with its arguments, see `dsc plot types`.
             arguments: values of the plot's parameters.
-            simulated: whether the run uses simulated time, which jumps from event to event, instead of real time.
             speed: simulated seconds per real second, for people who watch a run in simulated time.
             open_ended: whether an idle run waits for events from outside, e.g. from an operator. Otherwise an idle run
                 ends and reports the deadlock.
@@ -111,16 +112,17 @@ class Robot(RobotProgram):
             header: plain data that the store keeps with the run.
 
         Raises:
-            InputError: the plot is unknown, or a parameter is missing or unknown. An event loop is running, the robot
-                is closed, or it runs already with its store.
+            InputError: the plot is unknown, or a parameter is missing or unknown. An event loop is running. The robot
+                has no `clock`, is closed, or runs already with its store.
             StoreError: the store cannot be written, or contains an unfinished run.
         """
         require_no_loop("run", "start")
+        self._require_free()
 
         async def main() -> RunEnd[Outputs]:
             return await self.start(plot, arguments, open_ended=open_ended, until=until, prepare=prepare, header=header)
 
-        return run_simulated(main(), speed=speed) if simulated else run_real(main())
+        return _complete(main, self._required_clock(), speed=speed)
 
     def start(
         self,
@@ -136,7 +138,8 @@ class Robot(RobotProgram):
     ) -> Run[Outputs]:
         """Start a goal or a plot in the running event loop, and return the run; `await` it for its end.
 
-        The loop determines whether time is real, or simulated by `run_simulated`.
+        The loop determines whether time is real, or simulated by `run_simulated`; a robot with a `clock` requires that
+        kind.
 
         Args:
             goal_or_plot: a goal, which begins with `(`, or the name or call of a plot.
@@ -149,15 +152,15 @@ class Robot(RobotProgram):
             header: see `run`.
 
         Raises:
-            InputError: no event loop is running, the robot is closed, or runs already with its store. Further errors as
-                for `run` and `achieve`.
+            InputError: no event loop is running, or one with another kind of time than the robot's `clock`. The robot
+                is closed, or runs already with its store. Further errors as for `run` and `achieve`.
         """
         require_loop("start", "run")
         if isinstance(goal_or_plot, str) and goal_or_plot.lstrip().startswith("("):
             arguments, goal_or_plot = self._goal(goal_or_plot, seconds, replans), ACHIEVE
         self._require_free()
         self.library.plot(goal_or_plot if isinstance(goal_or_plot, str) else goal_or_plot.plot)
-        clock = LoopClock()
+        clock = self._loop_clock()
         limit = _limit(until, bounded=clock.simulated and not open_ended)
         number = self._new_id(simulated=clock.simulated)
         how = {"id": number, "simulated": clock.simulated, "open_ended": open_ended, "until": limit}
@@ -180,7 +183,7 @@ class Robot(RobotProgram):
         are still pending are kept and need not be posted again.
 
         Raises:
-            InputError: an event loop is running, or the robot is closed.
+            InputError: an event loop is running, the robot is closed, or its `clock` is not that of the run.
             StoreError: there is no store or no unfinished run, or the store cannot be read or written.
             ChangedError: plots or domain differ from their versions at the start of the run; the message lists the
                 differences.
@@ -191,7 +194,7 @@ class Robot(RobotProgram):
         async def main() -> RunEnd:
             return await self._resume(store, kept, prepare)
 
-        return run_simulated(main(), kept.time, speed) if kept.run.header["simulated"] else run_real(main())
+        return _complete(main, _kind_of(kept), kept.time, speed)
 
     def resuming(self, *, prepare: Prepare | None = None) -> Run:
         """Resume the unfinished run of the store in the running event loop, and return the run; see `resume`.
@@ -202,10 +205,7 @@ class Robot(RobotProgram):
         """
         require_loop("resuming", "resume")
         store, kept = self._unfinished()
-        simulated = LoopClock().simulated
-        if simulated != kept.run.header["simulated"]:
-            was, now = ("real", "simulated") if simulated else ("simulated", "real")
-            raise InputError(f"the run was begun in {was} time and cannot be resumed in {now} time")
+        _require_kind(kept, self._loop_clock().kind)
         return self._resume(store, kept, prepare)
 
     def resume_or_start(
@@ -306,7 +306,6 @@ class Robot(RobotProgram):
         *,
         seconds: float = _BUDGET.seconds,
         replans: int = _BUDGET.replans,
-        simulated: bool = True,
         speed: float = math.inf,
         open_ended: bool = False,
         until: float | None = None,
@@ -322,7 +321,6 @@ class Robot(RobotProgram):
             goal: the condition to reach.
             seconds: real time for each search.
             replans: the maximum number of plans after the first plan.
-            simulated: see `run`.
             speed: see `run`.
             open_ended: see `run`.
             until: see `run`.
@@ -336,7 +334,6 @@ class Robot(RobotProgram):
         return self.run(
             ACHIEVE,
             self._goal(goal, seconds, replans),
-            simulated=simulated,
             speed=speed,
             open_ended=open_ended,
             until=until,
@@ -356,7 +353,6 @@ class Robot(RobotProgram):
         self,
         task: Task | None = None,
         *,
-        simulated: bool = True,
         speed: float = math.inf,
         until: float | None = None,
         on_signal: OnSignal = "suspend",
@@ -366,7 +362,6 @@ class Robot(RobotProgram):
 
         Args:
             task: the task; by default the robot's own. A robot that `planning.resume` returned resumes its kept run.
-            simulated: as for `run`; a resumed run keeps its kind of time.
             speed: as for `run`.
             until: as for `run`; a resumed run keeps its limit.
             on_signal: with a store, `suspend` stops the components as at an end, and the run can be resumed; `end`
@@ -374,11 +369,11 @@ class Robot(RobotProgram):
             prepare: as for `run`.
 
         Raises:
-            InputError: there is no task, or the goal or an argument does not fit the robot.
+            InputError: the robot has no `clock` or no task, or the goal or an argument does not fit the robot.
             StoreError: the store cannot be read or written.
             ChangedError: plots or domain differ from their versions at the start of the resumed run.
         """
-        judgement, tally, started = self.judgement(task), Tally(), time.perf_counter()
+        clock, judgement, tally, started = self._required_clock(), self.judgement(task), Tally(), time.perf_counter()
 
         def ready(sequencer: Sequencer) -> None:
             sequencer.on_signal = on_signal
@@ -389,26 +384,24 @@ class Robot(RobotProgram):
 
         ignore = self.listen(tally)
         try:
-            end = self._perform(judgement.task, ready, simulated=simulated, speed=speed, until=until)
+            end = self._perform(judgement.task, ready, speed=speed, until=until)
         except KeyboardInterrupt as interrupt:
             suspended = self.store is not None and on_signal == "suspend"
             end = RunEnd(finished=False, problem=_interrupted(*interrupt.args, suspended=suspended))
         finally:
             ignore()
         name = "robot" if self.origin is None else self.origin.bundle.name
-        return judgement.report(name, end, tally, self.failures, time.perf_counter() - started)
+        return judgement.report(name, end, tally, self.failures, time.perf_counter() - started, clock)
 
-    def _perform(self, task: Task, prepare: Prepare, *, simulated: bool, speed: float, until: float | None) -> RunEnd:
+    def _perform(self, task: Task, prepare: Prepare, *, speed: float, until: float | None) -> RunEnd:
         if self.origin is not None and self.origin.resumes:
             return self.resume(speed=speed, prepare=prepare)
         header = {**self.header(), **({} if self.origin is None else self.origin.kept)}
         if task.plot is not None:
-            return self.run(
-                task.plot, task.arguments, simulated=simulated, speed=speed, until=until, prepare=prepare, header=header
-            )
+            return self.run(task.plot, task.arguments, speed=speed, until=until, prepare=prepare, header=header)
         if task.goal is None:
             raise InputError("a task is a plot or a goal: Task(plot=...) or Task(goal=...)")
-        return self.achieve(task.goal, simulated=simulated, speed=speed, until=until, prepare=prepare, header=header)
+        return self.achieve(task.goal, speed=speed, until=until, prepare=prepare, header=header)
 
     def _goal(self, goal: str, seconds: float, replans: int) -> dict[str, Any]:
         """Return the arguments of the plot `achieve` for a goal."""
@@ -432,7 +425,22 @@ class Robot(RobotProgram):
         store = self.run_store({})
         if store is None:
             raise StoreError("only a run with a store can be resumed")
-        return store, store.load_unfinished(self.library)
+        kept = store.load_unfinished(self.library)
+        if self.clock is not None:
+            _require_kind(kept, self.clock)
+        return store, kept
+
+    def _required_clock(self) -> ClockKind:
+        if self.clock is None:
+            raise InputError('the robot needs a kind of time: clock="real" for devices, or clock="simulated" for tests')
+        return self.clock
+
+    def _loop_clock(self) -> LoopClock:
+        """Return a clock of the running event loop, whose kind of time must be that of the robot."""
+        clock = LoopClock()
+        if self.clock not in (None, clock.kind):
+            raise InputError(f'the time of the event loop is {clock.kind}, and the robot has clock="{self.clock}"')
+        return clock
 
     def _resume(self, store: RunStore, kept: Kept, prepare: Prepare | None) -> Run:
         for record in kept.records:
@@ -500,6 +508,27 @@ class Robot(RobotProgram):
     def __exit__(self, *_: object) -> None:
         """Close the robot, see `close`."""
         self.close()
+
+
+def _complete(
+    main: Callable[[], Coroutine[Any, Any, RunEnd[Outputs]]], kind: ClockKind, at: float = 0.0, speed: float = math.inf
+) -> RunEnd[Outputs]:
+    """Run a coroutine to its end in an event loop with this kind of time."""
+    if kind == "simulated":
+        return run_simulated(main(), at, speed)
+    if speed != math.inf:
+        raise InputError(f"a speed of {speed:g} needs simulated time")
+    return run_real(main())
+
+
+def _kind_of(kept: Kept) -> ClockKind:
+    return "simulated" if kept.run.header["simulated"] else "real"
+
+
+def _require_kind(kept: Kept, kind: ClockKind) -> None:
+    began = _kind_of(kept)
+    if kind != began:
+        raise InputError(f"the run was begun in {began} time and cannot be resumed in {kind} time")
 
 
 async def _closing(running: Coroutine[Any, Any, RunEnd[Outputs]], planning: PlanningComponent) -> RunEnd[Outputs]:

@@ -128,7 +128,7 @@ class LivelyWorld:
         self._random = Random(self.seed)
         self.crew = [Arm(name) for name in self.robots]
         tidy = parse_plot(TIDY.replace("LIMIT", f"{self.seconds}"))
-        program = Robot(DOMAIN, [tidy, *plots(self.robots)], self.crew)
+        program = Robot(DOMAIN, [tidy, *plots(self.robots)], self.crew, clock="simulated")
         self.kb = program.knowledge
         for robot in self.crew:
             robot.knowledge = self.kb

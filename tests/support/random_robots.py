@@ -308,6 +308,7 @@ class RandomRobot:
             planner=BreadthFirst(),
             parallel=self.parallel,
             store=store,
+            clock="simulated",
         )
         for device in devices:
             device.knowledge = program.knowledge
@@ -418,7 +419,10 @@ class Trial:
             self.wrong.append(f"no end: {end.problem}")
         if robot.goal is not None:
             with_facts = Robot(
-                robot.domain, map(parse_plot, robot.plots), [Device(n, robot, World()) for n in COMPONENTS]
+                robot.domain,
+                map(parse_plot, robot.plots),
+                [Device(n, robot, World()) for n in COMPONENTS],
+                clock="simulated",
             )
             with with_facts as known:
                 nodes = dict.fromkeys(robot.things, "thing")

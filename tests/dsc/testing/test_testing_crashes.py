@@ -98,7 +98,12 @@ class Lives:
 
     def judged(self):
         folder = self.crashes.folder
-        invariants = [comes_to_an_end(1000), executed_once(Robot(folder).done), one_history, replays(Library([CHART]))]
+        invariants = [
+            comes_to_an_end(1000),
+            executed_once(Robot(folder).done),
+            one_history,
+            replays(Library([CHART])),
+        ]
         return violations(folder / "run.kb", invariants)
 
 

@@ -73,7 +73,7 @@ def at_work(act):
 
 
 def executive(components, plots=(PLOT,), **more):
-    return lambda: Robot("(define (domain d))", plots, components, **more)
+    return lambda: Robot("(define (domain d))", plots, components, **more, clock="simulated")
 
 
 def sequencer_of(**other):
@@ -141,15 +141,15 @@ def sequencer_of(**other):
         (executive(["arm"]), "a component is an instance of a subclass of Component, not 'arm'"),
         (executive([Arm(), Arm()]), "two components are named 'arm'"),
         (executive([], ["p"]), "a plot is an ActionPlot"),
-        (lambda: Robot(5, [PLOT], []), "a planning domain is a PlanningDomain, a PDDL file or its text, not 5"),  # type: ignore[arg-type]
-        (lambda: Robot("(define (domain d))", 5, []), "a library is made of a list of plots, not of 5"),  # type: ignore[arg-type]
+        (lambda: Robot(5, [PLOT], [], clock="simulated"), "a planning domain is a PlanningDomain, a PDDL file or its text, not 5"),  # type: ignore[arg-type]
+        (lambda: Robot("(define (domain d))", 5, [], clock="simulated"), "a library is made of a list of plots, not of 5"),  # type: ignore[arg-type]
         (executive(5), "components are given as a list, not as 5"),
         (executive([], knowledge=5), "the knowledge is a KnowledgeBase, not 5"),
         (executive([], planner="fast"), "a planner needs a method 'solve', which 'fast' lacks"),
         (executive([], planner=PlannerProcess), "a planner is an object, not a class; an instance is made by PlannerProcess()"),
         (executive([], foresight=5), "a foresight needs a method 'foresee', which 5 lacks"),
         (executive([], store=5), "a store is named by a text or a Path, not 5"),
-        (lambda: Robot("nowhere.pddl", [PLOT], []), "there is no file 'nowhere.pddl'"),
+        (lambda: Robot("nowhere.pddl", [PLOT], [], clock="simulated"), "there is no file 'nowhere.pddl'"),
     ],
 )  # fmt: skip
 def test_a_wrong_value_is_refused_in_words(act, said):

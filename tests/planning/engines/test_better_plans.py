@@ -72,9 +72,9 @@ def test_the_cheaper_plan_is_carried_out_and_without_costs_the_shorter_one(text,
     planner = Later(*(PlanFound(Plan(steps(one)), "fake", 0.0, 0.1) for one in (first, second)))
     robot = ObedientRobot(domain, seconds=0.0, until=planner.weighed)
     robot.knowledge = world
-    program = Robot(domain, plots(domain), [robot], world, planner=planner)
+    program = Robot(domain, plots(domain), [robot], world, planner=planner, clock="real")
     program.listen(planner.receive)
-    end = program.achieve("(at c)", simulated=False)
+    end = program.achieve("(at c)")
     assert (end.finished, end.emitted) == (True, ())
     assert robot.done == [f"({one})" for one in (second if taken else first)]
 
@@ -92,7 +92,7 @@ def test_who_failed_beside_the_winner_is_told(failures):
     robot = ObedientRobot(domain)
     robot.knowledge = world
     found = PlanFound(Plan(steps(SHORT)), "fake", 0.0, 0.1, failures=failures)
-    program, told = Robot(domain, plots(domain), [robot], world, planner=Later(found, found)), []
+    program, told = Robot(domain, plots(domain), [robot], world, planner=Later(found, found), clock="simulated"), []
     program.listen(lambda record: told.append(record.data) if record.type == "plan.found" else None)
     program.achieve("(at c)")
     expected = [[{"engine": "other", "message": "it crashed"}]] if failures else [None]

@@ -130,7 +130,7 @@ def test_a_simulated_run_with_numbers_uses_the_installed_engine():
         primitive_plot(counter.skills()["act"], name=name, done="acted", implements=name, effects="assumed")
         for name in ("more", "stop")
     ]
-    with Robot(COUNTING, plots, [counter]) as robot:
+    with Robot(COUNTING, plots, [counter], clock="simulated") as robot:
         with robot.knowledge.transaction(author="test") as world:
             world.set("n", 0)
         assert robot.achieve("(done)").reached

@@ -65,11 +65,13 @@ def run(planner, *, simulated=False, prepare=None):
     """The attributes of how it ended."""
     robot = ObedientRobot(DOMAIN, seconds=1.0 if simulated else 0.02)
     holder = parse_plot(HOLDER.replace("GOAL", "(at b)").replace("REPLANS", "4"))
-    program = Robot(DOMAIN, [holder, *plots(DOMAIN)], [robot], planner=planner)
+    program = Robot(
+        DOMAIN, [holder, *plots(DOMAIN)], [robot], planner=planner, clock="simulated" if simulated else "real"
+    )
     robot.knowledge = program.knowledge
     told = (fact("at", "a"), *(fact("way", *one.split()) for one in ROUND))
     program.knowledge.apply(Delta(nodes=dict.fromkeys(ROOMS, "room"), added=told), "test")
-    end = program.run("errand", prepare=prepare, simulated=simulated)
+    end = program.run("errand", prepare=prepare)
     assert end.finished
     return end.emitted[-1].attributes["how"]
 

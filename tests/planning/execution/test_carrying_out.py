@@ -26,12 +26,19 @@ class Run:
 
     def __init__(
         self, goal, script=None, *, planner=None, replans=4, ways=None, things=("cup",), plots_of=None, then=(), known=(),
-        foresight=None, prepare=None, links=ROUND, simulated=True,
+        foresight=None, prepare=None, links=ROUND, clock="simulated",
     ):  # fmt: skip
         self.planner = planner or BreadthFirst()
-        self.robot = ObedientRobot(DOMAIN, script, seconds=1.0 if simulated else 0.02)
+        self.robot = ObedientRobot(DOMAIN, script, seconds=1.0 if clock == "simulated" else 0.02)
         holder = parse_plot(HOLDER.replace("GOAL", goal).replace("REPLANS", str(replans)))
-        program = Robot(DOMAIN, [holder, *plots(DOMAIN, ways)], [self.robot], planner=self.planner, foresight=foresight)
+        program = Robot(
+            DOMAIN,
+            [holder, *plots(DOMAIN, ways)],
+            [self.robot],
+            planner=self.planner,
+            foresight=foresight,
+            clock=clock,
+        )
         self.knowledge = self.robot.knowledge = program.knowledge
         told = [fact("at", "a"), *(fact("in", t, "a") for t in things), *(fact("way", *one.split()) for one in links)]
         nodes = {**dict.fromkeys(ROOMS, "room"), **dict.fromkeys(things, "thing")}
@@ -45,7 +52,7 @@ class Run:
             if prepare is not None:
                 prepare(sequencer)
 
-        self.end = program.run("errand", prepare=ready, simulated=simulated)
+        self.end = program.run("errand", prepare=ready)
         self.how = self.end.emitted[-1].attributes["how"] if self.end.emitted else None
 
     def said(self, kind):
@@ -224,7 +231,7 @@ def found(*steps):
 
 def test_a_better_plan_found_later_replaces_the_steps_that_have_not_begun():
     planner = Improves(found("go a b", "sweep b", "go b c", "sweep c"))
-    run = Run("(and (clean b) (clean c))", planner=planner, prepare=planner.prepare, simulated=False)
+    run = Run("(and (clean b) (clean c))", planner=planner, prepare=planner.prepare, clock="real")
     assert planner.closed
     assert (run.how, run.done) == ("reached", ["(go a b)", "(sweep b)", "(go b c)", "(sweep c)"])
     assert [data["steps"] for data in run.said("found")][1] == run.done
@@ -234,7 +241,7 @@ def test_a_better_plan_found_later_replaces_the_steps_that_have_not_begun():
 @pytest.mark.parametrize("worse", [("go a d", "go d a"), ("go a b",)], ids=["leads_elsewhere", "wrong"])
 def test_a_plan_found_later_that_does_not_fit_is_not_taken(worse):
     planner = Improves(found(*worse))
-    run = Run("(and (clean b) (clean c))", planner=planner, prepare=planner.prepare, simulated=False)
+    run = Run("(and (clean b) (clean c))", planner=planner, prepare=planner.prepare, clock="real")
     assert planner.closed
     assert run.done == [f"({step})" for step in DETOUR]
     assert run.said("replaced") == []
@@ -386,7 +393,7 @@ def test_steps_that_end_at_once_are_each_done_one_time(seconds):
         )
         for name in ("more", "stop")
     ]
-    with Robot(COUNTING, ways, [counter], planner=CountsToThree()) as robot:
+    with Robot(COUNTING, ways, [counter], planner=CountsToThree(), clock="simulated") as robot:
         with robot.knowledge.transaction(author="test") as world:
             world.set("n", 0)
         robot.listen(records.append)

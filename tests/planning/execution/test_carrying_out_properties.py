@@ -113,7 +113,7 @@ def execute(domain, goal, facts, changes, failures):
     knowledge = a_world(domain, facts)
     robot = ObedientRobot(domain, failing_calls=failures)
     robot.knowledge = knowledge
-    program = Robot(domain, plots(domain), [robot], knowledge, planner=BreadthFirst())
+    program = Robot(domain, plots(domain), [robot], knowledge, planner=BreadthFirst(), clock="simulated")
 
     def prepare(sequencer):
         for seconds, delta in changes:

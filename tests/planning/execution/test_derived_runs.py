@@ -37,7 +37,7 @@ class Run:
 
     def __init__(self, goal, *known, then=(), script=None, lies="c"):
         self.robot = ObedientRobot(DOMAIN, script)
-        program = Robot(DOMAIN, plots(DOMAIN), [self.robot], planner=BreadthFirst())
+        program = Robot(DOMAIN, plots(DOMAIN), [self.robot], planner=BreadthFirst(), clock="simulated")
         self.knowledge = self.robot.knowledge = program.knowledge
         doors = [fact("door", *pair) for pair in ("ab", "cb", "cd")]
         nodes = {**dict.fromkeys("abcd", "room"), "cup": "thing"}
@@ -130,7 +130,7 @@ def test_plots_read_derived_predicates_in_conditions_and_guards(held, chosen):
         for name, when in (("idle", "(not (busy))"), ("hurry", "(busy)"))
     ]
     chosen_plots: list[str] = []
-    with Robot(DOMAIN, [parse_plot(text) for text in (look, *parts)], []) as program:
+    with Robot(DOMAIN, [parse_plot(text) for text in (look, *parts)], [], clock="simulated") as program:
         known = (fact("door", "d", "c"), *held)
         program.knowledge.apply(Delta(nodes={"c": "room", "d": "room", "cup": "thing"}, added=known), "t")
         program.listen(lambda one: chosen_plots.append(one.data["chosen"]) if one.type == "decision" else None)
@@ -141,7 +141,7 @@ def test_plots_read_derived_predicates_in_conditions_and_guards(held, chosen):
 def test_a_plot_that_reads_a_recursive_predicate_is_refused():
     text = "{plot: p, states: {a: {always: {when: (connected c d), to: e}}, e: {final: true}}}"
     with pytest.raises(PlotError, match="'connected' is a recursive derived predicate, which only goals"):
-        Robot(DOMAIN, [parse_plot(text)], [])
+        Robot(DOMAIN, [parse_plot(text)], [], clock="simulated")
 
 
 def test_a_plan_that_is_over_is_not_examined_again_when_a_recursive_predicate_changes():
@@ -154,7 +154,9 @@ def test_a_plan_that_is_over_is_not_examined_again_when_a_recursive_predicate_ch
     """
     records: list[Record] = []
     robot = ObedientRobot(DOMAIN)
-    with Robot(DOMAIN, [*plots(DOMAIN), parse_plot(main)], [robot], planner=BreadthFirst()) as program:
+    with Robot(
+        DOMAIN, [*plots(DOMAIN), parse_plot(main)], [robot], planner=BreadthFirst(), clock="simulated"
+    ) as program:
         robot.knowledge = program.knowledge
         doors = [fact("door", *pair) for pair in ("ab", "cb", "cd")]
         nodes = dict.fromkeys("abcd", "room")

@@ -59,12 +59,12 @@ class Lamps(Component):
         return Mended(observed=Delta(added=(fact("works", lamp),)))
 
 
-def executive(planner, store=None, domain=DOMAIN, more=()):
+def executive(planner, store=None, domain=DOMAIN, more=(), clock="simulated"):
     lamps = Lamps()
     skills = lamps.skills()
     light = primitive_plot(skills["light"], done="lit", implements="switch-on")
     mend = primitive_plot(skills["mend"], done="mended", implements="mend")
-    return Robot(domain, [light, mend, *more], [lamps], None, planner, store=store)
+    return Robot(domain, [light, mend, *more], [lamps], None, planner, store=store, clock=clock)
 
 
 def copied(folder, to):
@@ -198,7 +198,7 @@ def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, plan
             "outputs": {},
         }
     for copy in (seen[-2], copies[-2]):
-        with executive(planner, copy) as robot:
+        with executive(planner, copy, clock=None) as robot:
             with pytest.raises(InputError, match="begun in simulated time and cannot be resumed in real time"):
                 run_real(resumed(robot))
             assert run_simulated(resumed(robot)).reached
@@ -206,7 +206,7 @@ def test_a_run_inside_a_loop_is_kept_and_gone_on_with_like_any_other(whole, plan
 
 def test_a_store_brings_its_own_knowledge(planner, tmp_path):
     with pytest.raises(InputError, match="a store provides the knowledge"):
-        Robot(DOMAIN, [], [], KnowledgeBase(DOMAIN.schema), planner, store=tmp_path / "run.kb")
+        Robot(DOMAIN, [], [], KnowledgeBase(DOMAIN.schema), planner, store=tmp_path / "run.kb", clock="simulated")
 
 
 def test_what_is_known_and_what_was_run_lasts_from_one_program_to_the_next(planner, tmp_path):

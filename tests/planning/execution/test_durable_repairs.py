@@ -78,7 +78,13 @@ class Refuses:
 def executive(robot, store, goal, ways=None, foresight=None):
     holder = parse_plot(HOLDER.replace("GOAL", goal).replace("REPLANS", "4"))
     program = Robot(
-        DOMAIN, [holder, *plots(DOMAIN, ways)], [robot], planner=BreadthFirst(), foresight=foresight, store=store
+        DOMAIN,
+        [holder, *plots(DOMAIN, ways)],
+        [robot],
+        planner=BreadthFirst(),
+        foresight=foresight,
+        store=store,
+        clock="simulated",
     )
     robot.knowledge = program.knowledge
     return program

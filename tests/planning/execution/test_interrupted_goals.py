@@ -69,7 +69,7 @@ class Base(Component):
 def tour(base, every, count=300, places="abcd"):
     """How a tour ended that an event interrupts again and again, and how many plans it took."""
     records: list[Record] = []
-    with Robot(DOMAIN, [parse_plot(text) for text in (GO, TOUR, CHARGE)], [base]) as robot:
+    with Robot(DOMAIN, [parse_plot(text) for text in (GO, TOUR, CHARGE)], [base], clock="simulated") as robot:
         robot.knowledge.apply(
             Delta(nodes=dict.fromkeys(places, "place"), added=(fact("at", "a"), fact("visited", "a"))), "test"
         )

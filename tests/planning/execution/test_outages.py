@@ -64,7 +64,7 @@ class Base(Component):
 def visited(base, **how):
     """How the goal to visit three places ended, with the records of the run."""
     records: list[Record] = []
-    with Robot(DOMAIN, [parse_plot(VISIT)], [base]) as robot:
+    with Robot(DOMAIN, [parse_plot(VISIT)], [base], clock="simulated") as robot:
         robot.knowledge.apply(Delta(nodes=dict.fromkeys("abc", "place")), "test")
         robot.listen(records.append)
         return robot.achieve("(forall (?p - place) (visited ?p))", **how), records

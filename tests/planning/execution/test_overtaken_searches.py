@@ -45,7 +45,7 @@ def test_a_robot_begins_although_things_come_and_go_all_the_time(every):
             sequencer.change(Delta(nodes={f"n{number}": "item"}), "camera", after=came)
             sequencer.change(Delta(removed_nodes=(f"n{number}",)), "camera", after=gone)
 
-    with Robot(DOMAIN, plots, [arm]) as robot:
+    with Robot(DOMAIN, plots, [arm], clock="simulated") as robot:
         robot.knowledge.apply(Delta(nodes={"a": "item", "b": "item"}), "test")
         robot.listen(records.append)
         end = robot.achieve("(forall (?i - item) (clean ?i))", prepare=prepare)

@@ -108,7 +108,7 @@ class Studio(Component):
 def photographed(reactions, *facts, blurred=(), prepare=None):
     studio = Studio(blurred)
     plots = [parse_plot(text) for text in (HOLDER + reactions, *PLOTS)]
-    with Robot(DOMAIN, plots, [studio]) as robot:
+    with Robot(DOMAIN, plots, [studio], clock="simulated") as robot:
         known = [fact("known", thing) for thing in ("cup", "pot")]
         robot.knowledge.apply(Delta(nodes={"cup": "thing", "pot": "thing"}, added=(*known, *facts)), "test")
         end = robot.run("photograph", prepare=prepare)
@@ -171,7 +171,7 @@ def test_the_step_at_work_is_not_interrupted_when_a_later_one_turns_out_to_be_of
     studio = Studio()
     records: list[Record] = []
     plots = [parse_plot(text) for text in (HOLDER, *PLOTS)]
-    with Robot(DOMAIN, plots, [studio]) as robot:
+    with Robot(DOMAIN, plots, [studio], clock="simulated") as robot:
         robot.listen(records.append)
         known = tuple(fact("known", thing) for thing in ("cup", "pot"))
         robot.knowledge.apply(Delta(nodes={"cup": "thing", "pot": "thing"}, added=known), "test")
@@ -215,7 +215,7 @@ TELL_IT = "plot: tell_it\nparameters: {what: {type: symbol, default: nothing}}\n
 def away(rules, *facts, beside="", parallel=True, holder=HOLDER, records=None, **more):
     studio = Studio(**more)
     plots = [parse_plot(text) for text in (holder + beside + rules, TELL_IT, *PLOTS)]
-    with Robot(DOMAIN, plots, [studio], parallel=parallel) as robot:
+    with Robot(DOMAIN, plots, [studio], parallel=parallel, clock="simulated") as robot:
         if records is not None:
             robot.listen(records.append)
         known = [fact("known", thing) for thing in ("cup", "pot")]
@@ -327,7 +327,7 @@ def test_leaving_a_plan_takes_what_runs_in_it_and_its_watching_along():
     plots = [
         parse_plot(text) for text in (HOLDER + "rules: [{on: blurred, do: {then: over}}]", TELL_IT, slow, *PLOTS[1:])
     ]
-    with Robot(DOMAIN, plots, [studio]) as robot:
+    with Robot(DOMAIN, plots, [studio], clock="simulated") as robot:
         robot.listen(records.append)
         known = [fact("known", thing) for thing in ("cup", "pot")]
         robot.knowledge.apply(Delta(nodes={"cup": "thing", "pot": "thing"}, added=tuple(known)), "test")

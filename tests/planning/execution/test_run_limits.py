@@ -70,7 +70,9 @@ class Clerk(Component):
 
 
 def office(*plots, clerk=None, **how):
-    return Robot(DOMAIN, [parse_plot(text) for text in plots or (APPROVE, SIGN)], [clerk or Clerk()], **how)
+    return Robot(
+        DOMAIN, [parse_plot(text) for text in plots or (APPROVE, SIGN)], [clerk or Clerk()], **how, clock="simulated"
+    )
 
 
 def test_a_plan_may_wait_over_a_weekend():

@@ -58,7 +58,7 @@ class Guesses:
 def run(planner: Guesses, seconds: float = 60) -> tuple[RunEnd, list[Record], Tally]:
     base, records, tally = Base(), list[Record](), Tally()
     plot = primitive_plot(base.skills()["drive"], done="arrived", implements="go")
-    with Robot(DOMAIN, [plot], [base], planner=planner) as robot:
+    with Robot(DOMAIN, [plot], [base], planner=planner, clock="simulated") as robot:
         robot.listen(records.append)
         robot.listen(tally)
         rooms = dict.fromkeys(("hall", "bath", "loft"), "room")

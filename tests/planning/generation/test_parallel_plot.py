@@ -241,7 +241,7 @@ def executed(plan, goal, facts, *workers, change=None):
     plots = [*crew(switching=("worker", "worker"))]
     plots = [plot for plot in plots if plot.implements != "plug-in"]
     plots.append(primitive("plug", "plug-in", "worker", parameters=()))
-    robot = Robot(DOMAIN, plots, workers, planner=Answers(plan))
+    robot = Robot(DOMAIN, plots, workers, planner=Answers(plan), clock="simulated")
     robot.knowledge.apply(
         Delta(nodes=dict.fromkeys("ab", "lamp"), added=facts, values={fact("slowness", "a"): 1.0}), "me"
     )

@@ -50,7 +50,7 @@ def test_a_plan_side_by_side_reaches_its_goal_and_no_step_spoils_another(case: P
     before = Overlay(world.snapshot())
     everybody = Everybody(case.domain, world, seed)
     plots = list(map(plot_for, case.domain.actions.values()))
-    robot = Robot(case.domain, plots, [everybody], world)
+    robot = Robot(case.domain, plots, [everybody], world, clock="simulated")
     order = deordered(case.plan, case.domain, world, case.goal)
     robot.library.add(plot_from_plan(case.plan, case.domain, robot.library, order=order, shared=["everybody"]))
     replay = Replay(case.domain, before, to_text(case.goal), works_for=lambda author, step: True)

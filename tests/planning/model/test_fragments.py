@@ -215,7 +215,7 @@ ROOM = "(define (domain room) (:types item) (:predicates (near ?i - item)))"
 def test_an_executive_plans_with_what_its_components_bring():
     gripper = Gripper()
     plots = [primitive_plot(gripper.skills()["grasp"], done="grasped", implements="grasp")]
-    with Robot(PlanningDomain.parse(ROOM), plots, [gripper, Spare(), Component("camera")]) as robot:
+    with Robot(PlanningDomain.parse(ROOM), plots, [gripper, Spare(), Component("camera")], clock="simulated") as robot:
         robot.knowledge.apply(Delta(nodes={"cup": "item"}, added=(fact("near", "cup"),)), author="test")
         assert robot.achieve("(holding cup)").finished
         assert robot.knowledge.ask("(holding cup)")
@@ -225,7 +225,7 @@ def test_a_mistake_in_what_a_component_brings_is_named_with_its_class():
     with pytest.raises(
         InputError, match=r"Gripper\.domain:2:\d+: there is no predicate 'near' in room, Gripper\.domain"
     ):
-        Robot("(define (domain room) (:types item)\n)", [], [Gripper()])
+        Robot("(define (domain room) (:types item)\n)", [], [Gripper()], clock="simulated")
 
 
 def test_a_component_may_bring_a_file(files):
@@ -239,7 +239,7 @@ def test_a_component_may_bring_a_file(files):
 
 def test_a_world_model_that_lacks_what_a_component_brings_is_refused():
     with pytest.raises(SchemaMismatchError, match="the predicate 'holding' is missing"):
-        Robot(ROOM, [], [Gripper()], knowledge=KnowledgeBase(Schema.parse(ROOM)))
+        Robot(ROOM, [], [Gripper()], knowledge=KnowledgeBase(Schema.parse(ROOM)), clock="simulated")
 
 
 def test_a_domain_has_at_least_one_fragment():

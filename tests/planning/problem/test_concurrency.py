@@ -241,7 +241,7 @@ class Fixed:
 
 def test_a_robot_says_that_it_cannot_carry_out_what_needs_two_at_once():
     domain = PlanningDomain.parse(CELLAR)
-    with Robot(domain, [], [], cellar(1, 1), planner=Fixed(schedule(*MENDED))) as robot:
+    with Robot(domain, [], [], cellar(1, 1), planner=Fixed(schedule(*MENDED)), clock="simulated") as robot:
         end = robot.achieve(GOAL)
     [outcome] = end.emitted
     assert outcome.name == "no_plan"

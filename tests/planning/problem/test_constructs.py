@@ -65,7 +65,7 @@ def test_without_such_a_construct_it_is_said_what_is_needed(jars):
 
 def test_a_robot_says_which_condition_no_installed_engine_can_do(jars, world_of, monkeypatch):
     monkeypatch.setattr(Engine, "lacks", lambda one: "" if one.name == "pyperplan" else f"install {one.name}")
-    robot = Robot(jars, [], [], world_of(jars.schema, {"a": "jar"}, values={fact("size", "a"): 2}))
+    robot = Robot(jars, [], [], world_of(jars.schema, {"a": "jar"}, values={fact("size", "a"): 2}), clock="simulated")
     with robot:
         [outcome] = robot.achieve("(sealed a)").emitted
     reason = outcome.attributes["reason"]

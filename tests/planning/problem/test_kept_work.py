@@ -130,12 +130,12 @@ class Arm(Component):
         return Finished()
 
 
-@pytest.mark.parametrize("simulated", [True, False])
-def test_a_run_in_somebodys_program_leaves_its_garbage_collection_alone(simulated):
+@pytest.mark.parametrize("clock", ["real", "simulated"])
+def test_a_run_in_somebodys_program_leaves_its_garbage_collection_alone(clock):
     world, robot, before = KnowledgeBase(DOMAIN.schema), Arm(), gc.get_freeze_count()
     threshold = gc.get_threshold()
     world.apply(Delta(nodes=dict.fromkeys(SHELVES, "shelf"), added=(fact("at", "s1"),)), "test")
-    Robot(DOMAIN, plots(), [robot], world).run("do-go", {"from": "s1", "to": "s2"}, simulated=simulated)
+    Robot(DOMAIN, plots(), [robot], world, clock=clock).run("do-go", {"from": "s1", "to": "s2"})
     assert (robot.left_alone, robot.patience) == (before, threshold)
     assert (gc.get_freeze_count(), gc.get_threshold()) == (before, threshold)
 

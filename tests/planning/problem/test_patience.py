@@ -111,21 +111,21 @@ states:
 """
 
 
-def run(seconds, prepare=None, *, simulated):
-    program = Robot(many(), [parse_plot(WORKING.replace("SECONDS", str(seconds)))], [Idle()])
+def run(seconds, prepare=None, *, clock):
+    program = Robot(many(), [parse_plot(WORKING.replace("SECONDS", str(seconds)))], [Idle()], clock=clock)
     program.knowledge.apply(THINGS, "test")
-    end = program.run("top", prepare=prepare, simulated=simulated)
+    end = program.run("top", prepare=prepare)
     return end.emitted[-1].attributes["how"]
 
 
 def test_a_stop_while_the_problem_is_posed_ends_the_run_and_the_work():
     before = set(threading.enumerate())
-    assert run(3600, lambda sequencer: sequencer.post(Event("stop"), after=0.05), simulated=False) == "stopped"
+    assert run(3600, lambda sequencer: sequencer.post(Event("stop"), after=0.05), clock="real") == "stopped"
     for thread in set(threading.enumerate()) - before:
         thread.join(30)
         assert not thread.is_alive()
 
 
-@pytest.mark.parametrize("simulated", [True, False])
-def test_the_budget_is_for_posing_as_well(simulated):
-    assert run(0.05, simulated=simulated).startswith("no plan within 0.05 s (while grounding action 'a')")
+@pytest.mark.parametrize("clock", ["real", "simulated"])
+def test_the_budget_is_for_posing_as_well(clock):
+    assert run(0.05, clock=clock).startswith("no plan within 0.05 s (while grounding action 'a')")

@@ -62,14 +62,14 @@ def points(monkeypatch, **found):
 
 def test_a_program_of_bundles_has_what_they_need(monkeypatch):
     points(monkeypatch, handling=HANDLING, tasks=lambda: TASKS)
-    with Robot.of_bundles(["tasks"]) as robot:
+    with Robot.of_bundles(["tasks"], clock="simulated") as robot:
         robot.knowledge.apply(Delta(nodes={"cup": "item"}), "me")
         assert robot.run("fetch", {"item": "cup"}).reached
         assert robot.knowledge.ask("(holding cup)")
 
 
 def test_each_program_has_components_of_its_own():
-    programs = [Robot.of_bundles([HANDLING]) for _ in range(2)]
+    programs = [Robot.of_bundles([HANDLING], clock="simulated") for _ in range(2)]
     assert programs[0].components[0] is not programs[1].components[0]
 
 
@@ -105,9 +105,9 @@ def test_what_is_no_bundle_is_refused():
 def test_bundles_that_contradict_each_other_are_named():
     other = Bundle("other", (parse_plot(FETCH.replace("item: item", "item: object")),), lambda: [Arm()])
     with pytest.raises(InputError, match="the bundles 'tasks' and 'other' have different plots 'fetch'"):
-        Robot.of_bundles([TASKS, HANDLING, other])
+        Robot.of_bundles([TASKS, HANDLING, other], clock="simulated")
     with pytest.raises(InputError, match="the bundles 'handling' and 'more' both have a component 'arm'"):
-        Robot.of_bundles([HANDLING, Bundle("more", components=lambda: [Arm()])])
+        Robot.of_bundles([HANDLING, Bundle("more", components=lambda: [Arm()])], clock="simulated")
     with pytest.raises(InputError, match="two bundles are named 'handling'"):
         gathered([HANDLING, Bundle("handling")])
 

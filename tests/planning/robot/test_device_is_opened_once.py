@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from dsc import Component, Outcome, SkillCall, parse_plot, skill
-from dsc.sequencer.clock import SimulatedEventLoop, run_simulated
+from dsc.sequencer.clock import ClockKind, SimulatedEventLoop, run_simulated
 from planning import Bundle, deploy
 from planning.robot.bringup import resume
 
@@ -90,23 +90,23 @@ def robot(gripper: Gripper) -> Bundle:
     return Bundle("r", plots=(PLOT,), components=lambda: [gripper], main="turn")
 
 
-@pytest.mark.parametrize("simulated", [True, False])
-def test_in_a_good_run(port: Port, *, simulated: bool) -> None:
-    with deploy(robot(Gripper(port))) as deployed:
-        assert deployed.report(simulated=simulated).problem is None
+@pytest.mark.parametrize("clock", ["real", "simulated"])
+def test_in_a_good_run(port: Port, clock: ClockKind) -> None:
+    with deploy(robot(Gripper(port)), clock=clock) as deployed:
+        assert deployed.report().problem is None
     assert port.take() == GOOD
 
 
 @pytest.mark.parametrize("error", [OSError("no power"), ValueError("a bug")])
 def test_in_a_failed_run(port: Port, error: Exception) -> None:
-    with deploy(robot(Gripper(port, fails=error))) as deployed:
+    with deploy(robot(Gripper(port, fails=error)), clock="simulated") as deployed:
         report = deployed.report()
     assert str(error) in str(report.problem) + str(report.programming_error)
     assert port.take() == GOOD
 
 
 def test_in_a_killed_and_resumed_run(port: Port, tmp_path: Path) -> None:
-    killed = deploy(robot(Gripper(port)), store=tmp_path / "run.kb")
+    killed = deploy(robot(Gripper(port)), store=tmp_path / "run.kb", clock="simulated")
 
     async def begin() -> None:
         kept.append(asyncio.ensure_future(killed.start("turn", header=killed.header())))
@@ -124,7 +124,7 @@ def test_in_a_killed_and_resumed_run(port: Port, tmp_path: Path) -> None:
 def test_in_two_runs_in_a_row(port: Port) -> None:
     gripper = Gripper(port)
     for _ in range(2):
-        with deploy(robot(gripper)) as deployed:
+        with deploy(robot(gripper), clock="simulated") as deployed:
             assert deployed.report().problem is None
         assert port.take() == GOOD
 

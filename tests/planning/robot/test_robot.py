@@ -102,7 +102,7 @@ def executive(planner, lamps=("a", "b")):
     component = Lamps()
     light = component.skills()["light"]
     plots = [HOLDER, primitive_plot(light, done="lit", implements="switch-on")]
-    robot = Robot(DOMAIN, plots, [component], planner=planner)
+    robot = Robot(DOMAIN, plots, [component], planner=planner, clock="simulated")
     robot.knowledge.apply(
         Delta(nodes=dict.fromkeys(lamps, "lamp"), added=tuple(fact("works", lamp) for lamp in lamps)), "test"
     )
@@ -278,7 +278,9 @@ class Watcher(Component):
 def test_a_skill_that_works_for_another_state_is_somebody_else_to_the_monitor():
     lamps = Lamps()
     plots = [WATCHING, primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")]
-    robot = Robot(DOMAIN, plots, [lamps, Watcher()], planner=Answers(found("a", "b"), TimedOut("fake", 1.0)))
+    robot = Robot(
+        DOMAIN, plots, [lamps, Watcher()], planner=Answers(found("a", "b"), TimedOut("fake", 1.0)), clock="simulated"
+    )
     robot.knowledge.apply(
         Delta(nodes={"a": "lamp", "b": "lamp"}, added=(fact("works", "a"), fact("works", "b"))), "test"
     )
@@ -314,14 +316,14 @@ def test_what_is_handed_in_wrongly_is_told_to_whoever_did_and_changes_nothing(ha
 
 def test_two_components_of_one_name_are_refused():
     with pytest.raises(InputError, match="two components are named 'lamps'"):
-        Robot(DOMAIN, [], [Lamps(), Lamps()])
+        Robot(DOMAIN, [], [Lamps(), Lamps()], clock="simulated")
 
 
 def test_plots_and_domain_must_fit_before_anything_runs():
     lamps = Lamps()
     wrong = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-onn")
     with pytest.raises(PlotError, match="did you mean 'switch-on'"):
-        Robot(DOMAIN, [wrong], [lamps])
+        Robot(DOMAIN, [wrong], [lamps], clock="simulated")
 
 
 NESTED = PlanningDomain.parse("""
@@ -366,7 +368,7 @@ def test_a_plan_is_watched_also_after_one_of_its_steps_has_planned_for_itself():
     planner = Answers(found("a", "b"), approach, found("a"))
     legs = Walker()
     walk = primitive_plot(legs.skills()["walk"], done="there", implements="approach")
-    robot = Robot(NESTED, [LIGHT_ALL, GO_AND_LIGHT, walk], [Lamps(), legs], planner=planner)
+    robot = Robot(NESTED, [LIGHT_ALL, GO_AND_LIGHT, walk], [Lamps(), legs], planner=planner, clock="simulated")
     works = tuple(fact("works", lamp) for lamp in "ab")
     robot.knowledge.apply(Delta(nodes={"a": "lamp", "b": "lamp"}, added=works), "test")
     records: list[Record] = []
@@ -412,7 +414,7 @@ def test_an_executive_can_be_closed_inside_a_loop():
     async def main():
         lamps = Lamps()
         light = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")
-        with Robot(DOMAIN, [HOLDER, light], [lamps]) as robot:
+        with Robot(DOMAIN, [HOLDER, light], [lamps], clock="simulated") as robot:
             pass
         return robot
 
@@ -447,7 +449,7 @@ rules:
 """)
     lamps = Blown()
     light = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")
-    robot = Robot(DOMAIN, [holder, light], [lamps], planner=Answers(found("a")))
+    robot = Robot(DOMAIN, [holder, light], [lamps], planner=Answers(found("a")), clock="simulated")
     robot.knowledge.apply(Delta(nodes={"a": "lamp"}, added=(fact("works", "a"),)), "test")
     return robot.run("light_up")
 
@@ -471,7 +473,7 @@ def test_the_plots_of_an_action_agree_on_who_reports_its_effects():
     seen = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")
     assumed = seen.model_copy(update={"name": "blindly", "effects": "assumed"})
     with pytest.raises(PlotError, match="implement 'switch-on', but only one says `effects: assumed`"):
-        Robot(DOMAIN, [seen, assumed], [lamps])
+        Robot(DOMAIN, [seen, assumed], [lamps], clock="simulated")
 
 
 @pytest.mark.parametrize(
@@ -496,7 +498,7 @@ def light(answer):
     lamps = Lamps()
     lamps.answer = answer
     plot = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")
-    robot = Robot(DOMAIN, [plot], [lamps])
+    robot = Robot(DOMAIN, [plot], [lamps], clock="simulated")
     robot.knowledge.apply(Delta(nodes={"l1": "lamp"}, added=(fact("works", "l1"),)), "test")
     return robot, lamps
 
@@ -572,7 +574,9 @@ def test_a_skill_that_hangs_is_a_failed_step():
             await asyncio.Event().wait()
 
     deaf = Deaf()
-    with Robot(DOMAIN, [primitive_plot(deaf.skills()["light"], done="lit", implements="switch-on")], [deaf]) as robot:
+    with Robot(
+        DOMAIN, [primitive_plot(deaf.skills()["light"], done="lit", implements="switch-on")], [deaf], clock="simulated"
+    ) as robot:
         robot.knowledge.apply(Delta(nodes={"l1": "lamp"}, added=(fact("works", "l1"),)), "test")
         (gave_up,) = robot.achieve("(on l1)").emitted
     assert "lamps.light: no outcome within 300 s" in gave_up.attributes["reason"]
@@ -592,7 +596,7 @@ def test_a_rule_answers_a_step_whose_skill_fails():
         rules: [{on: skill_error, do: {then: give_up}}]
     """)
     plot = primitive_plot(lamps.skills()["light"], done="lit", implements="switch-on")
-    with Robot(DOMAIN, [plot, holder], [lamps]) as robot:
+    with Robot(DOMAIN, [plot, holder], [lamps], clock="simulated") as robot:
         robot.knowledge.apply(Delta(nodes={"l1": "lamp"}, added=(fact("works", "l1"),)), "test")
         (ended,) = robot.run("light_up").emitted
     assert ended.attributes["how"] == "lamps.light: SkillError: no power"
@@ -634,7 +638,7 @@ def test_a_component_whose_parameter_nobody_has_said_is_refused_before_anything_
         parameters: LaserParameters
 
     with pytest.raises(InputError, match=r"'laser\.port' has no value: its builder leaves it to a profile"):
-        Robot("(define (domain d))", [], [Laser()])
+        Robot("(define (domain d))", [], [Laser()], clock="simulated")
 
     class BoundParameters(LaserParameters):
         port: str = "ttyS0"
@@ -643,7 +647,7 @@ def test_a_component_whose_parameter_nobody_has_said_is_refused_before_anything_
         parameters: BoundParameters
 
     with pytest.raises(InputError, match=r"component 'laser' needs .<= .rate .most., but most is 20, rate is 30"):
-        Robot("(define (domain d))", [], [Bound()])
+        Robot("(define (domain d))", [], [Bound()], clock="simulated")
 
 
 def test_plots_ask_for_rules_if_the_knowledge_has_the_design():
@@ -665,10 +669,10 @@ def test_plots_ask_for_rules_if_the_knowledge_has_the_design():
     ]
     domain, library, seconds = PlanningDomain.parse("(define (domain d))"), Library(plots), []
     with pytest.raises(PlotError, match="there is no predicate 'stands-in'"):
-        Robot(domain, library, [])
+        Robot(domain, library, [], clock="simulated")
     design = KnowledgeBase(domain.schema.merged(MODELS))
     design.apply(design_facts(library, []), author="design")
-    with Robot(domain, library, [], design) as robot:
+    with Robot(domain, library, [], design, clock="simulated") as robot:
         robot.listen(lambda record: seconds.append(record.t))
         assert robot.run("p").finished
     assert seconds[-1] == 2.0
@@ -681,7 +685,7 @@ def test_needs_that_nobody_can_fulfil_are_refused():
         needs: ClassVar = {"evening": ("lamp",)}
 
     with pytest.raises(InputError, match=r"component 'dimmer' needs a component 'lamp', .* did you mean 'lamps'"):
-        Robot(DOMAIN, [HOLDER], [Lamps(), Dimmer()])
+        Robot(DOMAIN, [HOLDER], [Lamps(), Dimmer()], clock="simulated")
 
 
 def test_streams_that_have_no_port_are_refused():
@@ -690,9 +694,9 @@ def test_streams_that_have_no_port_are_refused():
         level = Stream("lamps.level", {"lumen": "number"})
 
     with pytest.raises(InputError, match="component 'lamps' has no push port 'level'"):
-        Robot(DOMAIN, [HOLDER], [Lamps(), Meter()])
+        Robot(DOMAIN, [HOLDER], [Lamps(), Meter()], clock="simulated")
     with pytest.raises(InputError, match=r"component 'meter' takes 'lamps\.level', and there is no such component"):
-        Robot(DOMAIN, [HOLDER], [Meter()])
+        Robot(DOMAIN, [HOLDER], [Meter()], clock="simulated")
 
 
 WORKER = parse_plot("""
@@ -714,7 +718,7 @@ states:
 
 
 def test_an_invalid_goal_during_a_run_is_no_plan_and_the_run_continues():
-    with Robot(DOMAIN, [WORKER], []) as robot:
+    with Robot(DOMAIN, [WORKER], [], clock="simulated") as robot:
         robot.knowledge.apply(Delta(nodes={"a": "lamp"}), author="me")
 
         def post(sequencer):
@@ -736,7 +740,7 @@ def test_a_state_with_a_goal_reads_the_kind_of_no_plan():
           s: {goal: (on a), on: {done: e, no_plan: {to: e, emit: why, with: {kind: ?event.kind}}, gave_up: e}}
           e: {final: true}
     """
-    with Robot(DOMAIN, [parse_plot(text)], []) as robot:
+    with Robot(DOMAIN, [parse_plot(text)], [], clock="simulated") as robot:
         robot.knowledge.apply(Delta(nodes={"a": "lamp"}), author="me")
         end = robot.run("top")
     assert end.emitted[0].attributes == {"kind": "unsolvable"}

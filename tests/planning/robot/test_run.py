@@ -10,7 +10,7 @@ from obedient_robot import ObedientRobot, plots
 from dsc import Event, Record, is_unfinished, parse_plot
 from dsc.sequencer.clock import run_real, run_simulated
 from knowledge_base import Delta, InputError, StoreError, UnknownNameError, fact
-from planning import PlanningDomain, Robot
+from planning import PlanningDomain, Robot, Task
 
 DOMAIN = PlanningDomain.parse("""(define (domain trip) (:types place)
   (:predicates (at ?p - place) (road ?a ?b - place) (closed))
@@ -31,9 +31,9 @@ states:
 """)
 
 
-def robot(store=None, seconds=1.0):
+def robot(store=None, seconds=1.0, clock=None):
     device = ObedientRobot(DOMAIN, seconds=seconds)
-    made = Robot(DOMAIN, [*plots(DOMAIN), WAIT], [device], store=store)
+    made = Robot(DOMAIN, [*plots(DOMAIN), WAIT], [device], store=store, clock=clock)
     device.knowledge = made.knowledge
     if not made.knowledge.nodes():
         made.knowledge.apply(WORLD, "me")
@@ -344,3 +344,30 @@ def test_the_key_of_a_call_is_equal_in_equal_runs_in_simulated_time():
     first = run_simulated(main())
     assert first == run_simulated(main())
     assert len({*first}) == len(first) == 2
+
+
+@pytest.mark.parametrize("method", ["run", "achieve", "report"])
+def test_a_robot_without_a_clock_asks_for_the_kind_of_time(method):
+    made = robot()
+    task = {"run": "wait", "achieve": "(at b)", "report": Task(goal="(at b)")}[method]
+    with pytest.raises(InputError, match='clock="real" for devices, or clock="simulated" for tests'):
+        getattr(made, method)(task)
+
+
+@pytest.mark.parametrize(
+    ("clock", "runs", "other"), [("real", run_simulated, "simulated"), ("simulated", run_real, "real")]
+)
+def test_a_clock_that_is_not_that_of_the_loop_is_refused(clock, runs, other):
+    made = robot(clock=clock)
+
+    async def start():
+        await made.start("wait")
+
+    with pytest.raises(InputError, match=f'event loop is {other}, and the robot has clock="{clock}"'):
+        runs(start())
+
+
+def test_a_speed_needs_simulated_time():
+    made = robot(clock="real")
+    with pytest.raises(InputError, match="a speed of 10 needs simulated time"):
+        made.run("wait", speed=10)

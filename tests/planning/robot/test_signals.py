@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from dsc import Component, Outcome, SkillCall, parse_plot, skill, takes
-from dsc.sequencer.clock import run_real
+from dsc.sequencer.clock import ClockKind, run_real
 from knowledge_base import StoreError
 from planning import Bundle, deploy
 from planning.robot.bringup import resume
@@ -87,24 +87,24 @@ def robot(base: Base) -> Bundle:
     return Bundle("r", plots=(PLOT,), components=lambda: [base], main="go")
 
 
-@pytest.mark.parametrize("simulated", [True, False])
+@pytest.mark.parametrize("clock", ["real", "simulated"])
 @pytest.mark.parametrize("number", SIGNALS)
-def test_a_signal_ends_a_run_without_a_store(number: signal.Signals, *, simulated: bool) -> None:
+def test_a_signal_ends_a_run_without_a_store(number: signal.Signals, clock: ClockKind) -> None:
     base = Base(number)
-    with deploy(robot(base)) as deployed:
-        report = deployed.report(simulated=simulated)
+    with deploy(robot(base), clock=clock) as deployed:
+        report = deployed.report()
     assert report.problem == f"{SIGNALS[number]} ended the run"
     assert sorted(base.log[3:-1]) == ["brake", "off"]
     assert (base.log[:3], base.log[-1]) == (["speed 2", "release", "on"], "stop")
     assert signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler)
 
 
-@pytest.mark.parametrize("simulated", [True, False])
+@pytest.mark.parametrize("clock", ["real", "simulated"])
 @pytest.mark.parametrize("number", SIGNALS)
-def test_a_signal_suspends_a_run_with_a_store(tmp_path, number: signal.Signals, *, simulated: bool) -> None:
+def test_a_signal_suspends_a_run_with_a_store(tmp_path, number: signal.Signals, clock: ClockKind) -> None:
     base = Base(number)
-    with deploy(robot(base), store=tmp_path / "run.kb") as deployed:
-        report = deployed.report(simulated=simulated)
+    with deploy(robot(base), store=tmp_path / "run.kb", clock=clock) as deployed:
+        report = deployed.report()
     assert report.problem == f"{SIGNALS[number]} suspended the run, which can be resumed"
     assert sorted(base.log[3:-1]) == ["brake", "off"]
     assert base.log[-1] == "stop"
@@ -137,7 +137,7 @@ def test_a_resume_sends_the_messages_of_the_active_states_again(tmp_path) -> Non
         return Bundle("r", plots=(LATER,), components=lambda: [base], main="go")
 
     base = Base(signal.SIGTERM)
-    with deploy(bundle(base), store=tmp_path / "run.kb") as deployed:
+    with deploy(bundle(base), store=tmp_path / "run.kb", clock="simulated") as deployed:
         deployed.report()
     assert base.log.count("release") == 2
     again = Base(signal.SIGTERM)
@@ -153,7 +153,7 @@ def test_a_resume_sends_the_messages_of_the_active_states_again(tmp_path) -> Non
 @pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_ends_a_run_with_a_store_on_request(tmp_path, number: signal.Signals) -> None:
     base = Base(number)
-    with deploy(robot(base), store=tmp_path / "run.kb") as deployed:
+    with deploy(robot(base), store=tmp_path / "run.kb", clock="simulated") as deployed:
         assert deployed.report(on_signal="end").problem == f"{SIGNALS[number]} ended the run"
     assert "brake" in base.log
     with pytest.raises(StoreError), resume(robot(base), tmp_path / "run.kb") as deployed:
@@ -165,7 +165,7 @@ def test_a_signal_that_the_program_handles_remains_its_own() -> None:
     before = signal.signal(signal.SIGTERM, lambda number, _: received.append(number))
     try:
         base = Base(signal.SIGTERM)
-        with deploy(robot(base)) as deployed:
+        with deploy(robot(base), clock="simulated") as deployed:
             assert deployed.report().problem is None
     finally:
         signal.signal(signal.SIGTERM, before)

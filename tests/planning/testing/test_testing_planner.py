@@ -20,7 +20,9 @@ def run(faults, *reached):
     knowledge = world(DOMAIN.schema, "a b - lamp")
     records: list[Record] = []
     skills = ScriptedSkills(knowledge, {"lamps.light": Answer("lit", observed="(on ?lamp)")}, like=[Lamps()])
-    robot = Robot(DOMAIN, PLOTS, skills.components, knowledge, FaultyPlanner(OnePlan(), faults, *reached))
+    robot = Robot(
+        DOMAIN, PLOTS, skills.components, knowledge, FaultyPlanner(OnePlan(), faults, *reached), clock="simulated"
+    )
     robot.listen(records.append)
     with robot:
         end = robot.run(LIGHT_UP.name)
@@ -67,7 +69,7 @@ def test_one_that_hangs_is_given_up_at_its_deadline_in_simulated_time():
     knowledge, ends = world(DOMAIN.schema, "a b - lamp"), []
     skills = ScriptedSkills(knowledge, {}, like=[Lamps()])
     planner = FaultyPlanner(OnePlan(), Faults(1, 1.0, {Fault.PLANNER_HANGS}))
-    with Robot(DOMAIN, PLOTS, skills.components, knowledge, planner) as robot:
+    with Robot(DOMAIN, PLOTS, skills.components, knowledge, planner, clock="simulated") as robot:
         robot.listen(lambda record: ends.append(record.t) if record.type == "end" else None)
         robot.achieve("(forall (?l - lamp) (on ?l))", seconds=7)
     assert ends == [7 + PATIENCE]

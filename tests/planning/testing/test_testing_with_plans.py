@@ -65,7 +65,7 @@ PLOTS = Library([LIGHT_UP, LIGHT])
 def light_up(replies, plots=PLOTS):
     knowledge = world(DOMAIN.schema, "a b - lamp")
     skills = ScriptedSkills(knowledge, {"lamps.light": replies}, like=[Lamps()])
-    robot = Robot(DOMAIN, plots, skills.components, knowledge, planner=OnePlan())
+    robot = Robot(DOMAIN, plots, skills.components, knowledge, planner=OnePlan(), clock="simulated")
     steps: list[Any] = []
     coverage = Coverage(plots)
 
@@ -119,4 +119,4 @@ def test_free_components_declare_nothing_so_an_executive_refuses_their_arguments
     knowledge = world(DOMAIN.schema, "a b - lamp")
     skills = ScriptedSkills(knowledge, {"lamps.light": ["lit", Answer("blown", {"lamp": "a"})]})
     with pytest.raises(PlotError, match="has no parameter 'lamp'"):
-        Robot(DOMAIN, PLOTS, skills.components, knowledge, planner=OnePlan())
+        Robot(DOMAIN, PLOTS, skills.components, knowledge, planner=OnePlan(), clock="simulated")
