@@ -34,6 +34,7 @@ from dsc.outcomes import Outcome as Outcome
 from dsc.profiles import configure as configure
 from dsc.reflection import MODELS as MODELS
 from dsc.reflection import design_facts as design_facts
+from dsc.run_log import RunFilter as RunFilter
 from dsc.runs.archive import has_run as has_run
 from dsc.runs.archive import is_unfinished as is_unfinished
 from dsc.runs.store import RunStore as RunStore
@@ -60,3 +61,4 @@ from dsc.validation import validate_library as validate_library
 from dsc.validation import validate_plot as validate_plot
 from dsc.validation.library import raise_findings as raise_findings
 from dsc.validation.review import review_plot as review_plot
+from knowledge_base.errors import DscError as DscError

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
-import logging
 import math
 import multiprocessing
 import os
@@ -19,6 +18,7 @@ import sys
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
+from contextvars import copy_context
 from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
@@ -28,11 +28,12 @@ from typing import Any, Generic, cast
 from dsc.calls import OBSERVED, Reported_contra, SkillCall
 from dsc.errors import ProgrammingError, SkillError
 from dsc.outcomes import Outcome
+from dsc.run_log import run_logger
 from knowledge_base.errors import described
 from knowledge_base.facts import Delta
 from knowledge_base.tracebacks import raised_at, whole_traceback
 
-_LOG = logging.getLogger("dsc.skills")
+_LOG = run_logger("dsc.skills")
 
 STOPPING = 2.0
 """Real seconds between the stop request and the end of a body, at most."""
@@ -162,7 +163,7 @@ async def _supervised(
     watchers: list[threading.Timer] = []
     if math.isfinite(blocking.seconds):
         watchers.append(_later(max(blocking.seconds, 0.0), stop))
-    threading.Thread(target=run, name=f"skill {blocking.action_id}", daemon=True).start()
+    threading.Thread(target=copy_context().run, args=(run,), name=f"skill {blocking.action_id}", daemon=True).start()
     try:
         with _hold(call):
             return await _until_stopped(ended, stop)

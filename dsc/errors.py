@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from knowledge_base.errors import InputError, Place
+from knowledge_base.errors import DscError, InputError, Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class PlotError(InputError):
         return "\n".join(map(str, self.findings))
 
 
-class RunawayError(Exception):
+class RunawayError(DscError):
     """A macrostep that does not end; `trail` lists the states that it enters repeatedly."""
 
     def __init__(self, problem: str, trail: Sequence[str]) -> None:
@@ -53,7 +53,7 @@ class RunawayError(Exception):
         self.trail = tuple(trail)
 
 
-class SkillError(Exception):
+class SkillError(DscError):
     """A failure of a device or of the infrastructure, but not of code: a skill that raises it ends with `skill_error`.
 
     In a hook such as `start`, it leads to FatalError.
@@ -72,7 +72,7 @@ class PreemptedError(SkillError):
         self.by = by
 
 
-class ProgrammingError(Exception):
+class ProgrammingError(DscError):
     """An undeclared exception of user code; the message has the hook or skill, the exception, the file and the line."""
 
     def __str__(self) -> str:

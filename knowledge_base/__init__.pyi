@@ -6,6 +6,7 @@ from knowledge_base.conditions.watch import Watch as Watch
 from knowledge_base.errors import ConditionCancelledError as ConditionCancelledError
 from knowledge_base.errors import ConflictError as ConflictError
 from knowledge_base.errors import DamagedStoreError as DamagedStoreError
+from knowledge_base.errors import DscError as DscError
 from knowledge_base.errors import HistoryError as HistoryError
 from knowledge_base.errors import InputError as InputError
 from knowledge_base.errors import OutOfBoundsError as OutOfBoundsError

@@ -122,7 +122,11 @@ def _pairs(name: str) -> frozenset[str]:
     return frozenset(name[at : at + 2] for at in range(len(name)))
 
 
-class InputError(Exception):
+class DscError(Exception):
+    """The base of every exception with which this library reports a mistake or a failure."""
+
+
+class InputError(DscError):
     """A mistake in the input; the operation had no effect.
 
     Attributes:
@@ -225,7 +229,7 @@ class SchemaError(InputError):
     """A declaration, fact or expression contradicts the schema (arity, type, duplicate)."""
 
 
-class ConflictError(Exception):
+class ConflictError(DscError):
     """A transaction contradicts the present version or the state of this thread; nothing was changed."""
 
 
@@ -278,5 +282,5 @@ class UserCodeError(InputError):
     """A user's function, e.g. a computed predicate, has failed; the message has the file and the line."""
 
 
-class ConditionCancelledError(Exception):
+class ConditionCancelledError(DscError):
     """A coroutine waits for a condition that is cancelled and will not fire again."""

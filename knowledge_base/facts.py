@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from knowledge_base.errors import InputError, Place, SchemaError
-from knowledge_base.spelling import value_text
+from knowledge_base.spelling import brief_repr, value_text
 
 Value = str | int | float | bool
 VALUE_TYPES = frozenset({str, int, float, bool})
@@ -39,6 +39,10 @@ class Fact:
 
     predicate: str
     args: tuple[Value, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return the call of `fact` with these values."""
+        return f"fact({', '.join(map(repr, (self.predicate, *self.args)))})"
 
     def __str__(self) -> str:
         """Return the fact in the language: `(on cup3 table1)`."""
@@ -74,6 +78,10 @@ class Delta:
     values: Mapping[Fact, Content] = field(default_factory=dict)
     removed_nodes: tuple[str, ...] = ()
     replaced: tuple[Fact, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return the constructor's call without empty parts."""
+        return brief_repr(self)
 
     def __bool__(self) -> bool:
         """Return whether the change contains anything."""

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 # Names without quotes, which a reader converts to lower case. In lists, a `-` separates names from their type.
 _PLAIN_NAME = re.compile(r"[^\s()\";?:-][^\s()\";?]*")
@@ -61,3 +66,10 @@ def value_text(value: str | float | tuple[float, ...], *, quoted: bool = False) 
         return value
     escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r")
     return f'"{escaped}"'
+
+
+def brief_repr(value: DataclassInstance) -> str:
+    """Return the call that constructs a value of a dataclass, without `None` and empty fields."""
+    said = {field.name: getattr(value, field.name) for field in fields(value)}
+    kept = (f"{name}={one!r}" for name, one in said.items() if one not in (None, (), {}))
+    return f"{type(value).__name__}({', '.join(kept)})"

@@ -17,7 +17,7 @@ from knowledge_base.language.evaluation.evaluator import apply_effect
 from knowledge_base.language.evaluation.world_protocol import BoundedWorld, Bounds, Meter, World
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When
 from knowledge_base.language.syntax.expression import Atom, Call, Comparison, Constant, Expression
-from knowledge_base.language.syntax.sexpr import Group, read
+from knowledge_base.language.syntax.sexpr import Group, Node, read
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, to_text
 from knowledge_base.world.overlay import Overlay
 
@@ -26,13 +26,13 @@ MOST_WORK = 500_000
 _BOUNDS = Bounds(work=MOST_WORK)
 
 
-def told(statements: Iterable[str], world: World, source: str | None = None, bounds: Bounds = _BOUNDS) -> Delta:
+def told(statements: Iterable[str | Node], world: World, source: str | None = None, bounds: Bounds = _BOUNDS) -> Delta:
     """Return the change that makes all the statements true, in the order of the statements.
 
     A statement may mention an object before the statement that declares its type.
 
     Args:
-        statements: the texts, one statement each.
+        statements: the texts or parsed groups, one statement each.
         world: the world before the change.
         source: name of the texts in error messages; the number of the statement follows the name.
         bounds: work, seconds and cancellation for all statements together.
@@ -106,9 +106,9 @@ def _called(source: str | None, number: int) -> str | None:
     return None if source is None else f"{source} {number}"
 
 
-def _effect(text: str, source: str | None) -> Effect:
+def _effect(text: str | Node, source: str | None) -> Effect:
     """Return the statement as an effect; `=` becomes an assignment of a number."""
-    groups = read(text, source)
+    groups = read(text, source) if isinstance(text, str) else [text]
     if len(groups) != 1 or not isinstance(groups[0], Group) or groups[0].head() != "=":
         return parse_effect(text, source)
     said = parse_condition(groups[0])

@@ -26,7 +26,9 @@ from knowledge_base.journal.history import History, MemoryHistory, Version, Writ
 from knowledge_base.journal.journal import Journal
 from knowledge_base.language.checking.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.language.syntax.sexpr import read
 from knowledge_base.sources import DataSource, SourceListener, Sources
+from knowledge_base.statements import told
 from knowledge_base.transaction import GroupCommit, Transaction
 from knowledge_base.view import View
 from knowledge_base.world.overlay import Overlay
@@ -131,8 +133,7 @@ class KnowledgeBase(View):
         """Read the output of `to_json` into memory and keep its version number.
 
         `text_or_path` is the JSON text, or a `Path` of its file. `source` is the name of the text in error messages.
-
-        `source` names a text in messages.
+        `apply(KnowledgeBase.from_json(path).contents(), author)` adds that world to another knowledge base.
 
         Raises:
             InputError: as for `exchange.read_json`.
@@ -225,14 +226,17 @@ class KnowledgeBase(View):
 
     def apply(
         self,
-        delta: Delta,
+        change: Delta | str,
         author: str,
         *,
         expect: int | None = None,
         key: str | None = None,
         along: Writer | None = None,
     ) -> Change:
-        """Commit `delta` as a whole; return its effective change.
+        """Commit a change as a whole; return its effective change.
+
+        The change is a `Delta`, or a text of statements: `(cup cup1) (on cup1 table) (not (clear table))`. Statements
+        declare objects, make facts true or false, and set values; they read the present version.
 
         `transaction` describes the other arguments. If a change with the same `key` was committed before, return
         that change and change nothing.
@@ -240,21 +244,23 @@ class KnowledgeBase(View):
         Raises:
             UnknownNameError: an undeclared type, predicate or function, or an unknown object.
             SchemaError: a wrong number of arguments or a wrong type.
-            InputError: a number that is not finite.
+            ParseError: the text contains something else than statements.
+            InputError: a number that is not finite, or statements that contradict each other.
             ConflictError: the version is not the expected one, or this thread has an open transaction.
             StoreError: the file cannot be written, or the knowledge base is closed; nothing was changed.
         """
-        require_delta(delta)
+        if not isinstance(change, str):
+            require_delta(change)
         _require_names(author, key)
         with self._lock.changing():
             self._require_free()
-            change = self._first(key, expect)
-            if change is None:
+            done = self._first(key, expect)
+            if done is None:
                 pending = Overlay(self._state)
-                pending.apply(delta)
-                change = self._commit(pending.delta, author, key, along)
+                pending.apply(told(read(change), self._state) if isinstance(change, str) else change)
+                done = self._commit(pending.delta, author, key, along)
         self._notifier.deliver()
-        return change
+        return done
 
     def together(self) -> AbstractContextManager[sqlite3.Connection]:
         """Return a context manager that writes all commits of its block to the file in one transaction.

@@ -7,7 +7,7 @@ from itertools import islice
 
 from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.exchange import to_json
-from knowledge_base.facts import Content, Fact, Value
+from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.checking.vocabulary import Signature
 from knowledge_base.language.evaluation.explanation import Explanation, explain
@@ -222,6 +222,15 @@ class View:
         """Return the values that changes have set, by function and arguments."""
         with self._lock:
             return dict(self._state.values)
+
+    def contents(self) -> Delta:
+        """Return all objects, facts and values as one change, e.g. to `apply` them to another knowledge base."""
+        return Delta(nodes=self.nodes(), added=tuple(self.facts()), values=self.values())
+
+    def __repr__(self) -> str:
+        """Return the sizes and the version: `<KnowledgeBase: 12 objects, 30 facts, 2 values, version 7>`."""
+        sizes = f"{len(self.nodes())} objects, {len(self.facts())} facts, {len(self.values())} values"
+        return f"<{type(self).__name__}: {sizes}, version {self._version}>"
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
         """Return whether the fact is true; the name of a type asks for the type of an object.

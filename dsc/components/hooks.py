@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
-import logging
 import re
 import signal
 import threading
 import warnings
 from asyncio.runners import Runner
-from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -24,10 +22,11 @@ from typing import Any
 from weakref import WeakSet
 
 from dsc.errors import ProgrammingError, SkillError
+from dsc.run_log import run_logger
 from knowledge_base.errors import InputError, described
 from knowledge_base.tracebacks import is_users_code, raised_at, waits_at, whole_traceback
 
-_LOG = logging.getLogger(__package__)
+_LOG = run_logger(__package__)
 Classes = tuple[type[BaseException], ...]
 active_component: ContextVar[str | None] = ContextVar("component_at_work", default=None)
 """Name of the component whose skill or hook the present task executes; the task's callbacks inherit it."""
@@ -52,9 +51,7 @@ def programming_errors() -> Iterator[list[str]]:
 
 @contextmanager
 def unheard_errors(found: list[str]) -> Iterator[None]:
-    """Return a context manager in which errors that Python only prints are programming errors of the run.
-
-    These are exceptions of tasks and coroutines without an `await`.
+    """Return a context manager in which an exception of a task without an `await` is a programming error of the run.
 
     Args:
         found: the list of `programming_errors`.
@@ -72,28 +69,38 @@ def unheard_errors(found: list[str]) -> Iterator[None]:
         _found.reset(token)
 
     loop.set_exception_handler(lost)
-    warnings.filterwarnings("always", _NEVER_AWAITED, RuntimeWarning)
-    if warnings.showwarning is not _show_warning:
-        _shown_before.append(warnings.showwarning)
-        warnings.showwarning = _show_warning
     try:
         yield
     finally:
         loop.set_exception_handler(before)
 
 
-_shown_before: deque[Callable[..., None]] = deque(maxlen=1)
+@contextmanager
+def unawaited_coroutines() -> Iterator[None]:
+    """Return a context manager in which a coroutine of a run without an `await` is a programming error of the run.
+
+    It changes Python's display of warnings for the whole process until its end. Therefore only simulated time and the
+    command use it, but not a run in the real time of another program.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("always", _NEVER_AWAITED, RuntimeWarning)
+        shown = warnings.showwarning
+
+        def show(
+            message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None,
+            line: Any = None,
+        ) -> None:  # fmt: skip
+            found = _found.get()
+            if found is not None and re.match(_NEVER_AWAITED, str(message)) and is_users_code(filename):
+                _note_unawaited(found, f"{message}; write `await` before it ({filename}:{lineno})")
+            else:
+                shown(message, category, filename, lineno, file, line)
+
+        warnings.showwarning = show
+        yield
 
 
-def _show_warning(
-    message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
-) -> None:
-    """Show a warning, unless it is about a coroutine of a run without an `await`."""
-    found = _found.get()
-    if found is None or not re.match(_NEVER_AWAITED, str(message)) or not is_users_code(filename):
-        _shown_before[-1](message, category, filename, lineno, file, line)
-        return
-    bug = f"{message}; write `await` before it ({filename}:{lineno})"
+def _note_unawaited(found: list[str], bug: str) -> None:
     if bug in found:
         return
     _LOG.error("%s", bug)

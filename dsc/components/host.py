@@ -7,7 +7,6 @@ A host stores an action's reports and end until the client releases them, within
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext
 from dataclasses import asdict, dataclass, field
@@ -26,11 +25,12 @@ from dsc.components.turns import turn_of
 from dsc.errors import NotAliveError, PreemptedError, ProgrammingError
 from dsc.outcomes import Outcome
 from dsc.rank import ORDINARY, Rank
+from dsc.run_log import run_logger
 from knowledge_base.errors import InputError
 from knowledge_base.exchange import delta_form, delta_of
 from knowledge_base.language.checking.inputs import require_delta, require_time, shown
 
-_LOG = logging.getLogger(__package__)
+_LOG = run_logger(__package__)
 
 MOST_ACTIONS = 1_000
 """Number of running actions of a host, and of ended actions that were not forgotten; the latest ends are kept."""

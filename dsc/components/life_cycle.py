@@ -9,7 +9,6 @@ succeeded.
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from enum import StrEnum
@@ -27,9 +26,10 @@ from dsc.components.hooks import (
 )
 from dsc.components.periodic_steps import StepCounts, step_periodically
 from dsc.errors import NotAliveError, ProgrammingError
+from dsc.run_log import run_logger
 from knowledge_base.errors import InputError
 
-_LOG = logging.getLogger(__package__)
+_LOG = run_logger(__package__)
 
 
 class Life(StrEnum):

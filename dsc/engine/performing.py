@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections import deque
 from collections.abc import Iterable, Mapping
@@ -32,11 +31,12 @@ from dsc.model.actions import (
 from dsc.model.language import TermField
 from dsc.model.plot import ActionPlot
 from dsc.rank import Rank
+from dsc.run_log import run_logger
 from knowledge_base.errors import InputError, UnknownNameError, UserCodeError
 from knowledge_base.language.syntax.expression import Constant, Expression, Term, Variable
 from knowledge_base.tracebacks import whole_traceback
 
-_LOG = logging.getLogger(__package__)
+_LOG = run_logger(__package__)
 
 _EXPONENT_FROM = 1e21
 """Smallest number that ECMAScript writes with an exponent."""

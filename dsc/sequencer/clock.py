@@ -19,6 +19,7 @@ from contextvars import Context, ContextVar, copy_context
 from functools import partial
 from typing import Any, Literal, NamedTuple, TypeVar, TypeVarTuple, Unpack
 
+from dsc.components.hooks import unawaited_coroutines
 from dsc.loop_calls import LoopCalls
 from dsc.sequencer.real_input import RealInput, TasksOf
 from dsc.sequencer.signals import run_until_signal
@@ -462,7 +463,7 @@ def run_simulated(main: Coroutine[Any, Any, _Result], at: float = 0.0, speed: fl
     if not speed > 0:
         main.close()
         raise InputError(f"a speed is a positive number of simulated seconds per real second, not {speed:g}")
-    with asyncio.Runner(loop_factory=lambda: SimulatedEventLoop(at, speed)) as runner:
+    with unawaited_coroutines(), asyncio.Runner(loop_factory=lambda: SimulatedEventLoop(at, speed)) as runner:
         return run_until_signal(runner, main)
 
 

@@ -9,7 +9,6 @@ chart and component share no object by accident.
 from __future__ import annotations
 
 import asyncio
-import logging
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -33,6 +32,7 @@ from dsc.events import (
 )
 from dsc.messages import LateMessage, SkillMessage, TimerMessage, Told
 from dsc.outcomes import Outcome
+from dsc.run_log import run_logger
 from dsc.sequencer.clock import LoopClock, PastClock
 from dsc.sequencer.inbox import Timers
 from dsc.sequencer.message_checks import encoded, late, validated
@@ -46,7 +46,7 @@ from dsc.supervision.lives import ComponentLives
 from dsc.supervision.skill_dependencies import SkillDependencies
 from knowledge_base.errors import InputError, UnknownNameError
 
-_LOG = logging.getLogger(__package__)
+_LOG = run_logger(__package__)
 DEFAULT_WITHIN = 300.0
 """Seconds after which a skill without `within` in its trigger is cancelled, so that every wait has a bound."""
 UNKNOWN_SKILL = SkillSignature("", "", {}, {}, {}, after_crash="repeat")

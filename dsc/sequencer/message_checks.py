@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -17,6 +16,7 @@ from dsc.events import NO_ATTRIBUTES, PROGRAMMING_ERROR, RESERVED, SKILL_ERROR, 
 from dsc.messages import KnowledgeMessage, ParameterMessage, SkillMessage
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
+from dsc.run_log import run_logger
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock
 from dsc.skills import SkillSignature
@@ -27,7 +27,7 @@ from knowledge_base.language.checking.inputs import require, require_delta, requ
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.store import KnowledgeBase
 
-_LOG = logging.getLogger("dsc.skills")
+_LOG = run_logger("dsc.skills")
 Declared = Mapping[str, str | None]
 """Types of attributes by name; `None` accepts any type."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections import deque
 from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -17,9 +16,10 @@ from dsc.components.life_cycle import NEUTRAL, Life
 from dsc.engine.steps import SendMessage, SetParameter, Start, SwitchMode
 from dsc.errors import ProgrammingError
 from dsc.messages import Told
+from dsc.run_log import run_logger
 from dsc.sequencer.message_checks import encoded
 
-_LOG = logging.getLogger(__package__)
+_LOG = run_logger(__package__)
 CLOSING = GRACE
 """Seconds for components to receive their last outputs, and for cancelled skills to stop."""
 _LIVES = frozenset({Life.INIT, Life.SHUTDOWN})

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Callable
 
 from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import Step
 from dsc.model.plot import ActionPlot
+from dsc.run_log import run_logger
 
-_LOG = logging.getLogger(__package__)
+_LOG = run_logger(__package__)
 LONGEST_PHASE = 0.5
 """Real seconds after which a coordination phase is reported; meanwhile no event is handled and no skill continues."""
 _MOST_REPORTED = 20

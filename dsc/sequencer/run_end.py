@@ -9,6 +9,7 @@ from typing import Generic, cast
 from dsc.calls import Outputs
 from dsc.events import GAVE_UP, NO_PLAN, Event
 from knowledge_base.notebook import table
+from knowledge_base.spelling import brief_repr
 
 SUSPENDED = "the run is suspended and can be resumed"
 """Problem of the end of a suspended run."""
@@ -37,6 +38,10 @@ class RunEnd(Generic[Outputs]):
     outputs: Outputs = field(default_factory=lambda: cast(Outputs, {}))
     programming_error: str | None = None
     failure: str | None = None
+
+    def __repr__(self) -> str:
+        """Return the constructor's call without empty parts."""
+        return brief_repr(self)
 
     def __bool__(self) -> bool:
         """Return `reached`."""

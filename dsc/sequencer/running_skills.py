@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import math
 import threading
 from collections.abc import Callable, Iterable
@@ -19,6 +18,7 @@ from dsc.errors import PreemptedError, ProgrammingError
 from dsc.events import PREEMPTED, PROGRAMMING_ERROR, SKILL_ERROR
 from dsc.messages import SkillMessage
 from dsc.outcomes import Outcome
+from dsc.run_log import run_logger
 from dsc.sequencer.clock import LoopClock, ScheduledCall
 from dsc.sequencer.message_checks import failed, faulty, late, validated
 from dsc.sequencer.outbox import Configuring
@@ -26,7 +26,7 @@ from dsc.skills import SkillSignature
 from knowledge_base.errors import described
 from knowledge_base.tracebacks import waits_at
 
-_LOG = logging.getLogger(__package__)
+_LOG = run_logger(__package__)
 
 
 @dataclass(frozen=True, slots=True)

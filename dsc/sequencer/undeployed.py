@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
@@ -10,12 +9,13 @@ from functools import partial
 
 from dsc.engine.steps import Start
 from dsc.messages import SkillMessage, Told
+from dsc.run_log import run_logger
 from dsc.sequencer.clock import LoopClock, ScheduledCall
 from dsc.sequencer.message_checks import late
 from dsc.sequencer.outbox import command
 from knowledge_base.errors import UnknownNameError
 
-_LOG = logging.getLogger(__package__)
+_LOG = run_logger(__package__)
 
 
 @dataclass(slots=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import sys
 import threading
 import time
@@ -12,9 +11,10 @@ from contextlib import contextmanager
 from types import CodeType, FrameType
 from typing import Any, NamedTuple
 
+from dsc.run_log import run_logger
 from knowledge_base.tracebacks import is_users_code
 
-_LOG = logging.getLogger(__package__)
+_LOG = run_logger(__package__)
 BLOCKED = 1.0
 """Real seconds after which the loop counts as blocked; the next warnings follow after ten times, hundred times ..."""
 NameOf = Callable[[asyncio.Task[Any]], str | None]

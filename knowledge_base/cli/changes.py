@@ -126,11 +126,8 @@ def import_(
     domain: Domain = None,
 ) -> None:
     """Add the content of another world to a store, as one change; the store's own content stays."""
-    from knowledge_base.facts import Delta
-
     with opened(source, domain) as (other, _), writable(store) as kb:
-        said = Delta(nodes=other.nodes(), added=tuple(other.facts()), values=other.values())
-        change = kb.apply(said, author or str(source))
+        change = kb.apply(other.contents(), author or str(source))
         typer.echo(f"{len(change.delta)} things, facts and numbers are new; version {kb.version}")
 
 

@@ -279,6 +279,7 @@ def _followed(
 
     from rich.console import Console
 
+    from dsc.components.hooks import unawaited_coroutines
     from dsc.trace import header, write_to
     from planning.robot.garbage import settled
     from planning.robot.progress import LiveProgress, PlainProgress, Tally
@@ -300,6 +301,7 @@ def _followed(
             stack.enter_context(redirect_stdout(sys.stderr))
         if robot.clock == "real":
             stack.enter_context(settled())
+            stack.enter_context(unawaited_coroutines())
         report = robot.report(speed=speed, until=until, on_signal=on_signal.value, prepare=prepare)
     if not quiet:
         typer.echo("")  # between the progress and the report

@@ -147,6 +147,11 @@ class RobotProgram:
         return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
 
     @property
+    def name(self) -> str:
+        """The name of the bundle; `robot` without a bundle."""
+        return "robot" if self.origin is None else self.origin.bundle.name
+
+    @property
     def failures(self) -> frozenset[str]:
         """The outcomes that report failures: `failure_events` of the plots, and the argument `failures`."""
         return failure_events(self.library).union(self._failures)

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from dsc.calls import Outputs, PlotCall
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.model.states import Budget
+from dsc.run_log import logged_run
 from dsc.runs.archive import is_unfinished
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
@@ -390,8 +391,7 @@ class Robot(RobotProgram):
             end = RunEnd(finished=False, problem=_interrupted(*interrupt.args, suspended=suspended))
         finally:
             ignore()
-        name = "robot" if self.origin is None else self.origin.bundle.name
-        return judgement.report(name, end, tally, self.failures, time.perf_counter() - started, clock)
+        return judgement.report(self.name, end, tally, self.failures, time.perf_counter() - started, clock)
 
     def _perform(self, task: Task, prepare: Prepare, *, speed: float, until: float | None) -> RunEnd:
         if self.origin is not None and self.origin.resumes:
@@ -458,7 +458,7 @@ class Robot(RobotProgram):
         self, number: str, sequencer: Sequencer, planning: PlanningComponent,
         main: Coroutine[Any, Any, RunEnd[Outputs]],
     ) -> Run[Outputs]:  # fmt: skip
-        run = Run(number, sequencer, planning, _closing(main, planning))
+        run = Run(number, sequencer, planning, _closing(main, planning, (self.name, number)))
         self._runs[run] = None
         run.task.add_done_callback(lambda _: self._runs.pop(run))
         return run
@@ -531,7 +531,10 @@ def _require_kind(kept: Kept, kind: ClockKind) -> None:
         raise InputError(f"the run was begun in {began} time and cannot be resumed in {kind} time")
 
 
-async def _closing(running: Coroutine[Any, Any, RunEnd[Outputs]], planning: PlanningComponent) -> RunEnd[Outputs]:
+async def _closing(
+    running: Coroutine[Any, Any, RunEnd[Outputs]], planning: PlanningComponent, logged: tuple[str, str]
+) -> RunEnd[Outputs]:
+    logged_run.set(logged)  # in the task of the run
     try:
         return await running
     finally:

@@ -15,7 +15,7 @@ from kb_interrupts import interrupted
 from kb_strategies import SCHEMA, THINGS, deltas, removals
 from kb_worlds import graph_content
 
-from knowledge_base import Change, ConflictError, Delta, Fact, InputError, KnowledgeBase, Overlay, fact
+from knowledge_base import Change, ConflictError, Delta, DscError, Fact, InputError, KnowledgeBase, Overlay, fact
 
 
 @pytest.fixture
@@ -330,3 +330,50 @@ def test_an_interrupt_at_any_moment_of_a_change_silences_nobody() -> None:
         assert heard[-1].version == kb.version, f"interrupted at moment {moment}"
         moment += 1
     assert moment > 1
+
+
+# -- changes as text, and texts of values ----------------------------------------------------------------------
+
+
+def test_a_text_of_statements_is_a_change(kb) -> None:
+    change = kb.apply("(item cup9) (on cup9 shelf) (not (on cup1 shelf)) (= (weight cup9) 3)", author="me")
+    assert change.delta == Delta(
+        nodes={"cup9": "item"},
+        removed=(fact("on", "cup1", "shelf"),),
+        added=(fact("on", "cup9", "shelf"),),
+        values={fact("weight", "cup9"): 3},
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("(on cup1 shelf) (not (on cup1 shelf))", "contradicts itself"),
+        ("(on cup1 shelff)", "did you mean 'shelf'"),
+        ("(or (on cup1 shelf))", "'or' is not an effect"),
+        ("on cup1 shelf", "written in parentheses"),
+    ],
+)
+def test_a_text_that_is_no_change_is_refused_with_its_place(kb, text, said) -> None:
+    before = kb.contents()
+    with pytest.raises(InputError, match=said) as found:
+        kb.apply(text, author="me")
+    assert found.value.place is not None
+    assert kb.contents() == before
+
+
+def test_the_contents_of_a_world_are_a_change_of_another(kb) -> None:
+    other = KnowledgeBase(SCHEMA)
+    other.apply(KnowledgeBase.from_json(kb.to_json()).contents(), author="import")
+    assert other.contents() == kb.contents()
+
+
+def test_a_change_is_shown_as_the_call_that_makes_it(kb) -> None:
+    change = Delta(nodes={"cup9": "item"}, added=(fact("on", "cup9", "shelf"),))
+    assert repr(change) == "Delta(nodes={'cup9': 'item'}, added=(fact('on', 'cup9', 'shelf'),))"
+    assert repr(kb) == f"<KnowledgeBase: {len(THINGS)} objects, 2 facts, 1 values, version 1>"
+
+
+def test_all_errors_have_one_base() -> None:
+    assert issubclass(InputError, DscError)
+    assert issubclass(ConflictError, DscError)

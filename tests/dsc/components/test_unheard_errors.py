@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from pathlib import Path
 
 import pytest
@@ -109,3 +110,25 @@ def test_a_skill_that_ignores_its_end_does_not_keep_the_program_alive():
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=30)  # noqa: PLW1510
     assert done.stdout == "False\n", done.stderr
+
+
+def test_a_run_leaves_the_warnings_of_the_program_alone():
+    shown, filters = warnings.showwarning, [*warnings.filters]
+    ended("forgets_to_await")
+    assert (warnings.showwarning, warnings.filters) == (shown, filters)
+
+
+def test_a_run_in_real_time_shows_the_warning_as_python_does(recwarn):
+    knowledge = KnowledgeBase(Schema.parse("(define (domain d) (:predicates (lit)))"))
+    text = (
+        "{plot: p, states: {a: {entry: {trigger: arm.forgets_to_await, within: 60}, on: {did: e}}, e: {final: true}}}"
+    )
+
+    async def main():
+        shown = warnings.showwarning
+        end = await Sequencer(Library([parse_plot(text)]), knowledge, [Arm()], LoopClock()).run("p")
+        return end, warnings.showwarning is shown
+
+    end, untouched = asyncio.run(main())
+    assert (end.finished, untouched) == (True, True)
+    assert [str(one.message) for one in recwarn] == ["coroutine 'LoopClock.sleep' was never awaited"]

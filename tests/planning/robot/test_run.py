@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 
 import pytest
 from obedient_robot import ObedientRobot, plots
 
-from dsc import Event, Record, is_unfinished, parse_plot
+from dsc import (
+    BlockingCall,
+    Component,
+    Event,
+    Outcome,
+    Record,
+    RunFilter,
+    is_unfinished,
+    parse_plot,
+    primitive_plot,
+    skill,
+)
 from dsc.sequencer.clock import run_real, run_simulated
 from knowledge_base import Delta, InputError, StoreError, UnknownNameError, fact
 from planning import PlanningDomain, Robot, Task
@@ -371,3 +383,31 @@ def test_a_speed_needs_simulated_time():
     made = robot(clock="real")
     with pytest.raises(InputError, match="a speed of 10 needs simulated time"):
         made.run("wait", speed=10)
+
+
+class Said(Outcome): ...
+
+
+def test_log_records_name_the_robot_and_the_run(caplog):
+    class Talker(Component):
+        name = "talker"
+
+        @skill(blocking="thread")
+        def says(self, call: BlockingCall) -> Said:
+            logging.getLogger("mine").warning("hello")
+            return Said()
+
+    talker = Talker()
+    says = primitive_plot(talker.skills()["says"], done="said")
+    made = Robot(DOMAIN, [says], [talker])
+
+    async def main():
+        runs = [made.start(says.name) for _ in range(2)]
+        for run in runs:
+            assert await run
+        return [run.id for run in runs]
+
+    caplog.handler.addFilter(added := RunFilter())
+    ids = run_real(main())
+    caplog.handler.removeFilter(added)
+    assert [(record.robot, record.run) for record in caplog.records] == [("robot", one) for one in ids]
