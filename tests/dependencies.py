@@ -54,7 +54,12 @@ WHY = {
     "httpx": ("requests in tests of the page", BUILD),
     "hypothesis": ("properties in tests", BUILD),
     "jsonschema": ("the published JSON Schema, tested", BUILD),
+    "ipykernel": ("the kernel of a notebook around a robot, in tests", BUILD),
+    "nbclient": ("execution of that notebook", BUILD),
+    "nbformat": ("cells of that notebook", BUILD),
     "pytest": ("tests", BUILD),
+    "pytest-asyncio": ("asynchronous tests around a robot", BUILD),
+    "uvloop": ("another event loop around a robot, in tests", BUILD),
     "pytest-xdist": ("tests on all cores", BUILD),
     "mutmut": ("mutants in `make mutation`", BUILD),
     "mkdocs": ("the site of the pages", BUILD),
@@ -77,7 +82,7 @@ LICENCES = {
     "up-fast-downward": "GPL-3.0 (the engine)", "up-enhsp": "Apache-2.0; the engine GPL-3.0", "up-aries": "MIT",
     "pyoxigraph": "MIT OR Apache-2.0", "python-statemachine": "MIT", "rdflib": "BSD-3-Clause", "sismic": "LGPL-3.0",
     "scipy": "BSD-3-Clause", "transitions": "MIT", "xstate-statemachine": "MIT", "hatchling": "MIT",
-    "mutmut": "BSD-3-Clause", "mkdocs": "BSD-2-Clause", "mkdocs-material": "MIT", "mkdocstrings-python": "ISC",
+    "mutmut": "BSD-3-Clause", "nbclient": "BSD-3-Clause", "mkdocs": "BSD-2-Clause", "mkdocs-material": "MIT", "mkdocstrings-python": "ISC",
 }  # fmt: skip
 """Of what `make test` does not install, and of a package that says too little."""
 SPELT = {"GPL3+": "GPL-3.0-or-later", "APACHE": "Apache-2.0", "BSD 2-Clause License": "BSD-2-Clause"}

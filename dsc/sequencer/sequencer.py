@@ -98,6 +98,7 @@ class Sequencer:
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id)
         self._open_ended = open_ended
         self._over = False
+        self._stopped: str | None = None  # the reason to end the run, from outside; not kept with its state
         self._reacts = False  # changes of knowledge are then the run's own
         self._wake_up: KnowledgeMessage | None = None  # the latest message for waiting guards
         self._until = until
@@ -204,7 +205,7 @@ class Sequencer:
 
     def _stop(self, reason: str) -> None:
         if not self._over and not self.machine.state.finished:
-            self._reactor.problem = self._reactor.problem or reason
+            self._stopped = self._stopped or reason
             self._inbox.wake()
 
     def suspend(self) -> None:
@@ -279,7 +280,7 @@ class Sequencer:
             await begin()
             self._reacts = False
             self._wake("another program")  # a resumed run may have missed a change
-            while not machine.state.finished and reactor.problem is None:
+            while not machine.state.finished and reactor.problem is None and self._stopped is None:
                 if not inbox.waiting:
                     await self._news()
                     continue
@@ -292,6 +293,8 @@ class Sequencer:
                 self._reacts = True
                 self._take(message)
                 self._reacts = False
+            if not machine.state.finished:
+                reactor.problem = reactor.problem or self._stopped
             if reactor.problem == SUSPENDED:
                 self._suspend()
         except asyncio.CancelledError:  # cancelled from outside; after a crash, this handler does not run
@@ -375,9 +378,7 @@ class Sequencer:
         return bool(done)
 
     def _expire(self) -> None:
-        reactor = self._reactor
-        reactor.problem = reactor.problem or f"the run has not ended within {self._until:,.10g} s of run time (until)"
-        self._inbox.wake()
+        self._stop(f"the run has not ended within {self._until:,.10g} s of run time (until)")
 
     def _keep_end(self) -> None:
         if self.store is not None and self.store.begun and not self.store.lost:
@@ -469,7 +470,7 @@ class Sequencer:
             return False
         if isinstance(message, SkillMessage) or isinstance(waiting[0], SkillMessage):
             return False
-        return not self.machine.state.finished and self._reactor.problem is None
+        return not self.machine.state.finished and self._reactor.problem is None and self._stopped is None
 
     def _react_and_keep(self, message: Message) -> tuple[Output, ...]:
         output = self._reactor.react(message)

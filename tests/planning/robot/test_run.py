@@ -21,6 +21,7 @@ from dsc import (
     skill,
 )
 from dsc.sequencer.clock import run_real, run_simulated
+from dsc.sequencer.run_end import SUSPENDED
 from knowledge_base import Delta, InputError, StoreError, UnknownNameError, fact
 from planning import PlanningDomain, Robot, Task
 
@@ -411,3 +412,31 @@ def test_log_records_name_the_robot_and_the_run(caplog):
     ids = run_real(main())
     caplog.handler.removeFilter(added)
     assert [(record.robot, record.run) for record in caplog.records] == [("robot", one) for one in ids]
+
+
+@pytest.mark.parametrize("steps", range(12))
+def test_a_run_that_is_suspended_at_any_record_is_resumed(steps, tmp_path):
+    """The first case is the suspension before the first step."""
+
+    async def first():
+        async with robot(tmp_path / "run.kb") as one:
+            run = one.start("(at c)")
+            seen = [0]
+
+            def count(_):
+                seen[0] += 1
+                if seen[0] == steps:
+                    run.suspend()
+
+            run.listen(count)
+            if steps == 0:
+                run.suspend()
+            assert (await run).problem == SUSPENDED
+
+    async def then():
+        async with robot(tmp_path / "run.kb") as one:
+            return await one.resume_or_start("(at c)"), done(one)
+
+    run_simulated(first())
+    end, _ = run_simulated(then())
+    assert end.reached, end.reason
