@@ -8,7 +8,7 @@ BENCH  := .venv-bench
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: house mistakes lively soak-robots soak-signals help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
+.PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
@@ -80,6 +80,12 @@ soak-robots: $(VENV)/.test   ## random small robots with faults, changes by othe
 
 soak-signals: $(VENV)/.test   ## signals at random moments of real runs with a device: is it braked, closed one time, and the run resumed? (RUNS=N FIRST=SEED)
 	$(BIN)/python tests/support/signals_soak.py $(or $(RUNS),25) $(or $(FIRST),0)
+
+soak-days: $(VENV)/.test   ## a robot with a store serves a goal a minute for simulated days: memory, file and time of each goal (DAYS=N KEEP=RUNS SEED=N)
+	$(BIN)/python tests/support/days_soak.py --days $(or $(DAYS),3) --keep $(or $(KEEP),200) --seed $(or $(SEED),0)
+
+soak-suspensions: $(VENV)/.test   ## runs suspended at random moments and resumed: is each action executed once? (CYCLES=N SEED=N)
+	$(BIN)/python tests/support/days_soak.py --suspensions $(or $(CYCLES),1000) --seed $(or $(SEED),0)
 
 lively: $(VENV)/.test   ## robots in a world that changes every half second: is each needed step carried out once? (HOURS=H SEED=N)
 	$(BIN)/python tests/support/lively_world.py --hours $(or $(HOURS),1) --seed $(or $(SEED),0)

@@ -104,6 +104,26 @@ def end(
 
 
 @app.command()
+def prune(
+    file: Store,
+    keep: Annotated[int, typer.Option(min=1, help="The number of runs to keep.")] = 100,
+    as_json: AsJson = False,
+) -> None:
+    """Delete all but the latest runs of a store, and the knowledge before them; its file becomes smaller."""
+    from dsc.runs.pruning import prune as pruned
+    from knowledge_base.store import KnowledgeBase
+
+    before = file.stat().st_size if file.exists() else 0
+    with KnowledgeBase.open(None, file) as knowledge:
+        deleted = pruned(knowledge, file, keep)
+    size = file.stat().st_size
+    if as_json:
+        print_line({"deleted": deleted, "bytes_before": before, "bytes": size})
+        return
+    typer.echo(f"{deleted} runs deleted: {size / 1000:,.0f} kB, before {before / 1000:,.0f} kB")
+
+
+@app.command()
 def check(file: Store) -> None:
     """Check that no row of a store, of runs or of knowledge, has changed since it was written; all rows are read."""
     from dsc.runs.archive import archive

@@ -16,9 +16,11 @@ from dsc.runs.tables import CHAIN, RunSnapshot, SnapshotRow, latest_snapshot, re
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.file import is_there, located, reading
-from knowledge_base.journal.integrity import NOTHING, Ends, Tip, damaged, require_link, require_sound
+from knowledge_base.journal.integrity import NOTHING, Ends, Tip, damaged, put_ends, require_link, require_sound
 
-_RUNS = "SELECT run, plot, arguments, version, header, plots, domain, digest, ended, steps, seal FROM runs ORDER BY run"
+_RUNS = """SELECT run, plot, arguments, version, header, plots, domain, digest, ended, steps, seal FROM runs
+    WHERE run > ? ORDER BY run"""
+_LAST_BUT_ONE = "SELECT run, steps, seal FROM runs ORDER BY run DESC LIMIT 1 OFFSET 1"
 _STEPS = """SELECT place, run, number, steps.time, before, version, serials, message, configuration, change, records,
     knowledge, steps.digest, changes.digest FROM steps LEFT JOIN changes USING (version)"""
 _DIGEST = "SELECT digest FROM steps WHERE place = ?"
@@ -80,6 +82,37 @@ class StepRow:
     records: tuple[Record, ...]
 
 
+class Pruned(NamedTuple):
+    """The end of the runs that were deleted, or that a reader skips; the first run of the store follows it.
+
+    Attributes:
+        run: the number of the last such run.
+        place: the place of its last macrostep.
+        serials: the last serial number that it has used.
+        seal: the digest of its end.
+    """
+
+    run: int = 0
+    place: int = 0
+    serials: int = 0
+    seal: bytes = NOTHING
+
+    @staticmethod
+    def read(ends: Ends) -> Pruned:
+        """Return what `write` has recorded in a store; by default that no run was deleted."""
+        run, place, serials = (ends.tips.get(name) for name in _PRUNED)
+        if run is None or place is None or serials is None:
+            return Pruned()
+        return Pruned(run.rows, place.rows, serials.rows, run.digest)
+
+    def write(self, connection: sqlite3.Connection) -> None:
+        """Record it in the store, in the table of the ends of chains."""
+        put_ends(connection, [(name, Tip(count, self.seal)) for name, count in zip(_PRUNED, self[:3], strict=True)])
+
+
+_PRUNED = "pruned run", "pruned step", "pruned serial"
+
+
 class _StoredStep(NamedTuple):
     """The stored row of a macrostep; `made` is the stored digest of the knowledge version that it made."""
 
@@ -104,17 +137,23 @@ class RunArchive:
 
     The archive checks each row of runs and macrosteps by its digest. For a row that differs, methods raise
     `DamagedStoreError` with the row's name.
+
+    Args:
+        connection: reads the store.
+        path: the store.
+        latest: whether only the last run is read; else each run's row is, which takes longer in a store of many runs.
     """
 
-    def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
+    def __init__(self, connection: sqlite3.Connection, path: Path, *, latest: bool = False) -> None:
         self.path = path
+        self._latest = latest
         self.connection = connection
         self._forms: dict[str, Any] = {}
         self._runs: list[RunRow] | None = None
         self._worlds: dict[int, bytes] | None = None
 
     def runs(self) -> list[RunRow]:
-        """Return all runs in order; the table is read only at the first call."""
+        """Return all runs in order, or the last one; the table is read only at the first call."""
         if self._runs is None:
             self._runs = self._read_runs()
         return list(self._runs)
@@ -125,7 +164,7 @@ class RunArchive:
         for one in reversed(found):
             if number in (None, one.number):
                 return one
-        there = f"there are {len(found)}" if found else "there is none"
+        there = f"there are {found[0].number} to {found[-1].number}" if found else "there is none"
         raise StoreError(f"there is no run {number or 1}; {there}", place=Place(str(self.path)))
 
     def steps(self, run: int) -> Iterator[StepRow]:
@@ -160,7 +199,8 @@ class RunArchive:
 
     def serials_before(self, run: int) -> int:
         """Return the last serial number that the earlier runs have used, so that all action ids in a store differ."""
-        return self.last(run - 1).serials if run > 1 else 0
+        pruned = Pruned.read(Ends(self.connection, self.path))
+        return pruned.serials if run == pruned.run + 1 else self.last(run - 1).serials
 
     def form(self, digest: str) -> Any:
         """Return the plot of that hash, as data; repeated calls return one object."""
@@ -220,8 +260,11 @@ class RunArchive:
     def _read_runs(self) -> list[RunRow]:
         runs: list[RunRow] = []
         (last,) = self.connection.execute("SELECT coalesce(max(place), 0) FROM steps").fetchone()
-        first, seal, unfinished = 0, NOTHING, False
-        for number, (*begun, own, ended, steps, found) in enumerate(self.connection.execute(_RUNS), 1):
+        ends = Ends(self.connection, self.path)
+        before = self._earlier() or Pruned.read(ends)
+        first, seal, unfinished = before.place, before.seal, False
+        rows = self.connection.execute(_RUNS, (before.run,))
+        for number, (*begun, own, ended, steps, found) in enumerate(rows, before.run + 1):
             name = f"run {number}"
             digest = require_link(self.path, name, own, (seal,), *begun)
             if begun[0] != number or unfinished:
@@ -240,10 +283,14 @@ class RunArchive:
             first = runs[-1].last
         if first != last:
             raise damaged(self.path, f"the run of macrosteps after place {first} of the table 'steps' is missing")
-        ends = Ends(self.connection, self.path)
         if CHAIN in ends.tips:
             ends.require(CHAIN, Tip(last, seal))
         return runs
+
+    def _earlier(self) -> Pruned | None:
+        """Return the end of the runs before the last one, if only that one is read."""
+        row = self.connection.execute(_LAST_BUT_ONE).fetchone() if self._latest else None
+        return None if row is None or None in row else Pruned(row[0], row[1], 0, row[2])
 
     def _with_steps(self, number: int) -> RunRow:
         run = self.run(number)
@@ -268,13 +315,14 @@ class RunArchive:
 
 
 @contextmanager
-def archive(path: Path, *, again: bool = False) -> Iterator[RunArchive]:
+def archive(path: Path, *, again: bool = False, latest: bool = False) -> Iterator[RunArchive]:
     """Open a store's runs in their present state; later writes are not visible.
 
     Args:
         path: the store.
         again: whether the store's pages were checked before. Otherwise, all pages of a store that was not closed are
             checked.
+        latest: see `RunArchive`.
 
     Raises:
         StoreError: the file is missing, not a store, damaged, or cannot be read.
@@ -284,7 +332,7 @@ def archive(path: Path, *, again: bool = False) -> Iterator[RunArchive]:
             raise StoreError("no run was ever kept in this store", place=Place(str(path)))
         if not again and not Ends(connection, path).closed:
             require_sound(connection, path)
-        yield RunArchive(connection, path)
+        yield RunArchive(connection, path, latest=latest)
 
 
 def records_of(
@@ -310,14 +358,14 @@ def has_run(path: Path) -> bool:
     if not is_there(place := located(path)):
         return False
     with reading(place) as connection:
-        return require_tables_of_runs(connection, path) and bool(RunArchive(connection, path).runs())
+        return require_tables_of_runs(connection, path) and bool(RunArchive(connection, path, latest=True).runs())
 
 
 def is_unfinished(path: Path) -> bool:
     """Return whether the file has an unfinished run; errors equal those of `has_run`."""
     if not has_run(path):
         return False
-    with archive(path) as runs:
+    with archive(path, latest=True) as runs:
         return runs.run().ended is None
 
 

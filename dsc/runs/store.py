@@ -238,8 +238,8 @@ class RunStore:
             plot, text_of(self._short(arguments)), self._knowledge.version, text_of(self._header), text_of(plots),
             text_of(self._domain),
         )  # fmt: skip
-        earlier = RunArchive(self.writing.connection, self.path)
-        serials = earlier.serials_before(len(earlier.runs()) + 1)
+        earlier = RunArchive(self.writing.connection, self.path, latest=True)
+        serials = earlier.serials_before(max((one.number for one in earlier.runs()), default=0) + 1)
         self._run = self.writing.begin(*row)
         return serials
 
@@ -310,7 +310,7 @@ class RunStore:
         Raises:
             StoreError: there is no unfinished run, or the file cannot be written.
         """
-        with archive(self.path, again=True) as runs:
+        with archive(self.path, again=True, latest=True) as runs:
             run = unfinished(runs)
         ended = {"finished": False, "problem": reason, "programming_error": None, "outputs": {}}
         with self.writing:
@@ -323,7 +323,7 @@ class RunStore:
             StoreError: there is no unfinished run, or it cannot be read.
             ChangedError: the plots or the domain differ from those with which the run began.
         """
-        with archive(self.path, again=True) as runs:  # opening the knowledge has checked the pages
+        with archive(self.path, again=True, latest=True) as runs:  # opening the knowledge has checked the pages
             run = unfinished(runs)
             require_unchanged(runs, run, library, self._domain)
             kept = read(runs, run, library)

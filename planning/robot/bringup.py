@@ -128,7 +128,7 @@ def kept_run(store: Path) -> RunRow:
     Raises:
         StoreError: the store is missing or unreadable, or has no unfinished run.
     """
-    with archive(store) as runs:
+    with archive(store, latest=True) as runs:
         return unfinished(runs)
 
 

@@ -17,13 +17,14 @@ from dsc.dynamic.library import Library
 from dsc.events import SKILL_FAILURES
 from dsc.model.plot import ActionPlot
 from dsc.profiles import configure
+from dsc.runs.pruning import prune
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import ClockKind, LoopClock
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import signatures
 from dsc.text.profiles import Profile
 from dsc.trace import Listener, Trace
-from knowledge_base.errors import InputError, SchemaError
+from knowledge_base.errors import InputError, SchemaError, StoreError
 from knowledge_base.journal.file import Durability, located
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema_compatibility import require_extension
@@ -214,6 +215,19 @@ class RobotProgram:
         if self.store is None:
             return None
         return RunStore(self.knowledge, self.store, header, self.domain.statements())
+
+    def prune(self, keep: int) -> int:
+        """Delete all but the latest `keep` runs of the store, also during a run; return the number of deleted runs.
+
+        The versions of the knowledge before the first kept run are deleted, too, and the file becomes smaller.
+
+        Raises:
+            InputError: `keep` is not a positive integer.
+            StoreError: there is no store, it has no runs, or it cannot be read or written.
+        """
+        if self.store is None:
+            raise StoreError("only a robot with a store has kept runs to prune")
+        return prune(self.knowledge, self.store, keep)
 
     def release(self) -> None:
         """Close the store and the simulated world, and terminate the processes of the default planners."""
