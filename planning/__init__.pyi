@@ -5,6 +5,8 @@ from planning.engines.planner import PlannerProcess as PlannerProcess
 from planning.engines.race import CachingPlanner as CachingPlanner
 from planning.engines.race import PlannerRace as PlannerRace
 from planning.engines.unified import from_unified as from_unified
+from planning.engines.unified import plan_from_unified as plan_from_unified
+from planning.engines.unified import plan_to_unified as plan_to_unified
 from planning.engines.unified import to_unified as to_unified
 from planning.execution.achieve import achieve_plot as achieve_plot
 from planning.execution.plan_records import why_broken as why_broken
@@ -15,12 +17,17 @@ from planning.model.plan import EngineFailed as EngineFailed
 from planning.model.plan import NoneFound as NoneFound
 from planning.model.plan import Plan as Plan
 from planning.model.plan import PlanFound as PlanFound
+from planning.model.plan import PlanningOutcome as PlanningOutcome
 from planning.model.plan import PlanStep as PlanStep
 from planning.model.plan import ProvenUnsolvable as ProvenUnsolvable
 from planning.model.plan import TimedOut as TimedOut
 from planning.model.plan import Timing as Timing
+from planning.model.plan import Unsupported as Unsupported
+from planning.model.problem import GroundAction as GroundAction
+from planning.model.problem import Problem as Problem
 from planning.model.problem import UnsupportedActionError as UnsupportedActionError
 from planning.model.problem import UnsupportedGoalError as UnsupportedGoalError
+from planning.model.problem import WrongPlan as WrongPlan
 from planning.ordering.causal_tracing import deordered as deordered
 from planning.ordering.partial_order import why as why
 from planning.problem.construction import build_problem as build_problem

@@ -6,15 +6,19 @@ unified-planning takes a second, so other modules import this module only when t
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from unified_planning.exceptions import UPException
 from unified_planning.io import PDDLReader, PDDLWriter
 from unified_planning.model import Problem as UpProblem
+from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, TimeTriggeredPlan
+from unified_planning.plans import Plan as UpPlan
 
 from knowledge_base.errors import InputError
 from knowledge_base.pddl import Metric, ProblemText, read_problem
 from planning.model.domain import PlanningDomain
+from planning.model.plan import Plan, PlanStep, Timing
 from planning.problem.operators import TOTAL_COST
 
 if TYPE_CHECKING:
@@ -25,23 +29,77 @@ if TYPE_CHECKING:
 def from_unified(problem: UpProblem) -> tuple[PlanningDomain, ProblemText]:
     """Return a domain, and a problem text with initial state and goal, for a problem of unified-planning.
 
-    Names are in lower case, and differ from the original names where PDDL reserves a word.
+    Names are in lower case, and differ from the original names where PDDL reserves a word. `plan_to_unified` returns
+    plans with the original names.
 
     Raises:
         InputError: PDDL cannot express a part of the problem.
         UnsupportedConstructError: no engine of this project supports a part of the problem.
     """
-    if not isinstance(problem, UpProblem):
-        raise InputError(f"from_unified takes a Problem of unified-planning, not {type(problem).__name__}")
-    name = problem.name or "problem"
-    try:
-        writer = PDDLWriter(problem)
-        texts = writer.get_domain(), writer.get_problem()
-    except (UPException, NotImplementedError, AssertionError) as error:
-        said = str(error) or type(error).__name__
-        raise InputError(f"the problem '{name}' cannot be written as PDDL: {said}") from error
+    name, (_, *texts) = problem.name or "problem", _written(problem)
     domain = PlanningDomain.parse(texts[0], f"{name} (domain)")
     return domain, read_problem(texts[1], domain.schema, f"{name} (problem)", domain.name)
+
+
+def plan_to_unified(plan: Plan, problem: UpProblem) -> UpPlan:
+    """Return a plan for the problem that `from_unified` has converted, as a plan of unified-planning.
+
+    Raises:
+        InputError: a step names no action or object of the problem, or PDDL cannot express a part of the problem.
+    """
+    writer, *_ = _written(problem)
+    steps = [_instance(step, problem, writer) for step in plan.steps]
+    if not plan.schedule:
+        return SequentialPlan(steps, problem.environment)
+    times = [(Fraction(one.start), Fraction(one.duration) if one.duration else None) for one in plan.schedule]
+    return TimeTriggeredPlan(
+        [(start, step, length) for (start, length), step in zip(times, steps, strict=True)], problem.environment
+    )
+
+
+def plan_from_unified(plan: UpPlan, problem: UpProblem) -> Plan:
+    """Return a plan of unified-planning for a problem, with the names that `from_unified` gives them.
+
+    A partially ordered plan becomes a sequence.
+
+    Raises:
+        InputError: the plan has another form, or PDDL cannot express a part of the problem.
+    """
+    writer, *_ = _written(problem)
+    if isinstance(plan, TimeTriggeredPlan):
+        timed = sorted(plan.timed_actions, key=lambda one: one[0])
+        schedule = [Timing(float(start), float(length or 0)) for start, _, length in timed]
+        return Plan(tuple([_step(one, writer) for _, one, _ in timed]), tuple(schedule))
+    try:
+        sequence = plan.convert_to(PlanKind.SEQUENTIAL_PLAN, problem)
+    except UPException as error:
+        raise InputError(f"a {type(plan).__name__} cannot become a sequence: {error}") from error
+    return Plan(tuple([_step(one, writer) for one in sequence.actions]))
+
+
+def _written(problem: UpProblem) -> tuple[PDDLWriter, str, str]:
+    """Return a writer, which maps names, with the text of domain and problem."""
+    if not isinstance(problem, UpProblem):
+        raise InputError(f"a conversion takes a Problem of unified-planning, not {type(problem).__name__}")
+    writer = PDDLWriter(problem)
+    try:
+        return writer, writer.get_domain(), writer.get_problem()
+    except (UPException, NotImplementedError, AssertionError) as error:
+        said = str(error) or type(error).__name__
+        raise InputError(f"the problem '{problem.name or 'problem'}' cannot be written as PDDL: {said}") from error
+
+
+def _step(instance: ActionInstance, writer: PDDLWriter) -> PlanStep:
+    args = [writer.get_pddl_name(one.object()) for one in instance.actual_parameters]
+    return PlanStep(writer.get_pddl_name(instance.action), tuple(args))
+
+
+def _instance(step: PlanStep, problem: UpProblem, writer: PDDLWriter) -> ActionInstance:
+    try:
+        action, *args = (writer.get_item_named(name) for name in (step.action, *step.args))
+        return ActionInstance(action, [problem.environment.expression_manager.ObjectExp(one) for one in args])
+    except (UPException, AssertionError, AttributeError) as error:
+        raise InputError(f"{step} is no step of the problem: {error}", found=str(step)) from error
 
 
 def to_unified(domain: PlanningDomain, world: View, goal: str | Expression, metric: Metric | None = None) -> UpProblem:

@@ -11,7 +11,7 @@ from unified_planning.plans import SequentialPlan
 from unified_planning.test.examples import get_example_problems
 
 from knowledge_base import InputError, KnowledgeBase, UnsupportedConstructError, computed
-from planning import PlanningDomain, PlanStep, from_unified, to_unified
+from planning import Plan, PlanningDomain, PlanStep, from_unified, plan_from_unified, plan_to_unified, to_unified
 
 up.get_environment().credits_stream = None
 EXAMPLES = get_example_problems()
@@ -138,3 +138,41 @@ def test_a_computed_predicate_is_no_pddl() -> None:
     domain = PlanningDomain.parse(text, computed=[close])
     with pytest.raises(InputError, match="computes the predicate 'close'"):
         domain.to_pddl()
+
+
+def _all_plans():
+    for name, example in EXAMPLES.items():
+        for number, plan in enumerate(example.valid_plans):
+            yield pytest.param(example.problem, plan, id=f"{name} {number}")
+
+
+@pytest.mark.parametrize(("problem", "plan"), list(_all_plans()))
+def test_their_plans_are_plans_here_and_the_same_back_again(problem, plan) -> None:
+    try:
+        ours = plan_from_unified(plan, problem)
+    except InputError as error:
+        assert any(words in str(error) for words in (*BEYOND, "cannot become a sequence", "cannot be written as PDDL"))  # noqa: PT017
+        return
+    back = plan_to_unified(ours, problem)
+    if isinstance(plan, SequentialPlan):
+        assert back == plan
+    assert plan_from_unified(back, problem) == ours
+
+
+def test_a_plan_for_a_renamed_problem_has_the_original_names() -> None:
+    problem = up.Problem("move")
+    place = up.UserType("Place")
+    at = problem.add_fluent("at", up.BoolType(), default_initial_value=False, p=place)
+    move = up.InstantaneousAction("Forall", p=place)
+    move.add_effect(at(move.p), True)
+    problem.add_action(move)
+    hall = problem.add_object("The Hall", place)
+    problem.add_goal(at(hall))
+    domain, start = from_unified(problem)
+    (name,) = domain.actions
+    (thing,) = start.objects
+    plan = Plan((PlanStep(name, (thing,)),))
+    assert (name, thing) != ("Forall", "The Hall")
+    assert str(plan_to_unified(plan, problem).actions[0]) == "Forall(The Hall)"
+    with pytest.raises(InputError, match=r"\(fly the_hall\) is no step of the problem"):
+        plan_to_unified(Plan((PlanStep("fly", ("the_hall",)),)), problem)
