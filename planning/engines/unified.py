@@ -99,7 +99,7 @@ def _instance(step: PlanStep, problem: UpProblem, writer: PDDLWriter) -> ActionI
         action, *args = (writer.get_item_named(name) for name in (step.action, *step.args))
         return ActionInstance(action, [problem.environment.expression_manager.ObjectExp(one) for one in args])
     except (UPException, AssertionError, AttributeError) as error:
-        raise InputError(f"{step} is no step of the problem: {error}", found=str(step)) from error
+        raise InputError(f"{step} is not a step of the problem: {error}", found=str(step)) from error
 
 
 def to_unified(domain: PlanningDomain, world: View, goal: str | Expression, metric: Metric | None = None) -> UpProblem:

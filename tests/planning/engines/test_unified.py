@@ -174,5 +174,5 @@ def test_a_plan_for_a_renamed_problem_has_the_original_names() -> None:
     plan = Plan((PlanStep(name, (thing,)),))
     assert (name, thing) != ("Forall", "The Hall")
     assert str(plan_to_unified(plan, problem).actions[0]) == "Forall(The Hall)"
-    with pytest.raises(InputError, match=r"\(fly the_hall\) is no step of the problem"):
+    with pytest.raises(InputError, match=r"\(fly the_hall\) is not a step of the problem"):
         plan_to_unified(Plan((PlanStep("fly", ("the_hall",)),)), problem)
