@@ -24,7 +24,7 @@ from mkdocs.structure.pages import Page
 from dsc.text.plot_files import json_schema
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("dsc", "dsc.testing", "planning", "knowledge_base")
+PACKAGES = ("dsc", "dsc.testing", "dsc.wire", "planning", "knowledge_base")
 FIXED = {"README.md": "index.md"}
 PROJECT = ("dsc/viewer/PROTOCOL.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
 """Files of the checkout with an entry in the navigation."""

@@ -7,17 +7,12 @@ from dsc.chance import uniform as uniform
 from dsc.components.assembly import component_of as component_of
 from dsc.components.component import ALWAYS as ALWAYS
 from dsc.components.component import Component as Component
-from dsc.components.endpoint import Endpoint as Endpoint
-from dsc.components.endpoint import LocalTransport as LocalTransport
-from dsc.components.heartbeat import Heartbeat as Heartbeat
-from dsc.components.host import Host as Host
 from dsc.components.life_cycle import Life as Life
 from dsc.components.parameters import Parameters as Parameters
 from dsc.components.parameters import parameter as parameter
 from dsc.components.ports import event as event
 from dsc.components.ports import query as query
 from dsc.components.ports import takes as takes
-from dsc.components.remote import RemoteComponent as RemoteComponent
 from dsc.components.streams import Push as Push
 from dsc.components.streams import Stream as Stream
 from dsc.dynamic.library import Library as Library

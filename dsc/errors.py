@@ -64,6 +64,14 @@ class NotAliveError(SkillError):
     """A required component is not alive; the message has the reason."""
 
 
+class NoAnswerError(SkillError):
+    """No answer arrived in time: the other endpoint has ended, is late, or is unreachable."""
+
+
+class RefusedError(SkillError):
+    """The other endpoint could not execute a call; the message has its reason."""
+
+
 class PreemptedError(SkillError):
     """A skill with a higher priority, which `by` names, has taken the component at its host."""
 

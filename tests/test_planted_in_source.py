@@ -17,9 +17,7 @@ import pytest
 
 from dsc.calls import SkillCall, Status
 from dsc.components.component import Component
-from dsc.components.endpoint import Endpoint, LocalTransport, encoded
-from dsc.components.host import Host, HostedActions
-from dsc.components.remote import RemoteComponent
+from dsc.components.frames import encoded
 from dsc.dynamic.library import Library
 from dsc.outcomes import Outcome
 from dsc.runs.store import RunStore
@@ -28,6 +26,9 @@ from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.text.plot_files import parse_plot
 from dsc.trace import Trace
+from dsc.wire.endpoint import Endpoint, LocalTransport
+from dsc.wire.host import Host, HostedActions
+from dsc.wire.remote import RemoteComponent
 from knowledge_base import Delta, Fact, KnowledgeBase, Schema, StoreError
 from knowledge_base.journal import history, journal
 from knowledge_base.journal.history import MemoryHistory

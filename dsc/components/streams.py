@@ -9,8 +9,9 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
-from dsc.components.endpoint import NoAnswerError, encoded
+from dsc.components.frames import encoded
 from dsc.components.life_cycle import Life, LifeCycle
+from dsc.errors import NoAnswerError
 from dsc.loop_calls import LoopCalls
 from dsc.model.ranges import Range
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError

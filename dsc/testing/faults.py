@@ -21,7 +21,6 @@ from typing import Any, NoReturn, TypeVar
 from dsc.calls import SkillCall
 from dsc.chance import choose, uniform
 from dsc.components.component import Component
-from dsc.components.endpoint import LocalTransport
 from dsc.components.life_cycle import Life, LifeCycle
 from dsc.engine.steps import SendLater, Start, Step
 from dsc.errors import SkillError
@@ -29,6 +28,7 @@ from dsc.events import Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.outcomes import Outcome
 from dsc.sequencer.sequencer import Sequencer
+from dsc.wire.endpoint import LocalTransport
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 

@@ -23,21 +23,21 @@ import pytest
 from dsc.calls import SkillCall
 from dsc.components.assembly import Wiring
 from dsc.components.component import Component
-from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError, Transport
-from dsc.components.heartbeat import BEAT, SILENCE, Heartbeat
-from dsc.components.host import Host
 from dsc.components.life_cycle import Life
 from dsc.components.ports import event, query, takes
-from dsc.components.publication import Publisher, Subscription
-from dsc.components.remote import RemoteComponent
 from dsc.components.streams import Push, Stream
-from dsc.errors import NotAliveError, ProgrammingError
+from dsc.errors import NoAnswerError, NotAliveError, ProgrammingError, RefusedError
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
 from dsc.supervision.activation import ComponentActivation
 from dsc.supervision.component_registry import ComponentRegistry
 from dsc.supervision.skill_dependencies import SkillDependencies
+from dsc.wire.endpoint import Endpoint, Transport
+from dsc.wire.heartbeat import BEAT, SILENCE, Heartbeat
+from dsc.wire.host import Host
+from dsc.wire.publication import Publisher, Subscription
+from dsc.wire.remote import RemoteComponent
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 

@@ -36,7 +36,7 @@ def from_unified(problem: UpProblem) -> tuple[PlanningDomain, ProblemText]:
         InputError: PDDL cannot express a part of the problem.
         UnsupportedConstructError: no engine of this project supports a part of the problem.
     """
-    name, (_, *texts) = problem.name or "problem", _written(problem)
+    name, (_, *texts) = problem.name or "problem", _write(problem)
     domain = PlanningDomain.parse(texts[0], f"{name} (domain)")
     return domain, read_problem(texts[1], domain.schema, f"{name} (problem)", domain.name)
 
@@ -47,7 +47,7 @@ def plan_to_unified(plan: Plan, problem: UpProblem) -> UpPlan:
     Raises:
         InputError: a step names no action or object of the problem, or PDDL cannot express a part of the problem.
     """
-    writer, *_ = _written(problem)
+    writer, *_ = _write(problem)
     steps = [_instance(step, problem, writer) for step in plan.steps]
     if not plan.schedule:
         return SequentialPlan(steps, problem.environment)
@@ -65,7 +65,7 @@ def plan_from_unified(plan: UpPlan, problem: UpProblem) -> Plan:
     Raises:
         InputError: the plan has another form, or PDDL cannot express a part of the problem.
     """
-    writer, *_ = _written(problem)
+    writer, *_ = _write(problem)
     if isinstance(plan, TimeTriggeredPlan):
         timed = sorted(plan.timed_actions, key=lambda one: one[0])
         schedule = [Timing(float(start), float(length or 0)) for start, _, length in timed]
@@ -77,7 +77,7 @@ def plan_from_unified(plan: UpPlan, problem: UpProblem) -> Plan:
     return Plan(tuple([_step(one, writer) for one in sequence.actions]))
 
 
-def _written(problem: UpProblem) -> tuple[PDDLWriter, str, str]:
+def _write(problem: UpProblem) -> tuple[PDDLWriter, str, str]:
     """Return a writer, which maps names, with the text of domain and problem."""
     if not isinstance(problem, UpProblem):
         raise InputError(f"a conversion takes a Problem of unified-planning, not {type(problem).__name__}")

@@ -19,8 +19,6 @@ from domains.clean_up_table.bringup import bundle, deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.calls import SkillCall
 from dsc.components.component import Component
-from dsc.components.endpoint import LocalTransport
-from dsc.components.host import Host
 from dsc.drawing import draw
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
@@ -49,6 +47,8 @@ from dsc.viewer.queries import PageQueries
 from dsc.viewer.record_sources import records_of
 from dsc.viewer.records import RecordLog, read_trace
 from dsc.viewer.server import Viewer
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
 from knowledge_base import InputError, KnowledgeBase, Schema
 from knowledge_base.language.checking.check import check, check_effect
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text

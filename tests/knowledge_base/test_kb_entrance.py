@@ -100,7 +100,6 @@ def test_who_asks_a_fact_is_told_to_write_it_as_text(kb):
     "delta",
     [
         None,
-        "(heavy cup2)",
         fact("heavy", "cup2"),
         Delta(added=[fact("heavy", "cup2")]),  # type: ignore[arg-type]
         Delta(added=fact("heavy", "cup2")),  # type: ignore[arg-type]

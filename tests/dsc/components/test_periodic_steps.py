@@ -9,11 +9,11 @@ from dsc_runs import ran
 
 from dsc import Component, LoopClock, Outcome, SkillCall, run_simulated, skill
 from dsc.components.assembly import require_instances
-from dsc.components.endpoint import LocalTransport
-from dsc.components.host import Host
 from dsc.components.life_cycle import Life
 from dsc.components.periodic_steps import StepCounts
-from dsc.components.remote import RemoteComponent
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
+from dsc.wire.remote import RemoteComponent
 from knowledge_base.errors import InputError
 
 

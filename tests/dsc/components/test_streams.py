@@ -11,15 +11,16 @@ from dsc_charts import plot
 
 from dsc.components.assembly import Wiring
 from dsc.components.component import ALWAYS, Component
-from dsc.components.endpoint import LocalTransport, NoAnswerError
-from dsc.components.host import Host
 from dsc.components.life_cycle import Life
 from dsc.components.streams import Push, Stream
 from dsc.dynamic.library import Library
+from dsc.errors import NoAnswerError
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema

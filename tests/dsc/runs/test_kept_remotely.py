@@ -11,10 +11,7 @@ from dsc_runs import SCHEMA
 
 from dsc import SkillCall
 from dsc.components.component import Component
-from dsc.components.endpoint import LocalTransport
-from dsc.components.host import Host
 from dsc.components.ports import event
-from dsc.components.remote import RemoteComponent
 from dsc.dynamic.library import Library
 from dsc.outcomes import Outcome
 from dsc.runs.archive import archive
@@ -23,6 +20,9 @@ from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.trace import Trace
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
+from dsc.wire.remote import RemoteComponent
 from knowledge_base.facts import Delta, Fact
 from knowledge_base.store import KnowledgeBase
 

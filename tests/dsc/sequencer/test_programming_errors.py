@@ -11,9 +11,6 @@ import pytest
 from dsc_runs import SCHEMA, Ran
 
 from dsc.components.component import Component
-from dsc.components.endpoint import LocalTransport
-from dsc.components.host import Host
-from dsc.components.remote import RemoteComponent
 from dsc.dynamic.library import Library
 from dsc.errors import SkillError
 from dsc.outcomes import Outcome
@@ -22,6 +19,9 @@ from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.text.plot_files import parse_plot
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
+from dsc.wire.remote import RemoteComponent
 from knowledge_base import KnowledgeBase, computed
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact

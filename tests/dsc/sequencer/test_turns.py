@@ -9,11 +9,11 @@ from dsc_charts import plot
 from dsc_runs import ran
 
 from dsc import Component, Event, Library, LoopClock, Outcome, Sequencer, SkillCall, Trace, skill
-from dsc.components.endpoint import LocalTransport
-from dsc.components.host import Host
-from dsc.components.remote import RemoteComponent
 from dsc.sequencer.clock import run_simulated
 from dsc.trace import Record
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
+from dsc.wire.remote import RemoteComponent
 from knowledge_base import KnowledgeBase, Schema
 
 

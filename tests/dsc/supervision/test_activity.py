@@ -9,10 +9,7 @@ from dsc_charts import plot
 from dsc_runs import ran
 
 from dsc.components.component import ALWAYS, Component
-from dsc.components.endpoint import LocalTransport
-from dsc.components.host import Host
 from dsc.components.life_cycle import Life
-from dsc.components.remote import RemoteComponent
 from dsc.dynamic.library import Library
 from dsc.engine.steps import SwitchMode
 from dsc.outcomes import Outcome
@@ -20,6 +17,9 @@ from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
 from dsc.testing.faults import LossyTransport
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
+from dsc.wire.remote import RemoteComponent
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 

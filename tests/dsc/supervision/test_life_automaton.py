@@ -13,11 +13,11 @@ from dsc_runs import ran
 
 from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, run_simulated, skill
 from dsc.components.assembly import require_instances
-from dsc.components.endpoint import LocalTransport
-from dsc.components.host import Host
 from dsc.components.life_cycle import TRANSITIONS, Life
-from dsc.components.remote import RemoteComponent
 from dsc.text.plot_files import load_plot
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
+from dsc.wire.remote import RemoteComponent
 from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.errors import InputError, UnknownNameError
 

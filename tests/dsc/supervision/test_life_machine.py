@@ -19,15 +19,15 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
 from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, skill
-from dsc.components.endpoint import LocalTransport
 from dsc.components.hooks import abandon
-from dsc.components.host import Host
 from dsc.components.life_cycle import Life
-from dsc.components.remote import RemoteComponent
 from dsc.events import Event
 from dsc.runs.store import RunStore
 from dsc.sequencer import signals
 from dsc.sequencer.clock import SimulatedEventLoop
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
+from dsc.wire.remote import RemoteComponent
 from knowledge_base import KnowledgeBase, Schema
 
 HOOKS = ["start", "on", "set", "enter", "leave", "off", "stop"]

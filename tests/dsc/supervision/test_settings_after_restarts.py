@@ -9,10 +9,10 @@ import pytest
 from dsc_charts import plot
 
 from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, run_simulated, skill
-from dsc.components.endpoint import LocalTransport
-from dsc.components.host import Host
 from dsc.components.life_cycle import Life
-from dsc.components.remote import RemoteComponent
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
+from dsc.wire.remote import RemoteComponent
 from knowledge_base import KnowledgeBase, Schema
 
 TEXT = """

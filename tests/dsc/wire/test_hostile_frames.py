@@ -14,18 +14,18 @@ from hypothesis import strategies as st
 
 from dsc import calls
 from dsc.calls import SkillCall
-from dsc.components import endpoint as endpoints
-from dsc.components import host as hosts
 from dsc.components.component import Component
-from dsc.components.endpoint import BROADCAST, Endpoint, LocalTransport, NoAnswerError, RefusedError
-from dsc.components.host import CONDITION, Host
-from dsc.components.publication import Subscription
-from dsc.components.remote import RemoteComponent
 from dsc.components.streams import Push, Stream
-from dsc.errors import ProgrammingError
+from dsc.errors import NoAnswerError, ProgrammingError, RefusedError
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.skills import skill
+from dsc.wire import endpoint as endpoints
+from dsc.wire import host as hosts
+from dsc.wire.endpoint import BROADCAST, Endpoint, LocalTransport
+from dsc.wire.host import CONDITION, Host
+from dsc.wire.publication import Subscription
+from dsc.wire.remote import RemoteComponent
 from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
 

@@ -10,13 +10,11 @@ from dsc_charts import plot
 
 from dsc import (
     Component,
-    Host,
     Library,
     LoopClock,
     Outcome,
     Parameters,
     Profile,
-    RemoteComponent,
     Sequencer,
     SkillCall,
     SkillError,
@@ -25,12 +23,13 @@ from dsc import (
     skill,
     takes,
 )
-from dsc.components.endpoint import LocalTransport
 from dsc.components.life_cycle import Life
 from dsc.profiles import configure
 from dsc.sequencer.clock import run_simulated
 from dsc.testing import LossyTransport
 from dsc.validation import validate_library
+from dsc.wire import Host, RemoteComponent
+from dsc.wire.endpoint import LocalTransport
 from knowledge_base import KnowledgeBase, Schema
 from knowledge_base.errors import InputError
 from planning.robot.bundles import shipped_by

@@ -13,8 +13,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsc.components.component import Component
-from dsc.components.endpoint import Endpoint, NoAnswerError, RefusedError
 from dsc.components.streams import Push, Receiver, Values, require_fitting
+from dsc.errors import NoAnswerError, RefusedError
+from dsc.wire.endpoint import Endpoint
 from knowledge_base.errors import InputError, described
 
 RENEWED = 1.0

@@ -15,17 +15,18 @@ from typing import Any
 
 from dsc.calls import OBSERVED, Clock, Reports, SkillCall
 from dsc.components.component import Component
-from dsc.components.endpoint import Endpoint, Transport, encoded
-from dsc.components.heartbeat import Heartbeat
+from dsc.components.frames import encoded
 from dsc.components.hooks import GRACE, abandon, cancel_once, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.parameters import Configuration
-from dsc.components.publication import HostedStreams, Publisher
 from dsc.components.turns import turn_of
 from dsc.errors import NotAliveError, PreemptedError, ProgrammingError
 from dsc.outcomes import Outcome
 from dsc.rank import ORDINARY, Rank
 from dsc.run_log import run_logger
+from dsc.wire.endpoint import Endpoint, Transport
+from dsc.wire.heartbeat import Heartbeat
+from dsc.wire.publication import HostedStreams, Publisher
 from knowledge_base.errors import InputError
 from knowledge_base.exchange import delta_form, delta_of
 from knowledge_base.language.checking.inputs import require_delta, require_time, shown

@@ -20,8 +20,9 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from dsc.components.frames import encoded
 from dsc.components.hooks import contained
-from dsc.errors import ProgrammingError, SkillError
+from dsc.errors import NoAnswerError, ProgrammingError, RefusedError
 from knowledge_base.errors import InputError, described, text_of
 
 Answers = Callable[[str, Any], Awaitable[Any]]
@@ -46,14 +47,6 @@ MOST_CALLS = 1_000
 """Number of calls of one sender that are running, or whose answer the sender may still need."""
 _LONGEST = 1_000
 """Maximum number of characters of a `kind` or `life` in a frame."""
-
-
-class NoAnswerError(SkillError):
-    """No answer arrived in time: the other endpoint has ended, is late, or is unreachable."""
-
-
-class RefusedError(SkillError):
-    """The other endpoint could not execute a call; the message has its reason."""
 
 
 class Transport(Protocol):
@@ -104,14 +97,6 @@ class LocalTransport:
             receive = self._attached.get(address)  # an earlier receiver may have detached the address
             if receive is not None:
                 receive(sender, frame)
-
-
-def encoded(value: Any) -> bytes:
-    """Return plain data as a frame; raise `InputError` for other data."""
-    try:
-        return json.dumps(value, separators=(",", ":"), allow_nan=False).encode()
-    except (TypeError, ValueError, RecursionError) as error:
-        raise InputError(f"only plain data can be sent: {described(error, named=False)}") from None
 
 
 @dataclass(slots=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from dsc.components.component import Component
-from dsc.components.endpoint import Endpoint, LocalTransport
-from dsc.components.host import Host
-from dsc.components.publication import Publisher
 from dsc.sequencer.clock import LoopClock, run_real, run_simulated
 from dsc.testing.faults import LossyTransport
 from dsc.testing.transport_suite import TransportSuite
+from dsc.wire.endpoint import Endpoint, LocalTransport
+from dsc.wire.host import Host
+from dsc.wire.publication import Publisher
 from knowledge_base.errors import InputError
 
 

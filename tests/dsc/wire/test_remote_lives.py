@@ -8,10 +8,11 @@ import pytest
 from dsc_charts import plot
 from dsc_runs import ran as ran_here
 
-from dsc import Component, Host, Library, LoopClock, Outcome, RemoteComponent, Sequencer, SkillCall, skill
-from dsc.components.endpoint import LocalTransport
+from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, skill
 from dsc.sequencer.clock import run_simulated
 from dsc.testing import LossyTransport
+from dsc.wire import Host, RemoteComponent
+from dsc.wire.endpoint import LocalTransport
 from knowledge_base import KnowledgeBase, Schema
 
 

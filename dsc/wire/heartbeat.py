@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Collection
 from contextlib import suppress
 from typing import Any
 
-from dsc.components.endpoint import Endpoint
+from dsc.wire.endpoint import Endpoint
 
 BEAT = 0.5
 """Seconds between heartbeats."""

@@ -17,15 +17,15 @@ from typing import Any
 from dsc.calls import Ended, SkillCall, Status
 from dsc.components.component import Component
 from dsc.components.declarations import Parameter
-from dsc.components.endpoint import AGAIN, RESOLUTION, WITHIN, Endpoint, NoAnswerError, RefusedError, Transport
-from dsc.components.heartbeat import Heartbeat
-from dsc.components.host import CONDITION, outcome_of
 from dsc.components.life_cycle import Life
 from dsc.components.parameters import Configuration, Parameters, parameters_of
-from dsc.components.publication import RemotePush, Subscription
-from dsc.errors import PreemptedError, ProgrammingError
+from dsc.errors import NoAnswerError, PreemptedError, ProgrammingError, RefusedError
 from dsc.outcomes import Outcome
 from dsc.skills import SkillSignature
+from dsc.wire.endpoint import AGAIN, RESOLUTION, WITHIN, Endpoint, Transport
+from dsc.wire.heartbeat import Heartbeat
+from dsc.wire.host import CONDITION, outcome_of
+from dsc.wire.publication import RemotePush, Subscription
 from knowledge_base.errors import InputError, described, text_of
 from knowledge_base.language.checking.inputs import require_text
 
