@@ -61,7 +61,8 @@ class SkillCall(Generic[Reported_contra]):
     """One execution of a skill; `SkillCall[Progress]` is the call of a skill that reports `Progress`.
 
     Attributes:
-        action_id: identifies this execution in its run; the id is stable across restarts.
+        action_id: identifies this execution in its run; the id is stable across restarts. In real time it contains the
+            run, and is unique.
         clock: the only clock that a skill may use.
         report: posts an intermediate event while the skill continues (e.g. progress, a perception).
         deadline: second of run time at which the skill is cancelled.
@@ -91,7 +92,7 @@ class SkillCall(Generic[Reported_contra]):
 
         In real time it is unique; in simulated time it is unique for the robot, so that traces stay comparable.
         """
-        return f"{self.run}/{self.action_id}" if self.run else self.action_id
+        return self.action_id if "/" in self.action_id or not self.run else f"{self.run}/{self.action_id}"
 
     def observe(self, observed: Delta) -> None:
         """Report observed facts immediately, before the outcome and without an event for the chart."""

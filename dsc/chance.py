@@ -16,8 +16,11 @@ _Option = TypeVar("_Option")
 
 
 def uniform(seed: int, action_id: str, purpose: str) -> float:
-    """Return a number in [0, 1), equal for equal arguments on every machine and in every process."""
-    text = f"{seed}\x1f{action_id}\x1f{purpose}".encode()
+    """Return a number in [0, 1), equal for equal arguments on every machine and in every process.
+
+    The run in an action id of real time has no influence, so that equal runs draw equally.
+    """
+    text = f"{seed}\x1f{action_id.rpartition('/')[2]}\x1f{purpose}".encode()
     digest = hashlib.blake2b(text, digest_size=8).digest()
     return (int.from_bytes(digest, "big") >> 11) / 2**53  # 53 bits: a float never rounds up to 1.0
 

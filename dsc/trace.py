@@ -1,7 +1,8 @@
 """The record of a run: one format for files, tests, listeners and the viewer (JSON lines).
 
 Every record is `{seq, t, type, cause, …}`. `t` is in seconds of run time, and `cause` is the `seq` of the record that
-led to this one. A record contains no wall time, process id or random id, so that equal runs produce equal bytes.
+led to this one. In simulated time a record contains no wall time, process id or random id, so that equal runs produce
+equal bytes. In real time, action ids contain the run.
 """
 
 from __future__ import annotations

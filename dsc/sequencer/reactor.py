@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from dsc.calls import OBSERVED
@@ -40,6 +41,13 @@ StepListener = Callable[[Step], None]
 class Reactor:
     """Executor of one macrostep for each message, in a live run and in the replay of a recorded run.
 
+    Args:
+        library: the plots.
+        knowledge: the world model.
+        trace: receives the records.
+        phases: measures the phases of a macrostep.
+        run: the run that action ids contain, so that they are unique; empty in simulated time.
+
     Attributes:
         machine: the chart's state.
         emitted: the latest outcome events of the plot, in order, see `MOST_EMITTED`.
@@ -57,9 +65,15 @@ class Reactor:
     """
 
     def __init__(
-        self, library: Library, knowledge: KnowledgeBase, trace: Trace, phases: PhaseWatch | None = None
+        self,
+        library: Library,
+        knowledge: KnowledgeBase,
+        trace: Trace,
+        phases: PhaseWatch | None = None,
+        run: str = "",
     ) -> None:
         self._phases = phases or PhaseWatch()
+        self._run = run
         self.library = library
         self.knowledge = knowledge
         self.machine = Machine(library)
@@ -259,6 +273,8 @@ class Reactor:
 
     def _commit(self, step: Step) -> tuple[Output, ...]:
         """Record the step and apply its changes of knowledge; return its outputs, which may then be dispatched."""
+        if self._run and step.output:
+            step = step._replace(output=tuple([_of_run(one, self._run) for one in step.output]))
         if self.listeners:
             self._tell(step)
         self.tracer.step(step)
@@ -353,3 +369,8 @@ def _latest(events: tuple[Event, ...]) -> tuple[Event, ...]:
         return events
     latest = {event.name: index for index, event in enumerate(events)}
     return tuple(event for index, event in enumerate(events) if index >= surplus or latest[event.name] == index)
+
+
+def _of_run(output: Output, run: str) -> Output:
+    """Return the output; the start of a skill has the run in its action id."""
+    return replace(output, action_id=f"{run}/{output.action_id}") if isinstance(output, Start) else output

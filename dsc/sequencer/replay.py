@@ -95,7 +95,8 @@ class _ReplayedRun:
         self._past = past
         start = Version(past.state(row.version, past.newest), row.version, 0.0)
         self._knowledge = KnowledgeBase(past.schema, lambda: 0.0, MemoryHistory(start))
-        self._reactor = Reactor(library, self._knowledge, Trace(lambda: 0.0))
+        of_run = str(row.header.get("action_ids", ""))
+        self._reactor = Reactor(library, self._knowledge, Trace(lambda: 0.0), run=of_run)
         self._started: dict[str, Start] = {}
 
     def take(self, step: StepRow) -> Divergence | None:

@@ -88,7 +88,7 @@ class Sequencer:
         self.library = library
         self.knowledge = knowledge
         self.trace = trace or Trace(clock.now)
-        self._reactor: Reactor = Reactor(library, knowledge, self.trace, phases)
+        self._reactor: Reactor = Reactor(library, knowledge, self.trace, phases, run="" if clock.simulated else run_id)
         self.clock = clock
         self.store = store
         self.on_signal: OnSignal = "suspend"

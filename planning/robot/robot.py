@@ -165,6 +165,8 @@ class Robot(RobotProgram):
         limit = _limit(until, bounded=clock.simulated and not open_ended)
         number = self._new_id(simulated=clock.simulated)
         how = {"id": number, "simulated": clock.simulated, "open_ended": open_ended, "until": limit}
+        if not clock.simulated:
+            how["action_ids"] = number
         store = self.run_store({**(header or {}), **how})
         sequencer, planning = self.wire(number, clock, 0, store, open_ended=open_ended, until=limit)
         if prepare is not None:

@@ -37,7 +37,11 @@ def test_a_new_project_runs_and_has_no_findings(project):
 
 def test_its_test_passes(project):
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:asyncio"], capture_output=True, text=True, check=False, cwd=project
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:asyncio"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=project,
     )
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     assert "7 passed" in done.stdout

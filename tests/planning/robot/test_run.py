@@ -18,6 +18,7 @@ from dsc import (
     is_unfinished,
     parse_plot,
     primitive_plot,
+    replay,
     skill,
 )
 from dsc.sequencer.clock import run_real, run_simulated
@@ -440,3 +441,51 @@ def test_a_run_that_is_suspended_at_any_record_is_resumed(steps, tmp_path):
     run_simulated(first())
     end, _ = run_simulated(then())
     assert end.reached, end.reason
+
+
+def test_action_ids_in_real_time_are_unique_and_contain_the_run():
+    async def ids():
+        found = []
+        for _ in range(2):
+            async with robot(seconds=0.01) as one:
+                one.listen(lambda record: found.append(record.data["id"]) if is_start(record) else None)
+                for goal in ("(at b)", "(at c)"):
+                    run = one.start(goal)
+                    assert await run
+                    assert any(str(seen).startswith(f"{run.id}/a") for seen in found)
+        return found
+
+    found = run_real(ids())
+    assert len(found) == len(set(found))
+
+
+def test_action_ids_in_simulated_time_are_without_the_run():
+    found = []
+    made = robot(clock="simulated")
+    made.listen(lambda record: found.append(record.data["id"]) if is_start(record) else None)
+    assert made.achieve("(at c)")
+    assert found
+    assert all("/" not in one for one in found)
+
+
+def is_start(record):
+    return record.type == "action" and record.data["action"] == "start"
+
+
+def test_a_run_in_real_time_is_kept_resumed_and_replayed_with_its_ids(tmp_path):
+    async def first():
+        async with robot(tmp_path / "run.kb", seconds=0.02) as one:
+            run = one.start("(at c)")
+            async for record in run.records():
+                if record.type == "action":
+                    return run.id
+        raise AssertionError
+
+    async def then():
+        async with robot(tmp_path / "run.kb", seconds=0.02) as one:
+            run = one.resume_or_start("(at c)")
+            assert (await run).reached
+            return run.id
+
+    assert run_real(first()) == run_real(then())
+    assert replay(tmp_path / "run.kb").divergence is None
