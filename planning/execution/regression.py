@@ -93,15 +93,32 @@ def regressed(e: Expression, changes: Sequence[Leaf]) -> Expression:
 
 
 def conjunction(parts: Iterable[Expression]) -> Expression:
-    """Return the simplified conjunction of the conditions."""
+    """Return the simplified conjunction of the conditions: `(not p)` of an equality `p` removes `p` from an `or`.
+
+    A long plan would otherwise nest a condition once for each step.
+    """
     kept = dict.fromkeys(inner for part in parts for inner in conjuncts(part))
-    return FALSE if FALSE in kept else _alone(And(tuple(kept)))
+    if FALSE in kept:
+        return FALSE
+    different = {one.body for one in kept if isinstance(one, Not) and _is_equality(one.body)}
+    for one in kept if different else ():
+        if isinstance(one, Or) and not different.isdisjoint(one.parts):
+            rest = disjunction(part for part in one.parts if part not in different)
+            return conjunction(rest if other is one else other for other in kept)
+    return _alone(And(tuple(kept)))
 
 
 def disjunction(parts: Iterable[Expression]) -> Expression:
-    """Return the simplified disjunction of the conditions."""
+    """Return the simplified disjunction of the conditions: an equality `p` removes `(not p)` from an `and`."""
     kept = dict.fromkeys(inner for part in parts for inner in (part.parts if isinstance(part, Or) else (part,)))
-    return TRUE if TRUE in kept else _alone(Or(tuple(kept)))
+    if TRUE in kept:
+        return TRUE
+    equal = set(filter(_is_equality, kept))
+    for one in kept if equal else ():
+        if isinstance(one, And) and any(isinstance(part, Not) and part.body in equal for part in one.parts):
+            rest = conjunction(part for part in one.parts if not (isinstance(part, Not) and part.body in equal))
+            return disjunction(rest if other is one else other for other in kept)
+    return _alone(Or(tuple(kept)))
 
 
 def negation(e: Expression) -> Expression:
@@ -109,6 +126,14 @@ def negation(e: Expression) -> Expression:
     if isinstance(e, Not):
         return e.body
     return FALSE if e == TRUE else TRUE if e == FALSE else Not(e)
+
+
+def _is_equality(e: Expression) -> bool:
+    """Return whether the condition consists of equalities of variables and constants, which no world leaves open."""
+    if isinstance(e, And):
+        return bool(e.parts) and all(map(_is_equality, e.parts))
+    plain = (Variable, Constant)
+    return isinstance(e, Comparison) and e.operator == "=" and isinstance(e.left, plain) and isinstance(e.right, plain)
 
 
 def _alone(e: And | Or) -> Expression:

@@ -10,11 +10,13 @@ At every step, a search chooses the next condition: the one with the fewest matc
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import chain
+from itertools import chain, groupby
 from operator import itemgetter
+from typing import cast
 
 from knowledge_base.errors import InputError, UserCodeError
 from knowledge_base.facts import Fact
@@ -44,6 +46,7 @@ from knowledge_base.language.evaluation.terms import (
     Test,
     compile_arguments,
     compile_comparison,
+    compile_membership,
     compile_term,
 )
 from knowledge_base.language.evaluation.world_protocol import World
@@ -51,6 +54,7 @@ from knowledge_base.language.syntax.expression import (
     And,
     Atom,
     Comparison,
+    Constant,
     Exists,
     Expression,
     Forall,
@@ -82,9 +86,9 @@ def compile_test(e: Expression, schema: Vocabulary) -> Test:
         case Not(body):
             test = _negation(compile_test(body, schema))
         case And(parts):
-            test = _all([compile_test(p, schema) for p in parts])
+            test = _all(_tests(parts, schema, _is_difference, negated=True))
         case Or(parts):
-            test = _any([compile_test(p, schema) for p in parts])
+            test = _any(_tests(parts, schema, _is_equality, negated=False))
         case Imply(premise, conclusion):
             test = _any([_negation(compile_test(premise, schema)), compile_test(conclusion, schema)])
         case Exists():
@@ -198,6 +202,52 @@ def _type_test(get: Getter, types: tuple[str, ...], schema: Vocabulary) -> Test:
         return isinstance(value, str) and world.type_of(value) in allowed
 
     return test
+
+
+def _tests(
+    parts: tuple[Expression, ...], schema: Vocabulary, joins: Callable[[Expression], bool], *, negated: bool
+) -> list[Test]:
+    """Return the tests of the parts; one test has all neighbouring equalities of one variable with plain terms.
+
+    A plan's condition may except hundreds of objects, `(or (= ?s web1) (= ?s web2) ...)`.
+    """
+    tests: list[Test] = []
+    for joined, group in groupby(parts, joins):
+        some = list(group)
+        if joined and len(some) > 1:
+            equalities = [one.body if isinstance(one, Not) else one for one in some]
+            found = _equalities(cast("list[Comparison]", equalities), schema)
+            tests += [_negation(one) for one in found] if negated else found
+        else:
+            tests += [compile_test(one, schema) for one in some]
+    return tests
+
+
+def _equalities(equalities: list[Comparison], schema: Vocabulary) -> list[Test]:
+    names = Counter(side.name for one in equalities for side in (one.left, one.right) if isinstance(side, Variable))
+    if not names:
+        return [compile_comparison(one, schema) for one in equalities]
+    name, _ = names.most_common(1)[0]
+    others: list[Variable | Constant] = []
+    rest: list[Test] = []
+    for one in equalities:
+        sides = cast("tuple[Variable | Constant, Variable | Constant]", (one.left, one.right))
+        own = [isinstance(side, Variable) and side.name == name for side in sides]
+        if any(own):
+            others.append(sides[own.index(True) - 1])
+        else:
+            rest.append(compile_comparison(one, schema))
+    return [compile_membership(name, others), *rest]
+
+
+def _is_equality(e: Expression) -> bool:
+    """Return whether the expression is an equality of variables or constants, which cannot raise an error."""
+    plain = (Variable, Constant)
+    return isinstance(e, Comparison) and e.operator == "=" and isinstance(e.left, plain) and isinstance(e.right, plain)
+
+
+def _is_difference(e: Expression) -> bool:
+    return isinstance(e, Not) and _is_equality(e.body)
 
 
 def _negation(test: Test) -> Test:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from operator import itemgetter
 from typing import cast
@@ -86,6 +86,8 @@ def compile_comparison(e: Comparison, schema: Vocabulary) -> Test:
 
     The returned function raises `SchemaError` if one of the other operators compares a value that is not a number.
     """
+    if e.operator == "=" and isinstance(e.left, Variable) and isinstance(e.right, Variable | Constant):
+        return compile_membership(e.left.name, [e.right])
     left, right = compile_term(e.left, schema), compile_term(e.right, schema)
     if e.operator == "=":
         return lambda world, b: same(left(world, b), right(world, b))
@@ -100,6 +102,21 @@ def compile_comparison(e: Comparison, schema: Vocabulary) -> Test:
     def test(world: World, b: Bindings) -> bool:
         first = as_number(left(world, b), name, places[0])
         return ordered(first, as_number(right(world, b), name, places[1]))
+
+    return test
+
+
+def compile_membership(name: str, terms: Sequence[Variable | Constant]) -> Test:
+    """Return a function that tests whether the value of a variable equals the value of one of the terms."""
+    names = tuple([term.name for term in terms if isinstance(term, Variable)])
+    values = tuple([term.value for term in terms if isinstance(term, Constant)])
+
+    def test(_: World, bindings: Bindings) -> bool:
+        value = bindings[name]
+        for other in names:  # a generator costs twice the time here
+            if same(value, bindings[other]):
+                return True
+        return bool(values) and any(same(value, given) for given in values)
 
     return test
 

@@ -7,7 +7,7 @@ unary predicate. Equality ignores places, so that the same text at two places re
 from __future__ import annotations
 
 import itertools
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field, replace
 from typing import overload
 
@@ -161,30 +161,33 @@ KEYWORDS = ("and", "or", "not", "imply", "exists", "forall", *COMPARISONS)
 """The words at the start of a condition that are not predicates."""
 
 
-def variables_in_order(e: Expression | Term) -> Iterator[str]:
-    """Yield the names of the free variables from left to right, with repetitions."""
-    match e:
-        case Variable(name):
-            yield name
-        case Constant():
-            return
-        case Exists(variables, body) | Forall(variables, body):
-            bound = {v.name for v in variables}
-            yield from (name for name in variables_in_order(body) if name not in bound)
-        case _:
-            for part in parts_of(e):
-                yield from variables_in_order(part)
+def variables_in_order(e: Expression | Term) -> list[str]:
+    """Return the names of the free variables from left to right, with repetitions."""
+    found: list[str] = []
+    _add_variables(e, frozenset(), found)
+    return found
+
+
+def _add_variables(e: Expression | Term, bound: frozenset[str], found: list[str]) -> None:
+    if isinstance(e, Variable):
+        if e.name not in bound:
+            found.append(e.name)
+    elif isinstance(e, Exists | Forall):
+        _add_variables(e.body, bound.union([v.name for v in e.variables]), found)
+    else:
+        for part in parts_of(e):
+            _add_variables(part, bound, found)
 
 
 def parts_of(e: Expression | Term) -> tuple[Expression | Term, ...]:
     """Return the expressions and terms that `e` directly consists of."""
-    match e:
-        case Atom(_, args) | Call(_, args) | Arithmetic(_, args):
-            return args
-        case And(parts) | Or(parts):
-            return parts
-        case Not(body) | Exists(_, body) | Forall(_, body):
-            return (body,)
+    match e:  # the most frequent forms first
+        case Atom() | Call() | Arithmetic():
+            return e.args
+        case And() | Or():
+            return e.parts
+        case Not() | Exists() | Forall():
+            return (e.body,)
         case Imply(first, second) | Comparison(_, first, second):
             return (first, second)
         case _:
