@@ -374,6 +374,7 @@ def primitive_plot(
     implements: str | None = None,
     when: str | None = None,
     effects: Literal["observed", "assumed"] = "observed",
+    within: float | None = None,
 ) -> ActionPlot:
     """Return a plot that triggers the skill, completes after outcome `done`, and emits every other outcome.
 
@@ -387,9 +388,11 @@ def primitive_plot(
         implements: the planning action that the plot executes; plot and action must have equal parameter names.
         when: the condition under which the plot fits as a candidate.
         effects: whether the skill observes the action's effects, or the executive assumes them after `done`.
+        within: seconds after which the skill is cancelled; by default those of the skill.
 
     Raises:
         UnknownNameError: the skill has no outcome `done`.
+        InputError: `within` is not a positive number of seconds.
         SchemaError: an outcome of the skill has the name of an event that only the executive fires.
     """
     refuse_reserved(f"{skill.component}.{skill.name}", skill.outcomes)
@@ -400,7 +403,12 @@ def primitive_plot(
     for event, attributes in others.items():
         on[event] = {"to": "ended", "emit": event, "with": {key: f"?event.{key}" for key in attributes}}
     parameters = {key: _parameter(skill, key) for key in skill.parameters if _can_be_given(skill, key)}
-    trigger = {"trigger": f"{skill.component}.{skill.name}", "with": {key: f"?{key}" for key in parameters}}
+    trigger: dict[str, Any] = {
+        "trigger": f"{skill.component}.{skill.name}", "with": {key: f"?{key}" for key in parameters}
+    }  # fmt: skip
+    if within is not None:
+        _require_limit(within, unlimited=False)
+        trigger["within"] = within
     states: dict[str, Any] = {"execute": {"entry": trigger, "on": on}, "completed": {"final": True}}
     if others:
         states["ended"] = {"final": True}

@@ -225,7 +225,9 @@ class View:
 
     def contents(self) -> Delta:
         """Return all objects, facts and values as one change, e.g. to `apply` them to another knowledge base."""
-        return Delta(nodes=self.nodes(), added=tuple(self.facts()), values=self.values())
+        with self._lock:
+            state = self._state
+            return Delta(nodes=dict(state.nodes), added=tuple(state.facts), values=dict(state.values))
 
     def __repr__(self) -> str:
         """Return the sizes and the version: `<KnowledgeBase: 12 objects, 30 facts, 2 values, version 7>`."""

@@ -6,7 +6,7 @@ import pytest
 
 from dsc import Component, Library, Outcome, primitive_plot, skill, validate_plot
 from dsc.skills import SkillSignature
-from knowledge_base import SchemaError, UnknownNameError
+from knowledge_base import InputError, SchemaError, UnknownNameError
 
 Item = Annotated[str, "item"]
 
@@ -55,3 +55,16 @@ def test_an_outcome_that_is_the_executives_is_an_error():
     signature = SkillSignature("arm", "grasp", {}, {}, {"grasped": {}, "timed_out": {}})
     with pytest.raises(SchemaError, match=r"skill 'arm\.grasp' cannot have the outcome 'timed_out'"):
         primitive_plot(signature, done="grasped")
+
+
+def test_its_time_limit_replaces_that_of_the_skill():
+    (trigger,) = primitive_plot(GRASP, done="grasped", within=3600).states["execute"].entry
+    assert trigger.within == 3600
+    (trigger,) = primitive_plot(GRASP, done="grasped").states["execute"].entry
+    assert trigger.within is None
+
+
+@pytest.mark.parametrize("within", [0, -1, True, float("inf"), "60"])
+def test_a_time_limit_that_is_none_is_refused(within):
+    with pytest.raises(InputError, match="positive number of seconds"):
+        primitive_plot(GRASP, done="grasped", within=within)
