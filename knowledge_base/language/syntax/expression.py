@@ -221,6 +221,8 @@ def substitute(e: Expression | Term, bindings: Mapping[str, Value | Term]) -> Ex
     A quantified variable hides an outer variable of the same name. Names in `bindings` that are not free in `e` are
     ignored. Places are kept. If a new term contains the name of a quantified variable, that variable is renamed.
     """
+    if not bindings:
+        return e
     made: Expression | Term = e
     match e:
         case Variable(name) if name in bindings:
