@@ -164,7 +164,9 @@ class RunArchive:
         for one in reversed(found):
             if number in (None, one.number):
                 return one
-        there = f"there are {found[0].number} to {found[-1].number}" if found else "there is none"
+        there = f"the runs are {found[0].number} to {found[-1].number}" if len(found) > 1 else "there is none"
+        if len(found) == 1:
+            there = f"the only run is {found[0].number}"
         raise StoreError(f"there is no run {number or 1}; {there}", place=Place(str(self.path)))
 
     def steps(self, run: int) -> Iterator[StepRow]:

@@ -142,5 +142,5 @@ def test_a_store_without_runs_and_a_run_that_is_not_there_are_said_so(tmp_path):
     with pytest.raises(StoreError, match="no run was ever kept in this store"):
         replay(tmp_path / "facts.kb")
     run = Run(tmp_path, [GUARDED])
-    with pytest.raises(StoreError, match="there is no run 7; there are 1"):
+    with pytest.raises(StoreError, match="there is no run 7; the only run is 1"):
         replay(run.path, 7)
