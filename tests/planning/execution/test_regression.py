@@ -4,11 +4,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from knowledge_base import Delta, KnowledgeBase, fact
+from knowledge_base import Delta, KnowledgeBase, Schema, fact
 from knowledge_base.language.evaluation.evaluator import holds
+from knowledge_base.language.syntax.expression import And, Atom, Comparison, Constant, Not, Or, Variable
 from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning import Plan, PlanningDomain, PlanStep, validate
-from planning.execution.regression import CausalNeeds
+from planning.execution.regression import CausalNeeds, conjunction, disjunction
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain everything)
@@ -142,3 +143,26 @@ def test_a_quantified_goal_of_many_moves_stays_shallow():
         if "forall" in to_text(one)
     ]
     assert len(to_text(condition)) < 400
+
+
+EQUALITIES = st.builds(
+    Comparison, st.just("="), st.sampled_from([Variable("x"), Variable("y")]), st.sampled_from([*map(Constant, "ab")])
+)
+LITERALS = EQUALITIES | EQUALITIES.map(Not) | st.sampled_from([Atom("lit", (Variable("x"),)), Atom("on", ())])
+CONDITIONS = st.recursive(
+    LITERALS,
+    lambda inner: st.builds(
+        lambda kind, parts: kind(tuple(parts)), st.sampled_from([And, Or]), st.lists(inner, min_size=1, max_size=4)
+    ),
+    max_leaves=12,
+)
+LAMPS = Schema.parse("(define (domain d) (:types lamp) (:predicates (lit ?l - lamp) (on)))")
+
+
+@given(st.lists(CONDITIONS, min_size=1, max_size=4), st.sets(st.sampled_from([fact("on"), fact("lit", "a")])))
+def test_a_simplified_condition_is_true_in_the_same_worlds(parts, told):
+    world = KnowledgeBase(LAMPS)
+    world.apply(Delta(nodes=dict.fromkeys("ab", "lamp"), added=tuple(told)), author="me")
+    for bindings in ({"x": one, "y": other} for one in "ab" for other in "ab"):
+        for join, simplified in ((And, conjunction), (Or, disjunction)):
+            assert holds(simplified(parts), world, bindings) == holds(join(tuple(parts)), world, bindings)
