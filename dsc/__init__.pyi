@@ -56,4 +56,3 @@ from dsc.validation import validate_library as validate_library
 from dsc.validation import validate_plot as validate_plot
 from dsc.validation.library import raise_findings as raise_findings
 from dsc.validation.review import review_plot as review_plot
-from knowledge_base.errors import DscError as DscError
