@@ -35,6 +35,7 @@ from knowledge_base.language.syntax.expression import (
     Variable,
     free_variables,
     fresh,
+    is_equality,
     substitute,
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
@@ -132,8 +133,7 @@ def _is_equality(e: Expression) -> bool:
     """Return whether the condition consists of equalities of variables and constants, which no world leaves open."""
     if isinstance(e, And):
         return bool(e.parts) and all(map(_is_equality, e.parts))
-    plain = (Variable, Constant)
-    return isinstance(e, Comparison) and e.operator == "=" and isinstance(e.left, plain) and isinstance(e.right, plain)
+    return is_equality(e)
 
 
 def _alone(e: And | Or) -> Expression:

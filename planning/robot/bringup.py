@@ -27,7 +27,7 @@ from planning.execution.achieve import achieve_plot
 from planning.problem.construction import check_goal
 from planning.robot.bundles import Bundle, components_of, gathered, plots_of
 from planning.robot.program import Origin
-from planning.robot.robot import Robot
+from planning.robot.robot import Robot, kind_of
 from planning.robot.simulation import Setup, Simulation
 from planning.robot.task import Task, own_task
 
@@ -118,8 +118,7 @@ def resume(
         task = Task(goal=str(run.arguments["goal"]))
     elif run.plot == bundle.main and not run.arguments:
         task = Task(plot=bundle.main)
-    clock: ClockKind = "simulated" if run.header["simulated"] else "real"
-    return _deployed(bundle, setup, task, durability, planner, listener, {}, clock)
+    return _deployed(bundle, setup, task, durability, planner, listener, {}, kind_of(run))
 
 
 def kept_run(store: Path) -> RunRow:

@@ -16,7 +16,7 @@ from dsc.calls import Outputs, PlotCall
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.model.states import Budget
 from dsc.run_log import logged_run
-from dsc.runs.archive import is_unfinished
+from dsc.runs.archive import RunRow, is_unfinished
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import ClockKind, LoopClock, run_real, run_simulated
@@ -197,7 +197,7 @@ class Robot(RobotProgram):
         async def main() -> RunEnd:
             return await self._resume(store, kept, prepare)
 
-        return _complete(main, _kind_of(kept), kept.time, speed)
+        return _complete(main, kind_of(kept.run), kept.time, speed)
 
     def resuming(self, *, prepare: Prepare | None = None) -> Run:
         """Resume the unfinished run of the store in the running event loop, and return the run; see `resume`.
@@ -523,12 +523,13 @@ def _complete(
     return run_real(main())
 
 
-def _kind_of(kept: Kept) -> ClockKind:
-    return "simulated" if kept.run.header["simulated"] else "real"
+def kind_of(run: RunRow) -> ClockKind:
+    """Return the kind of time of a kept run."""
+    return "simulated" if run.header["simulated"] else "real"
 
 
 def _require_kind(kept: Kept, kind: ClockKind) -> None:
-    began = _kind_of(kept)
+    began = kind_of(kept.run)
     if kind != began:
         raise InputError(f"the run was begun in {began} time and cannot be resumed in {kind} time")
 

@@ -64,6 +64,7 @@ from knowledge_base.language.syntax.expression import (
     TypedVariable,
     Variable,
     free_variables,
+    is_equality,
 )
 
 _MOST_STAGES = 1000
@@ -88,7 +89,7 @@ def compile_test(e: Expression, schema: Vocabulary) -> Test:
         case And(parts):
             test = _all(_tests(parts, schema, _is_difference, negated=True))
         case Or(parts):
-            test = _any(_tests(parts, schema, _is_equality, negated=False))
+            test = _any(_tests(parts, schema, is_equality, negated=False))
         case Imply(premise, conclusion):
             test = _any([_negation(compile_test(premise, schema)), compile_test(conclusion, schema)])
         case Exists():
@@ -240,14 +241,8 @@ def _equalities(equalities: list[Comparison], schema: Vocabulary) -> list[Test]:
     return [compile_membership(name, others), *rest]
 
 
-def _is_equality(e: Expression) -> bool:
-    """Return whether the expression is an equality of variables or constants, which cannot raise an error."""
-    plain = (Variable, Constant)
-    return isinstance(e, Comparison) and e.operator == "=" and isinstance(e.left, plain) and isinstance(e.right, plain)
-
-
 def _is_difference(e: Expression) -> bool:
-    return isinstance(e, Not) and _is_equality(e.body)
+    return isinstance(e, Not) and is_equality(e.body)
 
 
 def _negation(test: Test) -> Test:

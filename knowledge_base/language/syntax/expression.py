@@ -194,6 +194,12 @@ def parts_of(e: Expression | Term) -> tuple[Expression | Term, ...]:
             return ()
 
 
+def is_equality(e: Expression) -> bool:
+    """Return whether the expression is an equality of variables or constants, which has a value in each world."""
+    plain = (Variable, Constant)
+    return isinstance(e, Comparison) and e.operator == "=" and isinstance(e.left, plain) and isinstance(e.right, plain)
+
+
 def free_variables(e: Expression | Term) -> frozenset[str]:
     """Return the names of the variables in `e` that no quantifier binds."""
     return frozenset(variables_in_order(e))

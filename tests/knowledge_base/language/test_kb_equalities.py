@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from knowledge_base import Schema
+from knowledge_base.facts import Value
 from knowledge_base.language.evaluation.compiler import compile_test
 from knowledge_base.language.evaluation.terms import same
 from knowledge_base.language.syntax.expression import And, Comparison, Constant, Not, Or, Variable
@@ -14,8 +15,9 @@ from knowledge_base.world.state import WorldState
 
 SCHEMA = Schema.parse("(define (domain d) (:predicates (p)))")
 WORLD = Overlay(WorldState(SCHEMA))
-VALUES = st.sampled_from(["a", "b", 0, 1, 1.0, True, False, "1"])
-SIDES = st.sampled_from([*map(Variable, "xyz"), *(Constant(one) for one in ("a", "b", 0, 1, 1.0, True, False, "1"))])
+GIVEN: tuple[Value, ...] = ("a", "b", 0, 1, 1.0, True, False, "1")
+VALUES = st.sampled_from(GIVEN)
+SIDES = st.sampled_from([*map(Variable, "xyz"), *map(Constant, GIVEN)])
 EQUALITIES = st.builds(Comparison, st.sampled_from(["=", "!="]), SIDES, SIDES)
 
 
