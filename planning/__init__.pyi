@@ -8,8 +8,10 @@ from planning.engines.unified import from_unified as from_unified
 from planning.engines.unified import plan_from_unified as plan_from_unified
 from planning.engines.unified import plan_to_unified as plan_to_unified
 from planning.engines.unified import to_unified as to_unified
-from planning.execution.achieve import achieve_plot as achieve_plot
+from planning.execution.goals import GoalQueue as GoalQueue
+from planning.execution.goals import QueuedGoal as QueuedGoal
 from planning.execution.plan_records import why_broken as why_broken
+from planning.execution.shipped_plots import shipped_plots as shipped_plots
 from planning.generation.plan_to_plot import plot_from_plan as plot_from_plan
 from planning.model.domain import PlanningAction as PlanningAction
 from planning.model.domain import PlanningDomain as PlanningDomain
@@ -34,8 +36,6 @@ from planning.problem.construction import build_problem as build_problem
 from planning.robot.bringup import deploy as deploy
 from planning.robot.bringup import resume as resume
 from planning.robot.bundles import Bundle as Bundle
-from planning.robot.goals import GoalQueue as GoalQueue
-from planning.robot.goals import QueuedGoal as QueuedGoal
 from planning.robot.report import Report as Report
 from planning.robot.robot import Robot as Robot
 from planning.robot.run import Run as Run

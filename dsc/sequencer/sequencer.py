@@ -17,6 +17,7 @@ from dsc.engine.steps import Output, Start
 from dsc.errors import ProgrammingError
 from dsc.events import Event
 from dsc.messages import FromOutside, KnowledgeMessage, LateMessage, Message, SkillMessage
+from dsc.run_log import logged_run
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer import message_checks
@@ -396,15 +397,19 @@ class Sequencer:
 
     # -- macrosteps: commit, then dispatch ---------------------------------------------------------------
 
+    def _record_world(self) -> None:
+        named = () if self.clock.simulated else zip(("robot", "run"), logged_run.get(), strict=True)
+        self._reactor.tracer.world(self.knowledge, **dict(named))
+
     def _start(self, plot: str, arguments: Mapping[str, Any]) -> None:
         store, reactor = self.store, self._reactor
         if store is None:
-            reactor.tracer.world(self.knowledge)
+            self._record_world()
             self.dispatcher.dispatch_all(reactor.start(plot, arguments))
             return
         with store.writing:
             serials = store.begin(plot, arguments, self.library)
-            reactor.tracer.world(self.knowledge)
+            self._record_world()
             for late, due, _ in self.dispatcher.timers:
                 if isinstance(late, LateMessage):
                     store.late(late, due)

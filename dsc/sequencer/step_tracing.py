@@ -28,11 +28,11 @@ class StepTracer:
         self._frames: dict[str, FrameState] = {}
         self._active: dict[int, dict[str, str]] = {}  # skills by activation and action id
 
-    def world(self, knowledge: KnowledgeBase) -> None:
-        """Record the world at the start, unless the trace has no listener; later records are changes of this world."""
+    def world(self, knowledge: KnowledgeBase, **names: str) -> None:
+        """Record the world at the start and `names`, unless the trace has no listener; later records are changes."""
         if self._trace.heard:
             known = {"schema": schema_form(knowledge.schema), **world_form(knowledge.snapshot())}
-            self._trace.record("world", version=knowledge.version, **known)
+            self._trace.record("world", version=knowledge.version, **names, **known)
 
     def event(self, event: Event, source: str, original: str | None = None, conflated: int = 0) -> int:
         """Record an incoming event; return the number of the record.

@@ -56,6 +56,23 @@ class GaveUp(Outcome):
     reason: str
 
 
+class GoalTaken(Outcome):
+    """A goal was taken from the queue."""
+
+    goal: Annotated[str, "condition"]
+    number: int
+
+
+class GoalOver(Outcome):
+    """The goal was withdrawn, or its deadline has passed."""
+
+    reason: str
+
+
+class GoalEnded(Outcome):
+    """The end of the goal is noted in the queue."""
+
+
 Repaired = PlotFound | GoalHolds | Replan | GaveUp
 """Answers to the failure of a plan."""
 Monitored = GoalHolds | PlotFound | PlanInvalid

@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from dsc.calls import Ended, SkillCall, Status
-from dsc.components.component import Component
 from dsc.engine.steps import Cancel, Start
 from dsc.events import LED_AWAY
 from dsc.outcomes import Outcome
@@ -22,6 +21,7 @@ from planning.analysis.explanation import unmet
 from planning.execution.attempt import Attempt
 from planning.execution.choices import Choices
 from planning.execution.escalation import Escalation
+from planning.execution.goal_skills import GoalSkills
 from planning.execution.monitor_skill import MonitorSkill
 from planning.execution.outages import Outages
 from planning.execution.outcomes import (
@@ -44,6 +44,7 @@ from planning.problem.construction import check_goal
 from planning.problem.derived import derivation
 
 if TYPE_CHECKING:
+    from dsc.components.component import Component
     from dsc.dynamic.library import Library
     from dsc.engine.steps import Step
     from dsc.sequencer.clock import LoopClock
@@ -51,12 +52,13 @@ if TYPE_CHECKING:
     from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from planning.engines.planner import Planner
+    from planning.execution.goals import GoalQueue
     from planning.execution.search import Foresight, Found
     from planning.model.domain import PlanningDomain
 
 
-class PlanningComponent(Component):
-    """The component whose skills `plan`, `monitor`, `hold`, `repair` and `judge` the planning plots call.
+class PlanningComponent(GoalSkills):
+    """The component whose skills the shipped plots call: `plan`, `monitor`, `hold`, `repair`, `judge`, and for goals.
 
     Several plans may be executed in parallel regions, or one plan inside a step of another plan. Each plan has a name.
     The component has a parameter of that name, whose value is the number of the step that has begun.
@@ -74,6 +76,7 @@ class PlanningComponent(Component):
         working_for: returns, for the id of an action, the names of the components that execute skills for the state
             that started the action. Their observations count as effects of the running step, and are validated at the
             step's end.
+        goals: see `GoalSkills`.
         foresight: simulates each plan before its execution.
     """
 
@@ -90,12 +93,13 @@ class PlanningComponent(Component):
         trace: Trace,
         components: Mapping[str, Component],
         working_for: Callable[[str], frozenset[str]],
+        goals: Callable[[], GoalQueue],
         *,
         foresight: Foresight | None = None,
         parallel: bool = True,
         shared: Collection[str] = (),
     ) -> None:
-        super().__init__()
+        super().__init__(goals)
         self._derivation = derivation(domain)
         self._knowledge = knowledge
         self._clock = clock

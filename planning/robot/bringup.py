@@ -23,7 +23,7 @@ from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.tracebacks import place_of, user_place
 from planning.engines.planner import Planner
-from planning.execution.achieve import achieve_plot
+from planning.execution.shipped_plots import shipped_plots
 from planning.problem.construction import check_goal
 from planning.robot.bundles import Bundle, components_of, gathered, plots_of
 from planning.robot.program import Origin
@@ -230,4 +230,4 @@ _MAY_RAISE = (InputError, OSError)
 def _library(bundle: Bundle, profile: Profile | None) -> Library:
     if profile is None:
         return bundle.library
-    return Library([*adapted(plots_of(gathered([bundle])), profile), achieve_plot()])
+    return Library([*adapted(plots_of(gathered([bundle])), profile), *shipped_plots()])

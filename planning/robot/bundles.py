@@ -24,8 +24,8 @@ from knowledge_base.errors import InputError, Place, UnknownNameError, described
 from knowledge_base.facts import Delta
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
-from planning.execution.achieve import achieve_plot
 from planning.execution.search import Foresight
+from planning.execution.shipped_plots import shipped_plots
 from planning.model.domain import PlanningDomain
 from planning.robot.simulation import Simulation
 
@@ -132,7 +132,7 @@ class Bundle:
     @cached_property
     def library(self) -> Library:
         """The plots of the bundle and the bundles that it needs, with all derived tables; errors as for `plots_of`."""
-        return Library([*plots_of(gathered([self])), achieve_plot()])
+        return Library([*plots_of(gathered([self])), *shipped_plots()])
 
     @property
     def primitive(self) -> tuple[str, ...]:

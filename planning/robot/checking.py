@@ -30,8 +30,8 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.analysis.explanation import why_unsolvable
 from planning.engines.registry import able, installed, refusal
-from planning.execution.achieve import achieve_plot
 from planning.execution.planning_component import PlanningComponent
+from planning.execution.shipped_plots import shipped_plots
 from planning.model.cancellable_work import WorkLimit, WorkLimitError
 from planning.model.domain import PlanningDomain
 from planning.problem.construction import build_problem, check_goal
@@ -175,7 +175,7 @@ class _Robot:
 
     def findings(self) -> list[Finding]:
         """Return the findings of the validator; other errors go to the list of `collecting`."""
-        library = Library([*self._plots, achieve_plot()])
+        library = Library([*self._plots, *shipped_plots()])
         skills, declared, exclusive = self._skills(), self._declared(), self._exclusive()
         schema = None if self._domain is None else self._domain.schema
         found: list[Finding] = []

@@ -6,13 +6,12 @@ import hashlib
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Self
 
 from dsc.components.assembly import require_deployed, require_instances, require_wired
 from dsc.components.component import Component
-from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
 from dsc.events import SKILL_FAILURES
 from dsc.model.plot import ActionPlot
@@ -31,9 +30,10 @@ from knowledge_base.world.schema_compatibility import require_extension
 from planning.engines.planner import Planner
 from planning.engines.race import CachingPlanner, PlannerRace
 from planning.engines.registry import repeatable
-from planning.execution.achieve import achieve_plot
+from planning.execution.goals import GoalQueue
 from planning.execution.planning_component import PlanningComponent
 from planning.execution.search import Foresight
+from planning.execution.shipped_plots import shipped_plots
 from planning.model.domain import PlanningDomain
 from planning.robot.bundles import Bundle, components_of, domain_of, gathered, plots_of, shipped_by
 from planning.robot.run import Run
@@ -96,8 +96,9 @@ class RobotProgram:
             require_extension(self.domain.schema, knowledge.schema)
         self.store = None if store is None else located(store)
         self.library = plots if isinstance(plots, Library) else Library(plots)
-        if ACHIEVE not in self.library:
-            self.library.add(achieve_plot())
+        for plot in shipped_plots():
+            if plot.name not in self.library:
+                self.library.add(plot)
         self.clock = clock
         self._own_planners: dict[bool, CachingPlanner] = {}
         self._planner = planner
@@ -162,6 +163,11 @@ class RobotProgram:
         """The simulated world; `None` without a simulation."""
         return None if self.origin is None else self.origin.simulation
 
+    @cached_property
+    def goals(self) -> GoalQueue:
+        """The queue that `Robot.serve` or the plot `serve_goals` serves; with a store, the store keeps it."""
+        return GoalQueue(self.knowledge, kept=self.store is not None)
+
     def header(self) -> dict[str, Any]:
         """Return the inputs that determine a run, for the first line of the trace."""
         plots = "".join(sorted(plot.digest for plot in self.library))
@@ -202,7 +208,8 @@ class RobotProgram:
         )  # fmt: skip
         planning = PlanningComponent(
             self.domain, self.library, self.knowledge, self.planner_for(clock), clock, trace,
-            components=sequencer.dispatcher.components, working_for=sequencer.working_for, parallel=self._parallel,
+            components=sequencer.dispatcher.components, working_for=sequencer.working_for,
+            goals=lambda: self.goals, parallel=self._parallel,
             shared=[component.name for component in components if component.concurrent],
             foresight=self._foresight,
         )  # fmt: skip

@@ -6,7 +6,6 @@ import asyncio
 import math
 import time
 from collections.abc import Callable, Coroutine, Mapping
-from functools import cached_property
 from typing import Any, Self, cast
 from uuid import uuid4
 
@@ -26,9 +25,9 @@ from dsc.sequencer.signals import OnSignal
 from knowledge_base.errors import InputError, StoreError
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.text import parse_condition
+from planning.execution.goals import LATE, QueuedGoal
 from planning.execution.planning_component import PlanningComponent
 from planning.problem.construction import check_goal
-from planning.robot.goals import GoalQueue, QueuedGoal
 from planning.robot.judgement import Judgement
 from planning.robot.program import RobotProgram
 from planning.robot.progress import Tally
@@ -231,11 +230,6 @@ class Robot(RobotProgram):
         """The runs in progress, the oldest first."""
         return tuple(self._runs)
 
-    @cached_property
-    def goals(self) -> GoalQueue:
-        """The queue of goals that `serve` serves; with a store, the store keeps it."""
-        return GoalQueue(self.knowledge, kept=self.store is not None)
-
     async def serve(
         self, *, seconds: float = _BUDGET.seconds, replans: int = _BUDGET.replans, until_empty: bool = False
     ) -> None:
@@ -253,15 +247,12 @@ class Robot(RobotProgram):
             StoreError: the store cannot be read or written, or has an unfinished run that serves no goal.
             ChangedError: as for `resume`.
         """
-        goals = self.goals
-        for left in goals.list("running"):
-            resumed = self.store is not None and is_unfinished(self.store)
-            if resumed and not await self._serve(left, self.resuming()):
-                return
-            if not resumed:  # the program ended before the run began, or before the end of the goal was kept
-                reached = self.knowledge.ask(left.goal)
-                goals.end(left.id, reached=True, reason="reached") if reached else goals.wait_again(left.id)
-        while (queued := await goals.next(waits=not until_empty)) is not None:
+        goals, left = self.goals, self.goals.list("running")
+        resumed = left and self.store is not None and is_unfinished(self.store)
+        if resumed and not await self._serve(left[0], self.resuming()):
+            return
+        goals.recover()
+        while (queued := goals.first() if until_empty else await goals.next()) is not None:
             try:
                 run = self.start(
                     queued.goal, seconds=seconds, replans=replans, open_ended=True, header={"goal": queued.id}
@@ -279,7 +270,7 @@ class Robot(RobotProgram):
         remaining = self.goals.begin(queued.id, run.cancel)
         late = None
         if remaining is not None:
-            late = asyncio.get_running_loop().call_later(remaining, run.cancel, "its deadline has passed")
+            late = asyncio.get_running_loop().call_later(remaining, run.cancel, LATE)
         try:
             end = await run
         finally:

@@ -54,14 +54,14 @@ from knowledge_base.language.checking.check import check, check_effect
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text
 from knowledge_base.pddl import read_problem
 from knowledge_base.statements import retracted, told
-from planning.execution.achieve import achieve_plot
+from planning.execution.shipped_plots import shipped_plots
 from planning.model.cancellable_work import WorkLimit, WorkLimitError
 from planning.model.domain import PlanningDomain
 from planning.problem.construction import build_problem
 
 HOME = Path(__file__).parent
 ROOT = HOME.parents[1]
-LIBRARY = Library([*bundle().plots, achieve_plot()])
+LIBRARY = Library([*bundle().plots, *shipped_plots()])
 DOMAIN = PlanningDomain.from_pddl(ROOT / "domains" / "clean_up_table" / "domain.pddl")
 KITCHEN = ROOT / "examples" / "kitchen"
 PATIENCE_S = 1.0

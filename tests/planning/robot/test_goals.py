@@ -7,10 +7,11 @@ import asyncio
 import pytest
 from obedient_robot import ObedientRobot, plots
 
+from dsc import parse_plot
 from dsc.sequencer.clock import run_simulated
 from knowledge_base import Delta, InputError, UnknownNameError, fact
 from planning import PlanningDomain, Robot
-from planning.robot.goals import MOST_ENDED, GoalQueue
+from planning.execution.goals import MOST_ENDED, GoalQueue
 
 DOMAIN = PlanningDomain.parse("""(define (domain lamps) (:types lamp)
   (:predicates (on ?l - lamp) (broken ?l - lamp))
@@ -18,13 +19,37 @@ DOMAIN = PlanningDomain.parse("""(define (domain lamps) (:types lamp)
 WORLD = Delta(nodes=dict.fromkeys("abcd", "lamp"), added=(fact("broken", "d"),))
 
 
-def robot(store=None):
+def robot(store=None, more=()):
     device = ObedientRobot(DOMAIN)
-    made = Robot(DOMAIN, plots(DOMAIN), [device], store=store)
+    made = Robot(DOMAIN, [*plots(DOMAIN), *more], [device], store=store)
     device.knowledge = made.knowledge
     if not made.knowledge.nodes():
         made.knowledge.apply(WORLD, "me")
     return made
+
+
+@pytest.fixture(params=["method", "plot"], autouse=True)
+def way(request, monkeypatch):
+    """Each test serves the queue by the method, and once more by the shipped plot."""
+
+    async def by_plot(one, *, until_empty=False):
+        run = (
+            one.resume_or_start("serve_goals", open_ended=True)
+            if one.store
+            else one.start("serve_goals", open_ended=True)
+        )
+        try:
+            while not run.task.done() and not (until_empty and not one.goals.list()):  # noqa: ASYNC110
+                await asyncio.sleep(0.1)
+        finally:
+            if one.store is None or until_empty:
+                run.cancel("the queue is empty")
+            elif not run.task.done():
+                run.suspend()
+        await run
+
+    if request.param == "plot":
+        monkeypatch.setattr(Robot, "serve", by_plot)
 
 
 def served(*goals, store=None, meanwhile=None):
@@ -53,7 +78,7 @@ def test_goals_are_served_by_priority_and_then_in_their_order():
 def test_a_goal_that_cannot_be_reached_fails_with_the_reason_and_the_next_follows():
     ends, done = served(("(on d)", {}), ("(on a)", {}))
     assert ends[1][0] == "failed"
-    assert "no_plan" in ends[1][1]
+    assert "needs (not (broken d))" in ends[1][1]
     assert (ends[2], done) == (("reached", "reached"), ["(light a)"])
 
 
@@ -158,3 +183,45 @@ def test_ended_goals_are_dropped_from_a_certain_number_on(tmp_path):
         again = GoalQueue(one.knowledge, kept=True)
         assert again.list("withdrawn") == one.goals.list("withdrawn")
         assert again.put("(on b)") == MOST_ENDED + 4
+
+
+GUARDED = parse_plot("""
+plot: guarded
+receives: {alarm: , quit: }
+states:
+  work: {use: serve_goals, on: {quit: over}}
+  over: {final: true}
+handlers:
+  - on: alarm
+    interrupt: true
+    do: {use: pause}
+""")
+PAUSE = parse_plot("{plot: pause, states: {pause: {after: {seconds: 0.5, to: over}}, over: {final: true}}}")
+
+
+@pytest.mark.parametrize("crash", [False, True])
+def test_a_plot_that_serves_goals_can_be_interrupted_and_the_goal_is_then_served_again(tmp_path, crash):
+    async def life(first):
+        async with robot(tmp_path / "run.kb", [GUARDED, PAUSE]) as one:
+            run = one.resume_or_start("guarded", open_ended=True)
+            if first:
+                one.goals.put("(and (on a) (on b) (on c))")
+                await asyncio.sleep(1.5)
+                run.post("alarm")
+                await asyncio.sleep(0.6)
+                if crash:
+                    return one.components[0].done
+            await asyncio.sleep(10)
+            run.post("quit")
+            assert (await run).finished
+            return one.components[0].done, [queued.reason for queued in one.goals.list("reached")]
+
+    done = run_simulated(life(True))
+    if crash:
+        rest, ends = run_simulated(life(False))
+        done = [*done, *rest]
+    else:
+        done, ends = done
+    assert ends == ["reached"]
+    assert set(done) == {"(light a)", "(light b)", "(light c)"}
+    assert len(done) <= 4  # the interrupted action may be repeated

@@ -489,3 +489,19 @@ def test_a_run_in_real_time_is_kept_resumed_and_replayed_with_its_ids(tmp_path):
 
     assert run_real(first()) == run_real(then())
     assert replay(tmp_path / "run.kb").divergence is None
+
+
+def test_the_first_record_names_robot_and_run_in_real_time_only():
+    async def first():
+        async with robot() as one:
+            seen: list[Record] = []
+            one.listen(seen.append)
+            run = one.start("wait")
+            run.cancel("seen")
+            await run
+            return run.id, seen[0]
+
+    run, record = run_real(first())
+    assert (record.data["robot"], record.data["run"]) == ("robot", run)
+    _, record = run_simulated(first())
+    assert not {"robot", "run"} & record.data.keys()

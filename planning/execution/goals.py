@@ -24,6 +24,8 @@ _TABLE = (
 )
 MOST_ENDED = 1_000
 """The maximum number of ended goals that the queue keeps; the oldest are dropped."""
+LATE = "its deadline has passed"
+"""The reason of a goal that failed at its deadline."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,9 @@ class QueuedGoal:
 
 
 class GoalQueue:
-    """The goals of a robot; `Robot.serve` serves them. Methods belong to the thread of the loop that serves them.
+    """The goals of a robot; `Robot.serve` or the plot `serve_goals` serves them.
+
+    Methods belong to the thread of the loop that serves the goals.
 
     Args:
         knowledge: the knowledge base, against whose schema goals are checked.
@@ -121,19 +125,28 @@ class GoalQueue:
         found = (one for one in self._goals.values() if one.state in wanted)
         return tuple(sorted(found, key=lambda one: (one.state == "waiting", -one.priority, one.id)))
 
-    # -- for `Robot.serve` -----------------------------------------------------------------------------------
+    # -- for those who serve the goals -----------------------------------------------------------------------
 
-    async def next(self, *, waits: bool) -> QueuedGoal | None:
-        """Return the next waiting goal before its deadline; without one, wait for it, or return `None`."""
-        while True:
-            for one in self.list("waiting"):
-                if one.deadline is None or one.deadline > self._now():
-                    return one
-                self.end(one.id, reached=False, reason="its deadline has passed")
-            if not waits:
-                return None
+    def recover(self) -> None:
+        """Let the running goals without a server wait again, since their run was interrupted."""
+        for left in self.list("running"):
+            if left.id not in self._cancel:
+                self._write(replace(left, state="waiting"))
+
+    async def next(self) -> QueuedGoal:
+        """Return the next waiting goal before its deadline; wait for it if there is none."""
+        while (found := self.first()) is None:
             self._arrival.clear()
             await self._arrival.wait()
+        return found
+
+    def first(self) -> QueuedGoal | None:
+        """Return the next waiting goal, or `None`; end the goals whose deadline has passed."""
+        for one in self.list("waiting"):
+            if one.deadline is None or one.deadline > self._now():
+                return one
+            self.end(one.id, reached=False, reason=LATE)
+        return None
 
     def begin(self, number: int, cancel: Callable[[str], object]) -> float | None:
         """Note that a goal is being served; return the seconds until its deadline. `cancel` ends its run."""
@@ -142,16 +155,15 @@ class GoalQueue:
         self._cancel[number] = cancel
         return None if queued.deadline is None else max(0.0, queued.deadline - self._now())
 
+    def release(self, number: int) -> None:
+        """Note that a goal has no server; its state stays unchanged."""
+        self._cancel.pop(number, None)
+
     def end(self, number: int, *, reached: bool, reason: str) -> None:
         """Note the end of a goal; a withdrawn goal stays withdrawn."""
-        self._cancel.pop(number, None)
+        self.release(number)
         if self.get(number).state != "withdrawn":
             self._write(replace(self.get(number), state="reached" if reached else "failed", reason=reason))
-
-    def wait_again(self, number: int) -> None:
-        """Note that a goal waits again, since its run never began."""
-        self._cancel.pop(number, None)
-        self._write(replace(self.get(number), state="waiting"))
 
     def _write(self, queued: QueuedGoal) -> None:
         dropped = [one.id for one in self._goals.values() if one.state not in ("waiting", "running")][:-MOST_ENDED]

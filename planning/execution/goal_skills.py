@@ -1,0 +1,53 @@
+"""Skills with which the plot `serve_goals` serves a robot's queue of goals."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from dsc.calls import SkillCall
+from dsc.components.component import Component
+from dsc.skills import skill
+from planning.execution.goals import LATE, GoalQueue
+from planning.execution.outcomes import GoalEnded, GoalOver, GoalTaken
+
+
+class GoalSkills(Component):
+    """The part of the planning component that takes goals from a queue, watches them and notes their ends.
+
+    Args:
+        goals: returns the queue of goals, which one state at a time serves.
+    """
+
+    def __init__(self, goals: Callable[[], GoalQueue]) -> None:
+        super().__init__()
+        self._goals = goals
+
+    @skill(after_crash="repeat", unlimited=True)
+    async def next_goal(self, call: SkillCall) -> GoalTaken:  # noqa: ARG002
+        """Wait for the next goal of the queue; a goal whose pursuit was interrupted comes first."""
+        goals = self._goals()
+        goals.recover()
+        taken = await goals.next()
+        return GoalTaken(goal=taken.goal, number=taken.id)
+
+    @skill(after_crash="repeat", unlimited=True)
+    async def watch_goal(self, call: SkillCall, number: int) -> GoalOver:  # noqa: ARG002
+        """Note that a goal is running, and end when it is withdrawn or its deadline passes."""
+        goals = self._goals()
+        if goals.get(number).state not in {"waiting", "running"}:
+            return GoalOver(reason=goals.get(number).reason)
+        over: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        remaining = goals.begin(number, over.set_result)
+        try:
+            return GoalOver(reason=await asyncio.wait_for(over, remaining))
+        except TimeoutError:
+            return GoalOver(reason=LATE)
+        finally:
+            goals.release(number)
+
+    @skill(after_crash="repeat")
+    async def end_goal(self, call: SkillCall, number: int, reached: bool, reason: str) -> GoalEnded:  # noqa: ARG002, FBT001
+        """Note the end of a goal; a goal that is withdrawn stays withdrawn."""
+        self._goals().end(number, reached=reached, reason=reason)
+        return GoalEnded()
