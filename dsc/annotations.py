@@ -13,12 +13,17 @@ import sys
 from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import MISSING, fields, is_dataclass
+from enum import EnumType
 from types import FrameType, UnionType
-from typing import Annotated, Any, ClassVar, Literal, NewType, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, NewType, Union, get_args, get_origin, get_type_hints
 
+from pydantic import BaseModel
+
+from dsc.data_types import ANY, DataType, data_type
 from knowledge_base.errors import InputError, Place, SchemaError, nearest, tolerated
 
-_PLAIN: Mapping[object, str] = {bool: "boolean", int: "number", float: "number", str: "text"}
+_PLAIN: Mapping[object, str] = {bool: "boolean", int: "integer", float: "number", str: "text"}
 _WORDS = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 Namespace = Mapping[str, Any]
 
@@ -52,23 +57,105 @@ def class_statement(kind: type) -> Iterator[Namespace]:
             raise
 
 
-def type_of(annotation: object) -> str | None:
+FoundRecords = dict[str, dict[str, str | None]]
+"""Records that annotations name: the types of the fields by name."""
+
+
+def type_of(annotation: object, records: FoundRecords | None = None) -> str | None:
     """Return the type of plots for an annotation; `None` accepts any value.
 
-    `int` and `float` are `number`, `bool` is `boolean`, `str` and literals are `text`. `NewType("CleanItem", str)` is
-    the type `clean-item` of the domain, and so is `Annotated[str, "clean-item"]`. `X | None` has the type of `X`.
+    `int` is `integer`, `float` is `number`, `bool` is `boolean`, `str` is `text`. `NewType("CleanItem", str)` is the
+    type `clean-item` of the domain. The text in `Annotated[str, "clean-item"]` is a type as plots write it. A `Literal`
+    or an `Enum` is a choice, `X | None` is `optional`, `list[X]` and `dict[str, X]` contain values of the type of `X`.
+    A dataclass or a model of pydantic is a record, which is added to `records`.
+
+    Raises:
+        InputError: the text of `Annotated` is not a type, or two classes of records have one name.
     """
     if isinstance(annotation, type) and annotation in _PLAIN:
         return _PLAIN[annotation]
     if get_origin(annotation) is Annotated:
-        return next((one for one in get_args(annotation)[1:] if isinstance(one, str)), None)
+        said = next((one for one in get_args(annotation)[1:] if isinstance(one, str)), None)
+        return type_of(get_args(annotation)[0], records) if said is None else str(data_type(said))
     if isinstance(annotation, NewType):
         return domain_type(annotation.__name__) if _made_of(annotation) is str else None
+    return _compound_type(annotation, {} if records is None else records)
+
+
+def _choice(values: tuple[object, ...]) -> str | None:
+    plain = tuple(one for one in values if isinstance(one, str | int | float))
+    return str(DataType("choice", values=plain)) if plain and len(plain) == len(values) else None
+
+
+def _compound_type(annotation: object, records: FoundRecords) -> str | None:
+    """Return the type of a choice, record, list, map or optional value; `None` for another annotation."""
+    if is_record(annotation):
+        return _record(annotation, records)
+    if isinstance(annotation, EnumType):
+        annotation = Literal.__getitem__(tuple(one.value for one in annotation))  # type: ignore[var-annotated]
     if get_origin(annotation) is Literal:
-        kinds = {type_of(type(one)) for one in get_args(annotation)}
-        return kinds.pop() if len(kinds) == 1 else None
+        return _choice(get_args(annotation))
+    origin, inside = get_origin(annotation), get_args(annotation)
+    if origin is list or annotation is list:
+        return f"list of {(type_of(inside[0], records) if inside else None) or ANY}"
+    if (origin is dict or annotation is dict) and (not inside or inside[0] is str):
+        return f"map of {(type_of(inside[1], records) if inside else None) or ANY}"
     others = [one for one in members(annotation) if one is not type(None)]
-    return type_of(others[0]) if len(others) == 1 and others[0] is not annotation else None
+    if len(others) != 1 or others[0] is annotation:
+        return None
+    kind = type_of(others[0], records)
+    return None if kind is None else f"optional {kind}"
+
+
+def add_records(records: FoundRecords, more: Mapping[str, Mapping[str, str | None]]) -> None:
+    """Add records; raise `SchemaError` for a second record of one name with other fields."""
+    for name, own in more.items():
+        if records.setdefault(name, dict(own)) != own:
+            raise SchemaError(
+                f"two records are named '{name}', with the fields {', '.join(own)} and others", found=name
+            )
+
+
+def is_record(annotation: object) -> bool:
+    """Return whether an annotation is a class of records: a dataclass, or a model of pydantic."""
+    return isinstance(annotation, type) and (is_dataclass(annotation) or issubclass(annotation, BaseModel))
+
+
+class RecordField(NamedTuple):
+    """A field of a record: its annotation, and whether it has no default."""
+
+    annotation: object
+    required: bool
+
+
+def record_fields(kind: Any) -> dict[str, RecordField]:
+    """Return the fields of a class of records by name."""
+    hints = get_type_hints(kind, include_extras=True)
+    if issubclass(kind, BaseModel):
+        return {name: RecordField(hints[name], one.is_required()) for name, one in kind.model_fields.items()}
+    return {
+        one.name: RecordField(hints[one.name], one.default is MISSING and one.default_factory is MISSING)
+        for one in fields(kind)
+    }
+
+
+def _record(kind: Any, records: FoundRecords) -> str:
+    name = domain_type(kind.__name__)
+    if name in records and not records[name]:  # its own fields contain it
+        return name
+    known = records.get(name)
+    records[name] = {}
+    found = {}
+    for field, one in record_fields(kind).items():
+        text = type_of(one.annotation, records)
+        given = one.required or not text or text.startswith("optional ")
+        found[field] = text if given else f"optional {text}"
+    if known is not None and known != found:
+        raise SchemaError(
+            f"two classes of records are named '{name}': {kind.__qualname__} has other fields", found=name
+        )
+    records[name] = found
+    return name
 
 
 def domain_type(class_name: str) -> str:
@@ -120,13 +207,19 @@ def evaluated(annotation: object, names: Namespace, what: str) -> object:
         raise SchemaError(f"the annotation of {what} cannot be evaluated: {error}") from error
 
 
-def parameter_types(body: Callable[..., Any], own: int, names: Namespace) -> dict[str, str | None]:
-    """Return the types of a function's parameters after the `own` first ones, by name."""
-    given = list(inspect.signature(body).parameters.values())[own:]
-    return {
-        one.name: None if one.annotation is one.empty else type_of(evaluated(one.annotation, names, f"'{one.name}'"))
-        for one in given
-    }
+def parameter_annotations(body: Callable[..., Any], own: int, names: Namespace) -> dict[str, object]:
+    """Return the annotations of a function's parameters after the `own` first ones, by name; `Any` without one.
+
+    Raises:
+        SchemaError: a parameter is `*args` or `**kw`, or an annotation cannot be evaluated.
+    """
+    found: dict[str, object] = {}
+    for one in list(inspect.signature(body).parameters.values())[own:]:
+        if one.kind in {one.VAR_POSITIONAL, one.VAR_KEYWORD}:
+            message = f"a plot passes arguments by name, so '{one}' receives none; name the parameters, or take a list"
+            raise SchemaError(message, found=one.name)
+        found[one.name] = Any if one.annotation is one.empty else evaluated(one.annotation, names, f"'{one.name}'")
+    return found
 
 
 def lower_name(class_name: str) -> str:

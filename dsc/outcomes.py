@@ -22,7 +22,19 @@ from inspect import get_annotations
 from types import MappingProxyType
 from typing import Any, ClassVar, Never, NoReturn, dataclass_transform
 
-from dsc.annotations import Namespace, class_statement, evaluated, is_class_variable, lower_name, members, type_of
+from dsc.annotations import (
+    FoundRecords,
+    Namespace,
+    add_records,
+    class_statement,
+    evaluated,
+    is_class_variable,
+    lower_name,
+    members,
+    type_of,
+)
+from dsc.data_types import WORDS
+from dsc.python_values import plain_value
 from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.facts import Delta
 from knowledge_base.spelling import is_plain_name
@@ -53,6 +65,10 @@ class Outcome(_Typed):
     observed: Delta = _UNCHANGED
     declared: ClassVar[dict[str, str | None]] = {}
     """Types of the attributes by name; `None` accepts any value."""
+    records: ClassVar[FoundRecords] = {}
+    """The records in the types of the attributes."""
+    declared_by: ClassVar[str] = ""
+    """The skill that declares this outcome, for messages; empty without one."""
     _defaults: ClassVar[dict[str, Any]] = {}
 
     def __init__(self, event: str, attributes: Mapping[str, Any] = _NONE, observed: Delta = _UNCHANGED) -> None:
@@ -63,13 +79,17 @@ class Outcome(_Typed):
 
         Raises:
             SchemaError: an attribute has the name of an attribute of every outcome, or its annotation is not valid.
+                The class is a subclass of an outcome that a skill declares: the skill could return it undeclared.
         """
         own = {name: one for name, one in get_annotations(cls).items() if not is_class_variable(one)}
-        cls.declared, cls._defaults = dict(cls.declared), dict(cls._defaults)
+        cls.declared, cls._defaults, cls.records = (dict(cls.declared), dict(cls._defaults), dict(cls.records))
         cls.event = event or lower_name(cls.__name__)
         cls.__init__ = _filled  # type: ignore[method-assign,assignment]
         with class_statement(cls) as names:
-            cls.declared.update(_types(cls.__qualname__, own, names))
+            for above in cls.__mro__[1:]:
+                if declared_by := vars(above).get("declared_by"):
+                    raise _subclass_error(cls, above, declared_by)
+            cls.declared.update(_types(cls.__qualname__, own, names, cls.records))
         cls._defaults.update({name: vars(cls)[name] for name in own if name in vars(cls)})
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -90,7 +110,9 @@ class Outcome(_Typed):
         return f"{type(self).__name__}({', '.join(given)})"
 
 
-_TAKEN = frozenset({"event", "attributes", "observed", "declared"})
+_PLAIN = frozenset({"number", "integer", "boolean", *WORDS})
+"""Types whose values are plain data in Python, too."""
+_TAKEN = frozenset({"event", "attributes", "observed", "declared", "records", "declared_by"})
 
 
 def _filled(self: Outcome, *, observed: Delta = _UNCHANGED, **values: Any) -> None:
@@ -99,7 +121,10 @@ def _filled(self: Outcome, *, observed: Delta = _UNCHANGED, **values: Any) -> No
     attributes = {**kind._defaults, **values}  # noqa: SLF001  # a method of the class
     if attributes.keys() != kind.declared.keys():
         _refuse(kind, attributes)
-    vars(self).update(attributes, attributes=attributes, observed=observed)
+    plain = attributes
+    if not _PLAIN.issuperset(kind.declared.values()):
+        plain = {name: plain_value(value) for name, value in attributes.items()}
+    vars(self).update(attributes, attributes=plain, observed=observed)
 
 
 def _refuse(kind: type[Outcome], given: Mapping[str, Any]) -> None:
@@ -112,7 +137,7 @@ def _refuse(kind: type[Outcome], given: Mapping[str, Any]) -> None:
 
 
 def declared_outcomes(
-    annotation: object, names: Namespace, what: str, *, optional: bool = False
+    annotation: object, names: Namespace, what: str, records: FoundRecords, *, optional: bool = False
 ) -> dict[str, dict[str, str | None]]:
     """Return the outcomes that an annotation names: attributes with types, by event.
 
@@ -120,12 +145,15 @@ def declared_outcomes(
         annotation: the annotation, which may be text.
         names: the names that the annotation may use.
         what: the annotated value, for messages.
+        records: receives the records in the types of attributes.
         optional: whether the value may be `None`.
 
     Raises:
-        SchemaError: the annotation names something else than outcome classes, or two classes of one event.
+        SchemaError: the annotation names something else than outcome classes, or two classes of one event. It names a
+            class without its subclass, which a type checker accepts as a returned value, too.
     """
     found: dict[str, dict[str, str | None]] = {}
+    named = list[type[Outcome]]()
     for kind in members(evaluated(annotation, names, what)):
         if kind in {Never, NoReturn} or (optional and kind in {None, type(None)}):
             continue
@@ -139,10 +167,26 @@ def declared_outcomes(
         if kind.event in found:
             raise SchemaError(f"{what} names two classes for the event '{kind.event}'", found=kind.event)
         found[kind.event] = dict(kind.declared)
+        add_records(records, kind.records)
+        named.append(kind)
+    for kind in named:
+        for below in kind.__subclasses__():
+            if below not in named:
+                raise _subclass_error(below, kind, what)
+        kind.declared_by = what
     return found
 
 
-def _types(outcome: str, annotations: Mapping[str, object], names: Namespace) -> Iterator[tuple[str, str | None]]:
+def _subclass_error(below: type, kind: type, what: str) -> SchemaError:
+    message = f"{below.__qualname__} is a subclass of {kind.__qualname__}, the outcome of {what}"
+    return SchemaError(
+        f"{message}, which could return it undeclared; give both a common base class", found=below.__name__
+    )
+
+
+def _types(
+    outcome: str, annotations: Mapping[str, object], names: Namespace, records: FoundRecords
+) -> Iterator[tuple[str, str | None]]:
     for name, annotation in annotations.items():
         if not is_plain_name(name):
             message = f"attribute '{name}' of outcome {outcome} cannot be read in plots, which have lower-case names"
@@ -150,4 +194,4 @@ def _types(outcome: str, annotations: Mapping[str, object], names: Namespace) ->
         if name in _TAKEN:
             message = f"outcome {outcome} cannot have the attribute '{name}', which every outcome has"
             raise SchemaError(message, found=name)
-        yield name, type_of(evaluated(annotation, names, f"'{name}' of outcome {outcome}"))
+        yield (name, type_of(evaluated(annotation, names, f"'{name}' of outcome {outcome}"), records))

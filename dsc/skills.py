@@ -28,16 +28,18 @@ import inspect
 import math
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Literal, TypeVar, cast, get_args, overload
 
-from dsc.annotations import Namespace, evaluated, names_around, parameter_types
+from dsc.annotations import FoundRecords, Namespace, evaluated, names_around, parameter_annotations, type_of
 from dsc.blocking import in_process, in_thread
 from dsc.calls import SkillCall
+from dsc.data_types import Records
 from dsc.events import EXECUTIVES
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome, declared_outcomes
+from dsc.python_values import Builder, builder
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
 from knowledge_base.language.checking.inputs import shown
 
@@ -76,6 +78,7 @@ class SkillSignature:
         within: seconds after which the skill is cancelled and ends with `timed_out`, unless the trigger declares other
             seconds; `None` means 300 s.
         place: file and line of the body; empty if unknown.
+        records: the records in the types of parameters and attributes, see `dsc.data_types`.
     """
 
     component: str
@@ -88,6 +91,7 @@ class SkillSignature:
     unlimited: bool = False
     place: str = ""
     within: float | None = None
+    records: Records = field(default_factory=dict)
 
 
 Execution = Callable[[Any, SkillBody, SkillCall[Any], Mapping[str, Any]], Awaitable[Outcome]]
@@ -107,6 +111,8 @@ class Declared:
         after_crash: see `AfterCrash`.
         unlimited: as in `SkillSignature`.
         within: as in `SkillSignature`.
+        records: as in `SkillSignature`.
+        builders: functions that make the values of Python for arguments with records or enumerations.
     """
 
     types: Mapping[str, str | None]
@@ -117,6 +123,15 @@ class Declared:
     after_crash: AfterCrash = "sense"
     unlimited: bool = False
     within: float | None = None
+    records: Records = field(default_factory=dict)
+    builders: Mapping[str, Builder] = field(default_factory=dict)
+
+    def build(self, arguments: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return the arguments as the body's annotations state; raise `InputError` for data that have no such value."""
+        if not self.builders:
+            return arguments
+        made = {name: build(arguments[name]) for name, build in self.builders.items() if name in arguments}
+        return {**arguments, **made}
 
     def __call__(self, body: _Body) -> _Body:
         """Attach this declaration to `body`, and return `body`.
@@ -209,21 +224,42 @@ def skill(
 
     def declare(body: SkillBody) -> SkillBody:
         own, names = 2 if "." in named(body) else 1, names_around(body.__globals__)
-        outcomes, types = dict[str, dict[str, str | None]](), dict[str, str | None]()
+        outcomes, records = dict[str, dict[str, str | None]](), FoundRecords()
         with refused_at(body):
-            outcomes |= returned(body, names)
-            outcomes |= _reported(body, own, names)
-        with refused_at(body):
-            types |= parameter_types(body, own, names)
-        declared = Declared(
-            types, outcomes, _EXECUTIONS[blocking], after_crash=after_crash, unlimited=unlimited, within=within
-        )
-        return declared(body)
+            outcomes |= returned_outcomes(body, names, records)
+            outcomes |= _reported_outcomes(body, own, names, records)
+        how = {"after_crash": after_crash, "unlimited": unlimited, "within": within}
+        return declaration(body, own, names, outcomes, records, execute=_EXECUTIONS[blocking], **how)(body)
 
     return declare if body is None else declare(body)
 
 
-def returned(body: SkillBody, names: Namespace, *, optional: bool = False) -> dict[str, dict[str, str | None]]:
+def declaration(
+    body: SkillBody,
+    first: int,
+    names: Namespace,
+    outcomes: Mapping[str, Mapping[str, str | None]],
+    records: FoundRecords,
+    **how: Any,
+) -> Declared:
+    """Return the declaration that the annotations of a body's parameters complete, beginning with parameter `first`.
+
+    Raises:
+        SchemaError: an annotation has no valid type, or the parameter cannot be passed by name.
+    """
+    types, builders = dict[str, str | None](), dict[str, Builder]()
+    with refused_at(body):
+        for name, annotation in parameter_annotations(body, first, names).items():
+            types[name] = type_of(annotation, records)
+            build = builder(annotation)
+            if build is not None:
+                builders[name] = build
+    return Declared(types, outcomes, records=records, builders=builders, **how)
+
+
+def returned_outcomes(
+    body: SkillBody, names: Namespace, records: FoundRecords, *, optional: bool = False
+) -> dict[str, dict[str, str | None]]:
     """Return the outcomes in the return annotation of a body; `optional` permits `None`.
 
     Raises:
@@ -233,17 +269,19 @@ def returned(body: SkillBody, names: Namespace, *, optional: bool = False) -> di
     what = f"the returned value of '{named(body)}'"
     if annotation is inspect.Signature.empty:
         raise SchemaError(f"'{named(body)}' has no return annotation; write its outcomes, as in `-> Grasped | Slipped`")
-    return declared_outcomes(annotation, names, what, optional=optional)
+    return declared_outcomes(annotation, names, what, records, optional=optional)
 
 
-def _reported(body: SkillBody, own: int, names: Namespace) -> dict[str, dict[str, str | None]]:
+def _reported_outcomes(
+    body: SkillBody, own: int, names: Namespace, records: FoundRecords
+) -> dict[str, dict[str, str | None]]:
     """Return the outcomes in the annotation of the call, `SkillCall[Progress]`; usually there are none."""
     parameters = list(inspect.signature(body).parameters.values())[:own]
     annotation = parameters[-1].annotation if parameters else inspect.Parameter.empty
     if isinstance(annotation, str) and "[" not in annotation:  # the name may exist only for a type checker
         return {}
     what = f"the call of '{named(body)}'"
-    found = [declared_outcomes(one, names, what) for one in get_args(evaluated(annotation, names, what))]
+    found = [declared_outcomes(one, names, what, records) for one in get_args(evaluated(annotation, names, what))]
     return {event: attributes for one in found for event, attributes in one.items()}
 
 
@@ -321,6 +359,7 @@ def signature_of(component: str, name: str, body: SkillBody, declared: Declared)
         unlimited=declared.unlimited,
         place=_place_of(body),
         within=declared.within,
+        records=declared.records,
     )
 
 

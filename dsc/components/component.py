@@ -237,7 +237,7 @@ class Component(ComponentHooks, RestartHooks):
         self.configuration.require_bound()
         body = self._functions.get(skill_name) or getattr(self, skill_name)
         declared: Declared = getattr(body, DECLARED)
-        return declared.execute(self, body, call, arguments)
+        return declared.execute(self, body, call, declared.build(arguments))
 
     async def configure_all(self, values: Mapping[str, Any]) -> None:
         """Restore the parameters after a restart: validate them as one set, then `configure` each.

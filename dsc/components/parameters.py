@@ -24,7 +24,7 @@ from functools import partial
 from inspect import get_annotations
 from typing import Any, ClassVar, Literal, TypeVar, dataclass_transform, get_args, get_origin, overload
 
-from dsc.annotations import Namespace, class_statement, evaluated, is_class_variable, members, type_of
+from dsc.annotations import Namespace, class_statement, evaluated, is_class_variable, type_of
 from dsc.components.declarations import Parameter, Type, changed, check_declarations, known, missing, violated
 from dsc.model.ranges import Who, refuse_change
 from knowledge_base.errors import SchemaError, tolerated
@@ -141,7 +141,8 @@ def _declared(kind: type[Parameters], names: Namespace) -> Iterator[tuple[str, P
 def _typed(annotation: object, said: str) -> dict[str, Any]:
     """Return the type, and the permitted values, that an annotation declares."""
     among = get_args(annotation) if get_origin(annotation) is Literal else ()
-    kind = type_of(annotation) if [*members(annotation)] == [annotation] else None
+    first = type(among[0]) if among and len({*map(type, among)}) == 1 else annotation
+    kind = {"integer": "number"}.get(found, found) if (found := type_of(first)) else None
     if kind not in get_args(Type):
         shown = getattr(annotation, "__name__", None) or str(annotation)
         valid = "float, int, bool, str or a Literal of one type"

@@ -34,12 +34,12 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from dsc.annotations import names_around, parameter_types
+from dsc.annotations import FoundRecords, names_around
 from dsc.calls import SkillCall
 from dsc.components.hooks import contained
 from dsc.loop_calls import LoopCalls
 from dsc.outcomes import Outcome
-from dsc.skills import Declared, SkillBody, refused_at, require_function, returned
+from dsc.skills import SkillBody, declaration, refused_at, require_function, returned_outcomes
 from knowledge_base.errors import SchemaError
 
 ANSWERED = "answered"
@@ -65,11 +65,12 @@ def query(body: _Asked) -> _Asked:
     require_function(body, "query")
     with refused_at(body) as name:
         names = names_around(body.__globals__)
-        answers = list(returned(body, names).values())
+        records = FoundRecords()
+        answers = list(returned_outcomes(body, names, records).values())
         if len(answers) != 1:
             raise SchemaError(f"query '{name}' returns one outcome class, the answer, not {len(answers)}")
-        types = parameter_types(body, 1, names)
-        return Declared(types, {ANSWERED: answers[0]}, _ask, own=1, pattern="query", after_crash="repeat")(body)
+        how = {"execute": _ask, "own": 1, "pattern": "query", "after_crash": "repeat"}
+        return declaration(body, 1, names, {ANSWERED: answers[0]}, records, **how)(body)
     return body
 
 
@@ -91,11 +92,12 @@ def event(test: _Test) -> _Test:
     with refused_at(test) as name:
         names = names_around(test.__globals__)
         own = sum(one.default is inspect.Parameter.empty for one in inspect.signature(test).parameters.values())
-        events = returned(test, names, optional=True)
+        records = FoundRecords()
+        events = returned_outcomes(test, names, records, optional=True)
         if len(events) != 1:
             raise SchemaError(f"event '{name}' returns one outcome class or None, not {len(events)} classes")
-        types = parameter_types(test, own, names)
-        return Declared(types, events, _activate, own=own, pattern="event", after_crash="repeat")(test)
+        how = {"execute": _activate, "own": own, "pattern": "event", "after_crash": "repeat"}
+        return declaration(test, own, names, events, records, **how)(test)
     return test
 
 
@@ -103,8 +105,8 @@ def takes(body: _Body) -> _Body:
     """Declare a coroutine method that receives one-way messages, e.g. `send: voice.say` in a chart."""
     require_function(body, "takes")
     with refused_at(body):
-        types = parameter_types(body, 1, names_around(body.__globals__))
-        setattr(body, TAKES, Declared(types, {}, _ask, own=1))
+        names = names_around(body.__globals__)
+        setattr(body, TAKES, declaration(body, 1, names, {}, FoundRecords(), execute=_ask, own=1))
     return body
 
 

@@ -22,7 +22,8 @@ from dsc.model.actions import (
     Trigger,
     Withdraw,
 )
-from dsc.model.plot import ActionPlot, PlotParameter, PlotVariable
+from dsc.model.declarations import PlotParameter, PlotVariable
+from dsc.model.plot import ActionPlot
 from dsc.model.rules import Handler, Reaction, Rule
 from dsc.model.states import State
 from dsc.model.transitions import CHOICE, SelectState, TimedTransition, Transition, TransitionSource, case_value

@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from dsc.data_types import Records
 from dsc.dynamic.rule_expansion import expand
 from dsc.engine.tables import CompiledPlot, compile_plot
 from dsc.events import RESERVED
@@ -28,13 +29,18 @@ MOST_EXPECTED = 4
 
 
 class Library:
-    """A collection of plots by name; provides the engine with compiled plots."""
+    """A collection of plots by name; provides the engine with compiled plots.
+
+    Attributes:
+        records: the records that types of plots may name: those that plots or components declare.
+    """
 
     def __init__(self, plots: Iterable[ActionPlot] = ()) -> None:
         self._plots: dict[str, ActionPlot] = {}
         self._compiled: dict[str, CompiledPlot] = {}
         self._bound: dict[str, CompiledPlot] = {}
         self._made: dict[str, ActionPlot] = {}
+        self.records: dict[str, Mapping[str, str | None]] = {}
         self._received: frozenset[str] | None = None
         if isinstance(plots, ActionPlot | str) or not isinstance(plots, Iterable):
             raise InputError(f"a library is made of a list of plots, not of {shown(plots)[:60]}")
@@ -62,8 +68,17 @@ class Library:
             raise SchemaError(
                 f"two different plots are named '{plot.name}'", place=plot.place(("plot",)), found=plot.name
             )
+        self.declare(plot.types)
         self._plots[plot.name] = plot
         self._received = None
+
+    def declare(self, records: Records) -> None:
+        """Add records; raise `SchemaError` for a second record of one name with other fields."""
+        for name, fields in records.items():
+            known = self.records.setdefault(name, fields)
+            if known != fields:
+                said = f"two records are named '{name}', with the fields {', '.join(known)} and {', '.join(fields)}"
+                raise SchemaError(said, found=name)
 
     def plot(self, name: str) -> ActionPlot:
         """Return the plot of that name, without expansion; raise `UnknownNameError` if there is none."""
@@ -118,7 +133,7 @@ class Library:
     def compiled(self, name: str) -> CompiledPlot:
         """Return the compiled plot of that name; raise `UnknownNameError` if there is none."""
         if name not in self._compiled:
-            self._compiled[name] = compile_plot(self.expanded(self.plot(name)))
+            self._compiled[name] = compile_plot(self.expanded(self.plot(name)), records=self.records)
         return self._compiled[name]
 
     def expect(self, plot: ActionPlot) -> None:
@@ -136,7 +151,10 @@ class Library:
         if not isinstance(form, Mapping):  # the value of a variable may have any type
             raise InputError(f"the value to be bound is not a plot: {form!r}")
         key = json.dumps(form)  # keys stay unsorted, because the order of states is part of a plot
-        compiled = self._bound.pop(key, None) or compile_plot(self.expanded(self._made.get(key) or _read(form)), form)
+        compiled = self._bound.pop(key, None)
+        if compiled is None:
+            plot = self.expanded(self._made.get(key) or _read(form))
+            compiled = compile_plot(plot, form, self.records)
         self._bound[key] = compiled  # the least recently used plot is dropped first
         if len(self._bound) > MOST_BOUND:
             del self._bound[next(iter(self._bound))]
@@ -186,8 +204,8 @@ def require_substitute(original: ActionPlot, substitute: ActionPlot) -> None:
             different = f"takes '{name}' as '{own.type}', not as '{parameter.type}'"
             raise _refusal(original, substitute, different, own.type, (parameter.type,))
     for name, parameter in substitute.parameters.items():
-        given = name in original.parameters and original.parameters[name].default is None
-        if parameter.default is None and not given:
+        given = name in original.parameters and original.parameters[name].required
+        if parameter.required and not given:
             needs = f"needs the parameter '{name}', which holders need not give"
             raise _refusal(original, substitute, needs, name, original.parameters)
     for name, output in original.outputs.items():

@@ -10,7 +10,8 @@ from typing import Any
 from dsc.dynamic.steps import Plots, filled
 from dsc.events import DONE, FAILURES, GAVE_UP, SKILL_FAILURES
 from dsc.model.actions import Assign, Block, Choose, Emit, Internal, Log, Tell, Withdraw
-from dsc.model.plot import ActionPlot, PlotVariable
+from dsc.model.declarations import PlotVariable
+from dsc.model.plot import ActionPlot
 from dsc.model.rules import CONTINUE, ENTER, GIVE_UP, REPLAN, RETRY, Rule
 from dsc.model.states import AnyState, FinalState, State, SubmachineState
 from dsc.model.transitions import Transition

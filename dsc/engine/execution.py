@@ -68,7 +68,7 @@ class Execution:
         path = "" if parent is None else parent.prefix + host
         if parent is not None and parent.depth >= MAX_NESTING:
             raise RunawayError(f"plots nested deeper than {MAX_NESTING}", [path])
-        variables = fill_parameters(compiled.plot, arguments, performer.situation)
+        variables = fill_parameters(compiled, arguments, performer.situation)
         performer.bound.append(PlotBound(path, compiled.plot))
         performer.serials += 1
         state = FrameState(performer.serials, compiled, initial.following, variables)
@@ -229,7 +229,7 @@ class Execution:
         """
         performer, parent = self.performer, before.parent
         assert parent is not None  # noqa: S101  # only the plot inside a state is replaced
-        variables = dict(fill_parameters(compiled.plot, arguments, performer.situation))
+        variables = dict(fill_parameters(compiled, arguments, performer.situation))
         kept = [name for name in compiled.plot.variables if name in before.compiled.plot.variables]
         variables.update({name: before.variables[name] for name in kept})
         shared = _shared(before, compiled)

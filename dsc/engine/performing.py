@@ -7,11 +7,12 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from dsc.data_types import check_all
 from dsc.engine import steps
 from dsc.engine.frames import Frame
 from dsc.engine.machine_state import NOTHING
 from dsc.engine.situation import Situation
-from dsc.engine.tables import StateNode
+from dsc.engine.tables import CompiledPlot, StateNode
 from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event
 from dsc.model.actions import (
     Assign,
@@ -29,7 +30,6 @@ from dsc.model.actions import (
     Withdraw,
 )
 from dsc.model.language import TermField
-from dsc.model.plot import ActionPlot
 from dsc.rank import Rank
 from dsc.run_log import run_logger
 from knowledge_base.errors import InputError, UnknownNameError, UserCodeError
@@ -180,7 +180,10 @@ class Performer:
     def _perform(self, frame: Frame, state: str, action: Internal) -> None:
         match action:
             case Assign(assign=terms):
-                frame.variables = {**frame.variables, **self.values(frame, terms)}
+                values, compiled = self.values(frame, terms), frame.compiled
+                if compiled.types:
+                    check_all(f"'{compiled.plot.name}.{{}}'", values, compiled.types, compiled.records)
+                frame.variables = {**frame.variables, **values}
             case Tell(tell=effect):
                 told = self.situation.tell(effect, self.bindings(frame))
                 self.knowledge = self.knowledge.then(told)
@@ -218,7 +221,15 @@ class Performer:
         self.output.append(steps.SendLater(event, _delay_of(self.value(frame, delay)), name))
 
     def emit(self, frame: Frame, name: str, attributes: Mapping[str, Any]) -> None:
-        """Fire an event in a plot; an outcome of the plot is an event of its host, or of the run."""
+        """Fire an event in a plot; an outcome of the plot is an event of its host, or of the run.
+
+        Raises:
+            InputError: an attribute of an outcome does not have its declared type.
+        """
+        types = frame.compiled.plot.emits.get(name)
+        if types and not frame.compiled.scxml:
+            attributes = dict(attributes)
+            check_all(f"the attribute '{{}}' of '{name}'", attributes, types, frame.compiled.records)
         if name not in frame.compiled.plot.emits:
             self.internal.append(Event(name, attributes, frame=frame.serial))
         elif frame.parent is None:
@@ -242,12 +253,13 @@ def _rank(frame: Frame, state: str) -> Rank:
     return Rank(priority or 0.0, handles, depth, preempts)
 
 
-def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: Situation) -> Mapping[str, Any]:
+def fill_parameters(compiled: CompiledPlot, arguments: Mapping[str, Any], situation: Situation) -> Mapping[str, Any]:
     """Return the variables of a new plot instance by name, from arguments, defaults and initial values.
 
     Raises:
-        InputError: a parameter is missing or out of its range, or an argument names no parameter.
+        InputError: a parameter is missing, out of its range or of another type, or an argument names no parameter.
     """
+    plot = compiled.plot
     if not (arguments or plot.parameters or plot.variables or plot.outputs):
         return NOTHING
     for given in arguments:
@@ -259,11 +271,19 @@ def fill_parameters(plot: ActionPlot, arguments: Mapping[str, Any], situation: S
             value = arguments[name]
         elif parameter.default is not None:
             value = _evaluate(parameter.default, variables, situation)
-        else:
+        elif parameter.required:
             raise InputError(f"plot '{plot.name}' needs its parameter '{name}'")
-        variables[name] = parameter.range.check(f"{plot.name}.{name}", value) if parameter.bounded else value
+        else:
+            value = None
+        variables[name] = value
+        if parameter.bounded and value is not None:
+            variables[name] = parameter.range.check(f"{plot.name}.{name}", value)
     for name, variable in (*plot.variables.items(), *plot.outputs.items()):
         variables[name] = None if variable.initial is None else _evaluate(variable.initial, variables, situation)
+    if compiled.types:
+        own = {name: value for name, value in variables.items() if value is not None or name in plot.parameters}
+        check_all(f"'{plot.name}.{{}}'", own, compiled.types, compiled.records)
+        variables.update(own)
     return variables
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from itertools import chain, combinations, islice
 from typing import TYPE_CHECKING, Any
 
+from dsc.data_types import NO_RECORDS, Records
 from dsc.events import DONE
 from dsc.model import states
 from dsc.model.actions import ExternalAction, Internal
@@ -172,6 +173,8 @@ class CompiledPlot:
         form: the data of a plot that was bound as data; `None` for any other plot.
         defaults: default of each history, by node index.
         scxml: whether the plot is in dialect `scxml`, where events match by prefix and have the names of SCXML.
+        types: types of parameters, variables and outputs by name; empty in dialect `scxml`.
+        records: the records of the plot's library, which later plots may extend.
         cache: cached configurations and the initial reaction (see `machine_state`).
     """
 
@@ -181,6 +184,8 @@ class CompiledPlot:
     form: Mapping[str, Any] | None = None
     defaults: Mapping[int, Default] = field(default_factory=dict)
     scxml: bool = False
+    types: Mapping[str, str] = field(default_factory=dict)
+    records: Records = field(default_factory=dict)
     cache: dict[Any, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -205,8 +210,15 @@ class CompiledPlot:
         return around < index <= self.nodes[around].last
 
 
-def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> CompiledPlot:
-    """Return the tables of a plot; `form` is the plot's data if it was bound as data.
+def compile_plot(
+    plot: ActionPlot, form: Mapping[str, Any] | None = None, records: Records = NO_RECORDS
+) -> CompiledPlot:
+    """Return the tables of a plot.
+
+    Args:
+        plot: the plot, without rules and handlers.
+        form: the plot's data if it was bound as data.
+        records: the records that types of the plot may name.
 
     Raises:
         UnknownNameError: a transition or the initial state of a scope refers to a missing state.
@@ -215,7 +227,10 @@ def compile_plot(plot: ActionPlot, form: Mapping[str, Any] | None = None) -> Com
     layout = _Layout(plot)
     for node in layout.nodes:
         layout.prepare(node)
-    return CompiledPlot(plot, tuple(layout.nodes), layout.index, form, layout.defaults(), scxml=plot.dialect == "scxml")
+    scxml = plot.dialect == "scxml"
+    declared = {} if scxml else {**plot.parameters, **plot.variables, **plot.outputs}
+    types = {name: one.type for name, one in declared.items()}
+    return CompiledPlot(plot, tuple(layout.nodes), layout.index, form, layout.defaults(), scxml, types, records)
 
 
 class _Layout:

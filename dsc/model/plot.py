@@ -11,8 +11,9 @@ from typing import Any, Literal, Self
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from dsc.model.language import ConditionField, Frozen, Setting, TermField, Written, constant
-from dsc.model.ranges import Range, Who, refuse_change
+from dsc.model.declarations import PlotParameter, PlotVariable, TypeText
+from dsc.model.language import ConditionField, Written, constant
+from dsc.model.ranges import Who, refuse_change
 from dsc.model.reading import LOCATED, FormPath
 from dsc.model.rules import Handler, Rule, told_apart
 from dsc.model.states import (
@@ -37,53 +38,6 @@ _STATE_NAME = re.compile(r"[^/#][^/]*")
 # Slashes separate state names in paths. In a stored state, a name that begins with # identifies a region.
 
 
-class _Declaration(Frozen):
-    """A declaration of a type; the type alone is the short form of the declaration."""
-
-    type: str
-
-    @model_validator(mode="before")
-    @classmethod
-    def _short_form(cls, value: Any) -> Any:
-        return {"type": value} if isinstance(value, str) else value
-
-
-class PlotParameter(_Declaration):
-    """An input parameter of a plot, with the roles that may set its value (S1.11).
-
-    Attributes:
-        type: a type of the knowledge base's schema, or `number`, `boolean`, `text`, `symbol`.
-        default: value if no role sets another value; `None` makes the parameter required.
-        least, most: lower and upper bound of a number, inclusive; `None` means no bound.
-        among: the allowed values; empty means any.
-        changed_by: the last role that may set the value; all earlier roles may set it, too. In order: `nobody`;
-            `profile`, before a run; `operator`, during a run; `rules` and handlers that use the plot; `plots` that use
-            the plot.
-    """
-
-    default: TermField | None = None
-    least: float | None = Field(default=None, strict=True)
-    most: float | None = Field(default=None, strict=True)
-    among: tuple[Setting, ...] = ()
-    changed_by: Who = "plots"
-
-    @property
-    def range(self) -> Range:
-        """The allowed values of the parameter."""
-        return Range(self.type, self.least, self.most, self.among)
-
-    @property
-    def bounded(self) -> bool:
-        """Whether the parameter has a bound or a list of allowed values."""
-        return self.least is not None or self.most is not None or bool(self.among)
-
-
-class PlotVariable(_Declaration):
-    """A variable or output of a plot; its value exists only while the plot runs (S0.7)."""
-
-    initial: TermField | None = None
-
-
 class ActionPlot(Written):
     """An action plot: a state chart with parameters, variables, outcome events and rules.
 
@@ -94,6 +48,7 @@ class ActionPlot(Written):
         receives: accepted events from outside, e.g. from an operator, with the types of their attributes.
         outputs: typed values that the plot returns (S2.1). The plot assigns and reads them like variables. At the
             plot's end they become the attributes of the host state's `done` event.
+        types: records by name: the types of their fields. Plots of one library share their records.
         emits: outcome events with the types of their attributes; the host state must handle every outcome event.
         when: condition under which the plot fits as a candidate of a dynamic state (bottom-up, S0.4).
         implements: name of the planning action that the plot executes; both must have equal names of parameters.
@@ -113,8 +68,9 @@ class ActionPlot(Written):
     parameters: dict[str, PlotParameter] = Field(default_factory=dict)
     variables: dict[str, PlotVariable] = Field(default_factory=dict)
     outputs: dict[str, PlotVariable] = Field(default_factory=dict)
-    receives: dict[str, dict[str, str] | None] = Field(default_factory=dict)
-    emits: dict[str, dict[str, str] | None] = Field(default_factory=dict)
+    types: dict[str, dict[str, TypeText]] = Field(default_factory=dict)
+    receives: dict[str, dict[str, TypeText] | None] = Field(default_factory=dict)
+    emits: dict[str, dict[str, TypeText] | None] = Field(default_factory=dict)
     when: ConditionField | None = None
     implements: str | None = None
     effects: Literal["observed", "assumed"] = "observed"

@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from dsc.calls import Clock, Ended, SkillCall, Status
@@ -19,6 +20,7 @@ from dsc.components.component import Component
 from dsc.components.hooks import abandon, active_component, bug_in, cancel_once, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.turns import Claim, Turns
+from dsc.dynamic.library import Library
 from dsc.engine import steps
 from dsc.errors import UncertainActionError
 from dsc.events import (
@@ -35,7 +37,7 @@ from dsc.outcomes import Outcome
 from dsc.run_log import run_logger
 from dsc.sequencer.clock import LoopClock, PastClock
 from dsc.sequencer.inbox import Timers
-from dsc.sequencer.message_checks import encoded, late, validated
+from dsc.sequencer.message_checks import arguments_for, encoded, late, validated
 from dsc.sequencer.outbox import CLOSING, Outbox, command, failure, port_of
 from dsc.sequencer.running_skills import InterruptedSkill, PendingCleanups, RunningSkill, WaitObserver
 from dsc.sequencer.undeployed import Undeployed
@@ -66,6 +68,7 @@ class Dispatcher:
         observer: names the states of skills, and records which skills wait.
         part_of: a prefix of the action ids that components receive.
         run_id: identifies the run, see `SkillCall.key`.
+        library: the plots, whose records the types of skills may name; it receives the records of skills.
 
     Attributes:
         activation: keeps required components alive and active.
@@ -81,7 +84,9 @@ class Dispatcher:
         observer: WaitObserver,
         part_of: str = "",
         run_id: str = "",
+        library: Library | None = None,
     ) -> None:
+        self._library = library or Library()
         self._observer = observer
         self._part_of = part_of
         self._run_id = run_id
@@ -227,11 +232,13 @@ class Dispatcher:
                 return f"{running.start.component}.{running.start.skill}"
         return None
 
-    def place_of(self, start: steps.Start) -> str:
-        """Return file and line of a skill; empty if they are unknown."""
+    def signature(self, start: steps.Start) -> SkillSignature:
+        """Return the signature of a skill with all known records; `UNKNOWN_SKILL` for a skill that is missing."""
         component = self._components.get(start.component)
-        signature = None if component is None else component.skills().get(start.skill)
-        return "" if signature is None else signature.place
+        found = UNKNOWN_SKILL if component is None else component.skills().get(start.skill, UNKNOWN_SKILL)
+        if found.records:
+            self._library.declare(found.records)
+        return replace(found, records=self._library.records) if self._library.records else found
 
     def memories(self) -> Iterator[tuple[str, Any]]:
         """Yield names and memories of components.
@@ -360,7 +367,7 @@ class Dispatcher:
         except Exception as error:  # an error of a component must not end the program
             raise InputError(f"{start.component}.{start.skill} may continue: {reason_of(error)}") from error
         if ended is not None:
-            signature = component.skills().get(start.skill, UNKNOWN_SKILL)
+            signature = self.signature(start)
             outcome = validated(ended.outcome, start, signature)
             self._post(SkillMessage(start, outcome, final=True, declared=signature.outcomes.get(outcome.event)))
 
@@ -393,7 +400,7 @@ class Dispatcher:
 
     def _start(self, start: steps.Start, interrupted: InterruptedSkill | None = None) -> None:
         component = self.component(start.component)
-        signature = component.skills().get(start.skill, UNKNOWN_SKILL)
+        signature = self.signature(start)
         endless = signature.unlimited or signature.pattern == "event"
         within = start.within or signature.within or (math.inf if endless else DEFAULT_WITHIN)
         since = self._clock.now() if interrupted is None else interrupted.asked
@@ -467,7 +474,7 @@ class Dispatcher:
                 raise UncertainActionError(f"the run was interrupted, and the effect of {call.action_id} is unknown")
             if status is Status.RUNNING or signature.pattern != "event":  # else the event is activated again
                 taken = interrupted.reports
-        work = component.execute(start.skill, call, encoded(start.arguments) if start.arguments else {})
+        work = component.execute(start.skill, call, arguments_for(start, signature) if start.arguments else {})
         outcome = validated(await dependencies.carrying(work), start, signature)
         # The observations are true, also if they arrive late.
         return late(start, running.within, observed=outcome.observed) if running.is_late else outcome

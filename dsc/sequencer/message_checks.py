@@ -10,6 +10,7 @@ from typing import Any
 from dsc.calls import OBSERVED
 from dsc.components.component import Component
 from dsc.components.hooks import is_own, running_task
+from dsc.data_types import WORDS, Records, check_all, data_type, objects_in
 from dsc.dynamic.library import Library
 from dsc.engine.steps import NO_CHANGE, Start
 from dsc.events import NO_ATTRIBUTES, PROGRAMMING_ERROR, RESERVED, SKILL_ERROR, TIMED_OUT, Event
@@ -79,7 +80,7 @@ def late(start: Start, seconds: float, waited: str = "", observed: Delta = NO_CH
 def validated(outcome: object, start: Start, signature: SkillSignature) -> Outcome:
     """Return the outcome with encoded attributes, or a `programming_error` if the outcome violates the signature."""
     try:
-        return _conforming(outcome, signature.outcomes)
+        return _conforming(outcome, signature)
     except InputError as error:
         return _invalid(start, str(error), signature.place)
     except BaseException as error:
@@ -88,7 +89,20 @@ def validated(outcome: object, start: Start, signature: SkillSignature) -> Outco
         return _invalid(start, f"its outcome cannot be read: {described(error)}", signature.place)
 
 
-def _conforming(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
+def arguments_for(start: Start, signature: SkillSignature) -> dict[str, Any]:
+    """Return a copy of the arguments of a skill, converted to their types.
+
+    Raises:
+        InputError: an argument does not have its type.
+    """
+    arguments: dict[str, Any] = encoded(start.arguments)
+    subject = f"the argument '{{}}' of {start.component}.{start.skill}"
+    check_all(subject, arguments, signature.parameters, signature.records)
+    return arguments
+
+
+def _conforming(outcome: object, signature: SkillSignature) -> Outcome:
+    outcomes = signature.outcomes
     if not isinstance(outcome, Outcome):
         raise InputError(f"it ended with {shown(outcome)}, which is not an Outcome")
     event, attributes, observed = outcome.event, outcome.attributes, outcome.observed
@@ -109,10 +123,14 @@ def _conforming(outcome: object, outcomes: Mapping[str, Declared]) -> Outcome:
             raise InputError(f"the observation of '{event}': {error}") from None
         if observed.removed and observed.added:  # additions win, as in an effect: a drive to the place where it begins
             observed = NO_CHANGE.then(observed)
-    return Outcome(event, _plain(event, attributes, declared) if attributes or declared else {}, observed)
+    return Outcome(
+        event, _plain(event, attributes, declared, signature.records) if attributes or declared else {}, observed
+    )
 
 
-def _plain(event: str, attributes: Mapping[str, Any], declared: Declared, what: str = "outcome") -> dict[str, Any]:
+def _plain(
+    event: str, attributes: Mapping[str, Any], declared: Declared, records: Records, what: str = "outcome"
+) -> dict[str, Any]:
     """Return a copy of the attributes of an outcome or event as plain data.
 
     Raises:
@@ -123,35 +141,21 @@ def _plain(event: str, attributes: Mapping[str, Any], declared: Declared, what: 
         if name not in declared:
             message = f"the {what} '{event}' has no attribute {shown(name)}"
             raise UnknownNameError(message, found=str(name), valid=declared)
+    checked = dict(attributes)
     for name, kind in declared.items():
-        if name not in attributes:
+        wanted = None if kind is None else data_type(kind)
+        if name not in attributes and (wanted is None or wanted.kind != "optional"):
             of_type = f" of type {kind}" if kind else ""
             raise InputError(f"the {what} '{event}' needs its attribute '{name}'{of_type}")
-        wanted = _FITS.get(kind)
-        if wanted is not None and not wanted[1](attributes[name]):
-            raise InputError(f"the attribute '{name}' of '{event}' is {wanted[0]}, not {shown(attributes[name])}")
-    plain: dict[str, Any] = _copied(dict(attributes), f"the attributes of '{event}'")
+        if wanted is not None:
+            checked[name] = wanted.check(f"the attribute '{name}' of '{event}'", attributes.get(name), records)
+    plain: dict[str, Any] = _copied(checked, f"the attributes of '{event}'")
     return plain
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
-
-
-_FITS: Mapping[str | None, tuple[str, Callable[[object], bool]]] = {
-    "number": ("a finite number", _is_number),
-    "boolean": ("a truth value", lambda value: isinstance(value, bool)),
-    "text": ("text", _is_text),
-    "symbol": ("a name", _is_text),
-}
-"""Types of values that are not objects of the world, with a description and a test."""
-
-
-def validated_in_world(message: SkillMessage, knowledge: KnowledgeBase, place: Callable[[Start], str]) -> SkillMessage:
+def validated_in_world(
+    message: SkillMessage, knowledge: KnowledgeBase, signature: Callable[[Start], SkillSignature]
+) -> SkillMessage:
     """Return the message, or a `programming_error` if its outcome contradicts the schema or the world.
 
     If the outcome only refers to objects that were deleted, the result is a `skill_error`: the skill could not know.
@@ -159,23 +163,24 @@ def validated_in_world(message: SkillMessage, knowledge: KnowledgeBase, place: C
     Args:
         message: a message whose outcome conforms to the skill's signature.
         knowledge: the world before the observations of the outcome.
-        place: returns file and line of the skill.
+        signature: returns the signature of the skill.
     """
     said = message.outcome
     if said.observed is NO_CHANGE and not message.declared:
         return message
+    skill = signature(message.start)
     try:
         worlds: list[World] = [knowledge]
         if said.observed:
             worlds.insert(0, after := knowledge.overlay())
             after.apply(said.observed)
-        _require_objects(said.event, said.attributes, message.declared or {}, *worlds)
+        _require_objects(said.event, said.attributes, message.declared or {}, skill.records, *worlds)
     except Exception as error:  # noqa: BLE001  # an outcome may contain anything, e.g. unhashable values
         reason = described(error, named=not isinstance(error, InputError))
         if isinstance(error, UnknownNameError) and _was_deleted(error.found, knowledge):
             outcome = failed(message.start, reason)
         else:
-            outcome = _invalid(message.start, reason, place(message.start))
+            outcome = _invalid(message.start, reason, skill.place)
         return SkillMessage(message.start, outcome, final=True, continues=not message.final)
     return message
 
@@ -193,28 +198,41 @@ _MOST_SEARCHED = 1_000
 """Number of changes in which a deleted object is searched."""
 
 
-def _require_objects(event: str, attributes: Mapping[str, Any], declared: Declared, *worlds: World) -> None:
-    """Require that each attribute of an object type is the name of an object in one of these worlds.
+def _require_objects(
+    event: str, attributes: Mapping[str, Any], declared: Declared, records: Records, *worlds: World
+) -> None:
+    """Require that each part of an attribute that has an object type names an object in one of these worlds.
 
     Raises:
         InputError: the attribute is not a name, or there is no such object, or the object has another type.
     """
+    for name, kind in declared.items():
+        if kind is None or kind in _SCALARS:
+            continue
+        for at, value, wanted in objects_in(data_type(kind), attributes.get(name), records):
+            place = f"the attribute '{name}' of '{event}'" + (f" at {at}" if at else "")
+            _require_object(place, value, wanted, *worlds)
+
+
+_SCALARS = frozenset({"number", "integer", "boolean", *WORDS})
+
+
+def _require_object(place: str, value: object, wanted: str, *worlds: World) -> None:
+    """Require that a value names an object of a type in one of these worlds; an undeclared type accepts every name."""
     schema = worlds[0].schema
-    for name, wanted in declared.items():
-        if wanted is None or wanted not in schema.types:
-            continue
-        value = attributes.get(name)
-        known = [world.type_of(value) for world in worlds] if isinstance(value, str) else []
-        found = next((type_ for type_ in known if type_ is not None), None)
-        if found is not None and schema.is_a(found, wanted):
-            continue
-        said = f"the attribute '{name}' of '{event}' is of type {wanted}, and"
-        if not isinstance(value, str):
-            raise InputError(f"{said} {shown(value)} is not a name")
-        if found is not None:
-            raise SchemaError(f"{said} '{value}' is of type {found}", found=value)
-        valid = {thing for world in worlds for thing in world.objects(wanted)}
-        raise UnknownNameError(f"{said} there is no object '{value}'", found=value, valid=valid)
+    if wanted not in schema.types:
+        return
+    known = [world.type_of(value) for world in worlds] if isinstance(value, str) else []
+    found = next((type_ for type_ in known if type_ is not None), None)
+    if found is not None and schema.is_a(found, wanted):
+        return
+    said = f"{place} is of type {wanted}, and"
+    if not isinstance(value, str):
+        raise InputError(f"{said} {shown(value)} is not a name")
+    if found is not None:
+        raise SchemaError(f"{said} '{value}' is of type {found}", found=value)
+    valid = {thing for world in worlds for thing in world.objects(wanted)}
+    raise UnknownNameError(f"{said} there is no object '{value}'", found=value, valid=valid)
 
 
 # -- input from outside ------------------------------------------------------------------------------------
@@ -256,8 +274,8 @@ def checked_event(said: object, plots: Library, knowledge: KnowledgeBase) -> Eve
         declared = plot.receives.get(said.name)
         if declared is not None:
             try:
-                _plain(said.name, attributes, declared, "event")
-                _require_objects(said.name, attributes, declared, knowledge)
+                attributes = _plain(said.name, attributes, declared, plots.records, "event")
+                _require_objects(said.name, attributes, declared, plots.records, knowledge)
                 break
             except InputError as error:
                 errors.append(error)
@@ -265,7 +283,7 @@ def checked_event(said: object, plots: Library, knowledge: KnowledgeBase) -> Eve
         if errors:
             raise errors[0]
         plots.require_receiver(said.name)  # none declares the event
-    if plain:
+    if plain and not attributes:
         return said
     copied = _copied(attributes, f"the attributes of '{said.name}'") if attributes else NO_ATTRIBUTES
     return said._replace(attributes=copied)
@@ -301,28 +319,23 @@ def checked_setting(
     return ParameterMessage(owner, name, value, of_plot=owner not in components)
 
 
-def checked_arguments(plot: ActionPlot, given: object, world: World) -> Mapping[str, Any]:
-    """Return the validated arguments of a plot.
+def checked_arguments(plot: ActionPlot, given: object, world: World, library: Library) -> Mapping[str, Any]:
+    """Return the validated arguments of a plot of a library; `given` may be `None`.
 
     Raises:
-        InputError: `given` is not a mapping, a value is not plain data, or a number or truth value has another type.
-        UnknownNameError: the parameter has a type of the schema, and the world has no such object of this type.
+        InputError: `given` is not a mapping, or a value is not plain data or has another type than its parameter.
+        UnknownNameError: a part of a value has a type of the schema, and the world has no such object.
     """
+    if given is None:
+        return {}
     if not isinstance(given, Mapping):
         raise InputError(f"arguments are a mapping of parameters' names to values, not {shown(given)}")
     for name, value in given.items():
         declared = plot.parameters.get(name)
-        if declared is not None and declared.type in {"number", "boolean"}:
-            declared.range.check(f"{plot.name}.{name}", value)
-        elif declared is not None and world.schema.is_type(declared.type, 1):
-            _require_object(f"{plot.name}.{name}", value, declared.type, world)
+        if declared is not None:
+            place = f"'{plot.name}.{name}'"
+            checked = data_type(declared.type).check(place, value, library.records)
+            for at, one, wanted in objects_in(data_type(declared.type), checked, library.records):
+                _require_object(f"{place} at {at}" if at else place, one, wanted, world)
         _copied(value, f"the argument '{name}'")
     return given
-
-
-def _require_object(name: str, value: object, kind: str, world: World) -> None:
-    own = world.type_of(value) if isinstance(value, str) else None
-    if own is not None and world.schema.is_a(own, kind):
-        return
-    said = f"there is no {kind} {shown(value)}" if own is None else f"'{value}' is of type {own}"
-    raise UnknownNameError(f"'{name}' is a {kind}; {said}", found=str(value), valid=world.objects(kind))

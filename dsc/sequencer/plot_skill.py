@@ -101,7 +101,7 @@ class PlotComponent(Component):
 
 
 def _signature(component: str, plot: ActionPlot, after_crash: AfterCrash) -> SkillSignature:
-    defaults = {name: one.default for name, one in plot.parameters.items() if one.default is not None}
+    defaults = {name: one.default for name, one in plot.parameters.items() if not one.required}
     return SkillSignature(
         component=component,
         name=plot.name,

@@ -96,7 +96,7 @@ class Sequencer:
         if store is not None:
             self.trace.listen(store.receive)
         self._inbox = Inbox()
-        self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id)
+        self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id, library)
         self._open_ended = open_ended
         self._over = False
         self._stopped: str | None = None  # the reason to end the run, from outside; not kept with its state
@@ -231,7 +231,7 @@ class Sequencer:
         if isinstance(plot, PlotCall):
             arguments = {**plot.arguments, **(arguments or {})}
         wanted = self.library.plot(plot.plot if isinstance(plot, PlotCall) else plot)
-        given = message_checks.checked_arguments(wanted, {} if arguments is None else arguments, self.knowledge)
+        given = message_checks.checked_arguments(wanted, arguments, self.knowledge, self.library)
 
         async def begin() -> None:
             self._start(wanted.name, given)
@@ -462,7 +462,7 @@ class Sequencer:
         self.dispatcher.dispatch_all(output)
 
     def _validated(self, message: SkillMessage) -> SkillMessage:
-        return message_checks.validated_in_world(message, self.knowledge, self.dispatcher.place_of)
+        return message_checks.validated_in_world(message, self.knowledge, self.dispatcher.signature)
 
     def _may_group(self, message: Message, output: Collection[Output]) -> bool:
         """Return whether the next macrostep may share the commit of this one.

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from dsc.events import DONE
-from dsc.model.plot import ActionPlot, PlotVariable
+from dsc.model.declarations import PlotVariable
+from dsc.model.plot import ActionPlot
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta
 from knowledge_base.language.evaluation.evaluator import apply_effect

@@ -10,7 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from keyword import iskeyword
 
 from dsc.annotations import domain_type, type_class
-from dsc.model.plot import ActionPlot, PlotParameter
+from dsc.model.declarations import PlotParameter
+from dsc.model.plot import ActionPlot
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.world.schema import Schema
 

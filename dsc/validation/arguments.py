@@ -11,7 +11,8 @@ from dsc.components.declarations import Parameter, known
 from dsc.dynamic.steps import Step, concerns, contents_of, entered_by
 from dsc.errors import Finding
 from dsc.model.actions import Assign, Configure, ExternalAction, Internal, Trigger, component_of, flat
-from dsc.model.plot import ActionPlot, Path, PlotParameter, initial_of
+from dsc.model.declarations import PlotParameter
+from dsc.model.plot import ActionPlot, Path, initial_of
 from dsc.model.ranges import Who, refuse_change
 from dsc.model.rules import Rule
 from dsc.model.states import AnyState, FinalState, HistoryState, State, SubmachineState
@@ -50,7 +51,7 @@ def _own(subject: Subject, name: str, parameter: PlotParameter) -> Iterator[Find
     for problem in parameter.range.problems():
         yield subject.finding(here, "parameter roles", f"parameter '{name}': {problem}")
         return
-    if parameter.default is None:
+    if parameter.required:
         if parameter.changed_by != "plots":
             message = f"'{name}' needs a default, because not every user of the plot may set it"
             yield subject.finding(here, "parameter roles", message, "a profile may set another one")
@@ -228,7 +229,7 @@ class _Need:
 
 
 def _needed(plot: ActionPlot) -> Iterator[str]:
-    return (name for name, parameter in plot.parameters.items() if parameter.default is None)
+    return (name for name, parameter in plot.parameters.items() if parameter.required)
 
 
 class _Entrances:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 
+from dsc.data_types import data_type, names_in
 from dsc.dynamic.steps import (
     Outcomes,
     Step,
@@ -31,6 +32,7 @@ from dsc.model.transitions import SelectState, TimedTransition, Transition, Tran
 from dsc.skills import SkillSignature, check_arguments
 from dsc.validation.rules import RuleScope, attributes_of, read_as
 from dsc.validation.subject import Subject, Types
+from dsc.validation.type_checks import FREE_TYPES, TypeChecker, language_type
 from knowledge_base.errors import InputError
 from knowledge_base.language.checking.binding import unbound_error
 from knowledge_base.language.checking.check import check, check_effect, check_term
@@ -38,9 +40,6 @@ from knowledge_base.language.syntax.effect import Effect, mentioned
 from knowledge_base.language.syntax.expression import Constant, Expression, Term, Variable, free_variables
 from knowledge_base.language.syntax.text import to_text
 
-_VALUES = frozenset({"number", "boolean"})
-FREE_TYPES = _VALUES | {"text", "symbol", "condition", "plot"}
-"""Types that parameters and variables may have in addition to the schema's types."""
 _ANY: Types = {}
 
 
@@ -59,7 +58,7 @@ class _Data:
     def __init__(self, subject: Subject) -> None:
         self._subject, self._plot, self._library = subject, subject.plot, subject.library
         self._schema = subject.schema
-        self._typed = {"number", "text", "boolean"}.union(() if self._schema is None else self._schema.types)
+        self._checker = TypeChecker(subject.schema, subject.records)
         self._skills = subject.skills or {}
         self._assigned, self._own = subject.assigned, subject.types
         self._rules = RuleScope(subject)
@@ -89,18 +88,27 @@ class _Data:
     # -- parts of a plot ---------------------------------------------------------------------------------
 
     def _declarations(self) -> Iterator[Finding]:
-        plot, valid = self._plot, FREE_TYPES if self._schema is None else FREE_TYPES | self._schema.types.keys()
+        plot = self._plot
         for name, parameter in plot.parameters.items():
-            yield from self._declared(parameter.type, valid, ("parameters", name))
+            yield from self._type_exists(parameter.type, ("parameters", name))
             yield from self._fits(parameter.default, parameter.type, _ANY, ("parameters", name, "default"))
         for group, declared in (("variables", plot.variables), ("outputs", plot.outputs)):
             for name, variable in declared.items():
-                yield from self._declared(variable.type, valid, (group, name))
+                yield from self._type_exists(variable.type, (group, name))
                 yield from self._fits(variable.initial, variable.type, self._own, (group, name, "initial"))
+        for group, events in (("types", plot.types), ("emits", plot.emits), ("receives", plot.receives)):
+            for event, attributes in events.items():
+                for name, kind in (attributes or {}).items():
+                    yield from self._type_exists(kind, (group, event, name))
 
-    def _declared(self, kind: str, valid: Iterable[str], path: Path) -> Iterator[Finding]:
-        if self._schema is not None and kind not in valid:
-            yield self._subject.finding(path, "known type", f"there is no type '{kind}'", found=kind, valid=valid)
+    def _type_exists(self, text: str, path: Path) -> Iterator[Finding]:
+        if self._schema is None:
+            return
+        for name in names_in(data_type(text)):
+            if not self._checker.knows(name):
+                valid = {*FREE_TYPES, *self._schema.types, *self._subject.records}
+                message = f"there is no type '{name}'"
+                yield self._subject.finding(path, "known type", message, found=name, valid=valid)
 
     def _state(self, state: State, path: Path) -> Iterator[Finding]:
         for key, block in state.blocks():
@@ -325,8 +333,9 @@ class _Data:
         return {**self._own, **dict.fromkeys(attributes)} if attributes else self._own
 
     def _known(self, scope: Types) -> dict[str, str | None]:
-        """Return the scope with `None` for each type that the schema does not declare."""
-        return {name: kind if kind in self._typed else None for name, kind in scope.items()}
+        """Return the scope with `None` for each type that conditions do not know."""
+        assert self._schema is not None  # noqa: S101
+        return {name: kind and language_type(kind, self._schema) for name, kind in scope.items()}
 
     # -- types -------------------------------------------------------------------------------------------
 
@@ -337,14 +346,21 @@ class _Data:
         given = None if term is None or wanted is None or not self._subject.strict else self._kind(term, scope)
         if term is None or wanted is None or given is None:
             return
+        name, kind = what or path[-1], data_type(wanted)
         named = wanted in (self._schema.types if self._schema is not None else ())
         if named and isinstance(term, Constant) and isinstance(term.value, str) and term.value != term.value.lower():
-            message = f"'{what or path[-1]}' is of type {wanted}, and the name of an object is in lower case"
+            message = f"'{name}' is of type {wanted}, and the name of an object is in lower case"
             lower = term.value.lower()
             yield self._subject.finding(path, "value fits", message, f"write {lower}", found=term.value)
-        if not self._compatible(given, wanted):
-            message = f"'{what or path[-1]}' is of type {wanted}, and {to_text(term)} is of type {given}"
+        different = self._checker.difference(data_type(given), kind)
+        if different is not None:
+            message = f"'{name}' is of type {wanted}, and {to_text(term)} is {different}"
             yield self._subject.finding(path, "value fits", message, found=to_text(term))
+        elif isinstance(term, Constant) and all(map(self._checker.knows, names_in(kind))):
+            try:
+                kind.check(f"'{name}'", term.value, self._subject.records)
+            except InputError as error:
+                yield self._subject.caught(error, path, "value fits")
 
     def _kind(self, term: Term, scope: Types) -> str | None:
         """Return the type of a term's value, or `None` if it is unknown."""
@@ -357,15 +373,6 @@ class _Data:
                 return "text" if self._schema is None else self._schema.constants.get(name, "text")
             case _:
                 return "number"
-
-    def _compatible(self, given: str, wanted: str) -> bool:
-        schema = self._schema
-        if _VALUES & {given, wanted}:  # an unknown type has a separate finding, and here fits every value
-            known = schema is None or {given, wanted} <= FREE_TYPES | schema.types.keys()
-            return given == wanted or not known
-        if schema is None or not {given, wanted} <= schema.types.keys():
-            return True  # a word may be the name of an object, a plot or a condition
-        return schema.is_a(given, wanted) or schema.is_a(wanted, given)
 
 
 def _types(plot: ActionPlot) -> dict[str, str]:

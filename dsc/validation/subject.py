@@ -43,6 +43,7 @@ class Subject:
         planned: whether a dynamic state has a goal.
         assigned: declared types of variables and outputs, by name.
         types: declared types of variables, outputs and parameters, by name.
+        records: the records of the library and of the skills.
     """
 
     def __init__(
@@ -62,6 +63,9 @@ class Subject:
         self.planned = any(is_planned(state) for _, state, _ in self.steps)
         self.assigned = {name: one.type for name, one in (plot.variables | plot.outputs).items()}
         self.types: Types = {**{name: one.type for name, one in plot.parameters.items()}, **self.assigned}
+        self.records: dict[str, Mapping[str, str | None]] = dict(library.records)
+        for skill in (skills or {}).values():
+            self.records.update(skill.records)
         self._states = {path: state for _, state, path in self.states}
         self._leaving = {
             path: tuple(((*path, *inside), trigger, way) for inside, trigger, way in state.placed_transitions())

@@ -273,7 +273,7 @@ class _Robot:
         if main not in plots:
             raise UnknownNameError(f"the bundle '{self._bundle.name}' has no plot '{main}'", found=main, valid=plots)
         for name, parameter in plots[main].parameters.items():
-            if parameter.default is None:
+            if parameter.required:
                 place = plots[main].place(("parameters", name))
                 message = f"the main plot '{main}' needs its parameter '{name}', and a run gives it none"
                 raise InputError(message, place=place)

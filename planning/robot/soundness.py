@@ -46,7 +46,7 @@ def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[
             continue
         names = [parameter.name for parameter in action.parameters]
         for name, parameter in plot.parameters.items():
-            if name not in names and parameter.default is None:
+            if name not in names and parameter.required:
                 missing = UnknownNameError(
                     f"planning action '{action.name}' has no parameter '?{name}' to give to the plot",
                     place=plot.place(("parameters", name)), found=name, valid=names,

@@ -373,7 +373,7 @@ def waits(call) -> Ok:
 def test_a_skill_may_be_a_function():
     voice = component_of("voice", greet, waits)
     signature = voice.skills()["greet"]
-    assert (signature.component, signature.parameters) == ("voice", {"person": None, "times": "number"})
+    assert (signature.component, signature.parameters) == ("voice", {"person": None, "times": "integer"})
     outcome, _, _ = execute(voice, "greet", person="bob", times=2)
     assert outcome.attributes == {"person": "bobbob"}
     assert execute(voice, "waits")[0].event == "ok"

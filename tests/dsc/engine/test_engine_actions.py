@@ -174,7 +174,7 @@ def test_a_delay_that_is_none_is_an_error_not_a_timeout_that_never_comes(seconds
     run = Run(
         plot("""
         plot: p
-        variables: {t: number}
+        variables: {t: any}
         states: {a: {on: {go: {to: b, assign: {t: ?event.t}}}}, b: {after: {seconds: ?t, to: c}}, c: }
     """)
     )

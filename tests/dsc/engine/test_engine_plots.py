@@ -130,7 +130,7 @@ def test_the_order_of_a_bound_plots_states_counts():
 )
 def test_what_is_no_plot_cannot_be_bound_and_is_an_error_of_the_chart(value):
     host = plot(
-        "{plot: p, variables: {what: plot}, states: {a: {on: {go: {to: h, assign: {what: ?event.what}}}}, h: {use: ?what}}}"
+        "{plot: p, variables: {what: any}, states: {a: {on: {go: {to: h, assign: {what: ?event.what}}}}, h: {use: ?what}}}"
     )
     run = Run(host)
     run.start()

@@ -89,7 +89,7 @@ def test_the_period_is_worked_out_anew_each_time():
 def test_a_period_that_is_none_is_an_error_of_the_chart(nonsense):
     run = started(f"""
         plot: p
-        parameters: {{t: {{type: number, default: {nonsense}}}}}
+        parameters: {{t: {{type: any, default: {nonsense}}}}}
         states: {{a: {{every: {{seconds: ?t, to: b}}, on: {{error: {{to: b, assign: {{}}}}}}}}, b: }}
     """)
     assert run.active == ["b"]

@@ -374,9 +374,9 @@ def test_arguments_and_answers_are_copies():
     ran = Ran(
         """
         plot: p
-        parameters: {things: symbol}
-        emits: {end: {yours: symbol, mine: symbol}}
-        variables: {got: symbol}
+        parameters: {things: list of symbol}
+        emits: {end: {yours: list of symbol, mine: list of symbol}}
+        variables: {got: list of symbol}
         states:
           a: {entry: {trigger: arm.collect, with: {things: ?things}}, on: {ok: {to: e, assign: {got: ?event.things}}}}
           e: {final: true, emit: end, with: {yours: ?things, mine: ?got}}

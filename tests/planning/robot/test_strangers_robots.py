@@ -167,9 +167,9 @@ def test_a_plot_runs_with_arguments_that_are_checked_first(project):
     report = json.loads(dsc("run", project, "--plot", "drive", "--with", "to=office", "--json"))
     assert (report["goal_reached"], report["judge"]) == (True, "outcome")
     said = dsc("run", project, "--plot", "drive", "--with", "to=ofice", status=2)
-    assert "'drive.to' is a room; there is no room 'ofice'; did you mean 'office'?" in said
+    assert "'drive.to' is of type room, and there is no object 'ofice'; did you mean 'office'?" in said
     said = dsc("run", project, "--plot", "drive", "--with", "to=parcel1", status=2)
-    assert "'drive.to' is a room; 'parcel1' is of type parcel" in said
+    assert "'drive.to' is of type room, and 'parcel1' is of type parcel" in said
     assert "no parameter 'too'; did you mean 'to'" in dsc(
         "run", project, "--plot", "drive", "--with", "too=x", status=2
     )

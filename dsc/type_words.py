@@ -1,0 +1,59 @@
+"""Types and values of data in the words of messages, and the answer to a text that is not a type."""
+
+from __future__ import annotations
+
+import re
+
+from knowledge_base.errors import InputError
+from knowledge_base.facts import GEOMETRY, MOST_NUMBERS
+from knowledge_base.language.checking.inputs import shown
+from knowledge_base.spelling import is_plain_name
+
+_LIKE_PYTHON = re.compile(r"(list|map|dict|optional)[\[(<](.*)[\])>]", re.IGNORECASE)
+
+
+def in_words(text: str) -> str:
+    """Return a type, given as text, with its article, for messages."""
+    if text in _SAID:
+        return _SAID[text]
+    if is_plain_name(text):
+        return f"the name of an object of type {text}"
+    return f"{'an' if text[0] in 'aeiou' else 'a'} {text}"
+
+
+_SAID = {
+    "text": "text", "symbol": "a name", "condition": "a condition", "plot": "a plot", "boolean": "a truth value",
+    "number": "a finite number", "integer": "an integer", GEOMETRY: f"a geometry, 1 to {MOST_NUMBERS} finite numbers",
+}  # fmt: skip
+
+
+def brief(value: object) -> str:
+    """Return the text of a value, with at most 80 characters."""
+    text = shown(value)
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 1]}…"
+
+
+_LONGEST_SHOWN = 80
+
+
+def choice_text(value: object) -> str:
+    """Return a value as a choice writes it: a text that is not a name has quotes."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) and not is_plain_name(value) else str(value)
+
+
+def not_a_type(text: str) -> InputError:
+    """Return the error for a text that is not a type, with the form that is nearest."""
+    python = _LIKE_PYTHON.fullmatch(text)
+    if python is not None:
+        outer, inside = python[1].lower(), python[2].rpartition(",")[2].strip()
+        better = f"optional {inside}" if outer == "optional" else f"{outer.replace('dict', 'map')} of {inside}"
+    elif text.endswith("?"):  # the sign of other languages
+        better = f"optional {text[:-1]}"
+    elif text.partition(" ")[0] in {"list", "map"}:
+        better = f"{text.partition(' ')[0]} of {text.rpartition(' ')[2]}"
+    else:
+        forms = "a name, `list of item`, `map of number`, `optional text`, `left | right` or `number from 0 to 5 in m`"
+        return InputError(f"'{text}' is not a type; a type is {forms}", found=text)
+    return InputError(f"'{text}' is not a type; write `{better}`", found=text)

@@ -1,0 +1,212 @@
+"""Types of data: which values they accept, in one check, in a run, through a store, and from another process (S2.21)."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typed_values import PLAIN, RECORDS, typed_values
+
+from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, parse_plot, skill
+from dsc.data_types import data_type, objects_in
+from dsc.runs.archive import records_of
+from dsc.runs.store import RunStore
+from dsc.sequencer.clock import run_simulated
+from dsc.wire import Host, RemoteComponent
+from dsc.wire.endpoint import LocalTransport
+from knowledge_base import InputError, KnowledgeBase, Schema
+
+SCHEMA = Schema.parse("(define (domain d) (:types item))")
+TYPES = """
+types:
+  spot: {x: number, label: optional text}
+  find: {item: text, at: spot, tags: list of text}
+"""
+
+
+def accepts(text: str, value: Any) -> bool:
+    try:
+        data_type(text).check("it", value, RECORDS)
+    except InputError:
+        return False
+    return True
+
+
+@given(typed_values(fits=True))
+def test_a_value_of_the_type_is_accepted_and_equal_after_json(drawn):
+    text, value = drawn
+    checked = data_type(text).check("it", value, RECORDS)
+    assert checked == value
+    assert data_type(text).check("it", json.loads(json.dumps(checked)), RECORDS) == checked
+
+
+@given(typed_values(fits=False))
+def test_a_value_that_differs_in_one_part_is_refused(drawn):
+    text, value = drawn
+    with pytest.raises(InputError, match="it "):
+        data_type(text).check("it", value, RECORDS)
+
+
+@given(typed_values(fits=True))
+def test_a_type_is_read_from_its_text(drawn):
+    kind = data_type(drawn[0])
+    assert data_type(str(kind)) == kind
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("list[item]", "write `list of item`"),
+        ("dict[str, number]", "write `map of number`"),
+        ("List<item>", "write `list of item`"),
+        ("item?", "write `optional item`"),
+        ("list item", "write `list of item`"),
+        ("Optional[text]", "write `optional text`"),
+        ("two words", "a type is a name"),
+        ("number from low", "a bound is a number"),
+        ("number from 3 to 1", "has no values"),
+        ("", "is not a type"),
+    ],
+)
+def test_a_text_that_is_no_type_is_answered_with_the_nearest_form(text, said):
+    with pytest.raises(InputError) as caught:
+        data_type(text)
+    assert said in str(caught.value)
+
+
+def test_the_message_names_the_part_that_differs():
+    value = [{"item": "a", "at": {"x": 1}, "tags": []}, {"item": "a", "at": {"x": "far"}, "tags": []}]
+    with pytest.raises(InputError) as caught:
+        data_type("list of find").check("'p.found'", value, RECORDS)
+    assert str(caught.value) == "'p.found' at 1.at.x is a finite number, not 'far'"
+
+
+def test_a_list_that_is_too_long_is_refused():
+    with pytest.raises(InputError, match="10001 elements"):
+        data_type("list of number").check("'x'", [1] * 10_001)
+
+
+def test_the_objects_inside_of_a_value_are_found():
+    records = {"find": {"item": "item", "near": "optional list of item"}}
+    value = [{"item": "a", "near": ["b", "c"]}, {"item": "d"}]
+    found = list(objects_in(data_type("list of find"), value, records))
+    assert found == [
+        ("0.item", "a", "item"),
+        ("0.near.0", "b", "item"),
+        ("0.near.1", "c", "item"),
+        ("1.item", "d", "item"),
+    ]
+
+
+# -- one verdict in all places -------------------------------------------------------------------------------
+
+
+def mouth(text: str, value: Any) -> Component:
+    """A component whose skill says the value as an attribute of the type, and whose other skill takes it."""
+
+    class Said(Outcome):
+        what: Annotated[Any, text]
+
+    class Heard(Outcome): ...
+
+    class Mouth(Component):
+        name = "mouth"
+
+        @skill
+        async def say(self, call: SkillCall) -> Said:
+            return Said(what=value)
+
+        @skill
+        async def hear(self, call: SkillCall, what: Annotated[Any, text]) -> Heard:
+            assert what == value
+            return Heard()
+
+    return Mouth()
+
+
+def said(text: str, component: Component, *, store: Any = None, remote: bool = False) -> tuple[bool, Any]:
+    """Return whether the run reached its end, and the value that went from one skill through a plot to the other."""
+    plot = parse_plot(f"""
+plot: p
+{TYPES}
+outputs: {{kept: '{text}'}}
+states:
+  a:
+    entry: {{trigger: mouth.say}}
+    on: {{said: {{to: b, assign: {{kept: ?event.what}}}}}}
+  b:
+    entry: {{trigger: mouth.hear, with: {{what: ?kept}}}}
+    on: {{heard: over}}
+  over: {{final: true}}
+""")
+
+    async def main() -> tuple[bool, Any]:
+        knowledge = KnowledgeBase(SCHEMA) if store is None else KnowledgeBase.open(SCHEMA, store)
+        host, used = None, component
+        if remote:
+            host = Host(component, transport := LocalTransport(), LoopClock())
+            used = await RemoteComponent.connect("mouth", transport)
+        run = None if store is None else RunStore(knowledge, store, {})
+        sequencer = Sequencer(Library([plot]), knowledge, [used], LoopClock(), store=run)
+        end = await sequencer.run("p")
+        if host is not None:
+            await host.close()
+        if run is not None:
+            knowledge.close()
+            return end.finished, records_of(store)[-1][-1].data["outputs"]["kept"]
+        return end.finished, end.outputs.get("kept")
+
+    return run_simulated(main())
+
+
+@settings(max_examples=40)
+@given(typed_values(fits=True) | typed_values(fits=False), st.booleans())
+def test_an_outcome_has_the_same_verdict_here_and_in_another_process(drawn, remote):
+    text, value = drawn
+    fits = accepts(text, value)
+    finished, kept = said(text, mouth(text, value), remote=remote)
+    assert finished == fits
+    assert not fits or kept == value
+
+
+@settings(max_examples=15)
+@given(drawn=typed_values(fits=True))
+def test_a_value_is_equal_in_a_kept_run(tmp_path_factory, drawn):
+    text, value = drawn
+    store = tmp_path_factory.mktemp("kept") / "run.kb"
+    finished, kept = said(text, mouth(text, value), store=store)
+    assert (finished, kept) == (True, value)
+
+
+@settings(max_examples=60)
+@given(typed_values(fits=True) | typed_values(fits=False))
+def test_an_argument_of_a_run_has_the_same_verdict(drawn):
+    text, value = drawn
+    plot = parse_plot(f"""
+plot: p
+{TYPES}
+parameters: {{x: '{text}'}}
+outputs: {{y: {{type: '{text}', initial: ?x}}}}
+states:
+  a: {{on: {{done: over}}}}
+  over: {{final: true}}
+""")
+
+    async def main() -> Any:
+        sequencer = Sequencer(Library([plot]), KnowledgeBase(SCHEMA), [], LoopClock())
+        try:
+            return (await sequencer.run("p", {"x": value})).outputs["y"]
+        except InputError:
+            return InputError
+
+    found = run_simulated(main())
+    assert (found is not InputError) == accepts(text, value)
+    assert found is InputError or found == value
+
+
+def test_each_form_of_type_is_tested():
+    kinds = {data_type(text).kind for text in PLAIN} | {"list", "map", "optional"}
+    assert kinds == {"number", "integer", "boolean", "name", "geometry", "choice", "list", "map", "optional"}
