@@ -12,6 +12,7 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Plots
 from dsc.engine.situation import Bindings, Decision, Verdict
+from dsc.model.data_forms import Values, plain_condition, plain_effect, plain_term, reads_data
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState
 from knowledge_base.facts import Content, Delta
@@ -19,7 +20,7 @@ from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import Effect
-from knowledge_base.language.syntax.expression import Constant, Expression, Term, substitute
+from knowledge_base.language.syntax.expression import Constant, Expression, Term, Variable, substitute
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.overlay import Overlay
@@ -46,14 +47,20 @@ class KnowledgeSituation:
 
     def holds(self, expression: Expression, bindings: Bindings) -> bool:
         """See `Situation`."""
+        if reads_data(expression):
+            expression = plain_condition(expression, Values(bindings))
         return holds(expression, self._world, bindings)
 
     def value(self, term: Term, bindings: Bindings) -> Any:
         """See `Situation`."""
+        if reads_data(term):
+            term = plain_term(term, Values(bindings))
         return plain(evaluate_term(term, self._world, bindings))
 
     def tell(self, effect: Effect, bindings: Bindings) -> Delta:
         """See `Situation`."""
+        if reads_data(effect):
+            effect = plain_effect(effect, Values(bindings))
         delta = apply_effect(effect, self._world, scalars(bindings))
         self._world.apply(delta)
         return delta
@@ -78,10 +85,12 @@ def choose(
     Raises:
         UnknownNameError: a candidate is not in the library, or a variable has no value.
     """
-    goal = None if state.goal is None else substitute(state.goal, scalars(bindings))
+    goal = state.goal
+    if goal is not None:
+        goal = substitute(plain_condition(goal, Values(bindings)) if reads_data(goal) else goal, scalars(bindings))
     if goal is not None and holds(goal, world, {}):
         return Decision(None, satisfied=True, version=version)
-    arguments = {name: plain(evaluate_term(term, world, bindings)) for name, term in state.arguments.items()}
+    arguments = {name: _argument(term, world, bindings) for name, term in state.arguments.items()}
     chosen: str | None = None
     chosen_arguments: dict[str, Any] = {}
     verdicts = []
@@ -106,8 +115,15 @@ def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdi
     if plot.when is None:
         return Verdict(plot.name, fits=True, reason="no condition")
     bindings = {**_defaults(plot), **arguments}
-    why = explain(plot.when, world, scalars(bindings))
+    when = plain_condition(plot.when, Values(bindings)) if reads_data(plot.when) else plot.when
+    why = explain(when, world, scalars(bindings))
     return Verdict(plot.name, fits=why.truth, reason=str(why.deciding), explanation=why.to_json())
+
+
+def _argument(term: Term, world: World, bindings: Mapping[str, Any]) -> Any:
+    if isinstance(term, Variable):
+        return Values(bindings).value(term.name)
+    return plain(evaluate_term(plain_term(term, Values(bindings)), world, bindings))
 
 
 def _defaults(plot: ActionPlot) -> dict[str, Any]:

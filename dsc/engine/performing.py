@@ -29,6 +29,7 @@ from dsc.model.actions import (
     Trigger,
     Withdraw,
 )
+from dsc.model.data_forms import Values
 from dsc.model.language import TermField
 from dsc.rank import Rank
 from dsc.run_log import run_logger
@@ -296,11 +297,7 @@ def _evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation) -> 
     if isinstance(term, Constant):
         return term.value
     if isinstance(term, Variable):
-        if term.name not in bindings:
-            raise UnknownNameError(
-                f"variable '?{term.name}' has no value here", place=term.place, found=term.name, valid=bindings
-            )
-        return bindings[term.name]
+        return bindings[term.name] if term.name in bindings else Values(bindings).value(term.name, term.place)
     return situation.value(term, bindings)
 
 

@@ -25,6 +25,7 @@ from dsc.engine.situation import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model import actions
+from dsc.model.data_forms import plain_condition, plain_effect, plain_term
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
 from dsc.model.states import DynamicState, FinalState, HistoryState, State
@@ -33,6 +34,7 @@ from dsc.skills import SkillSignature, check_arguments
 from dsc.validation.rules import RuleScope, attributes_of, read_as
 from dsc.validation.subject import Subject, Types
 from dsc.validation.type_checks import FREE_TYPES, TypeChecker, language_type
+from dsc.validation.type_reader import TypeReader
 from knowledge_base.errors import InputError
 from knowledge_base.language.checking.binding import unbound_error
 from knowledge_base.language.checking.check import check, check_effect, check_term
@@ -272,6 +274,13 @@ class _Data:
         names = self._scope(scope, condition)
         if not self._subject.strict:
             condition = settle(condition, lambda _: True)
+        reader = TypeReader(names, self._subject.records)
+        try:
+            condition = plain_condition(condition, reader)
+        except InputError as error:
+            yield self._subject.caught(error, path, "condition")
+            return
+        names = {**names, **reader.read}
         if self._schema is None:
             yield from self._unbound(free_variables(condition), names, path, "condition")
             return
@@ -284,6 +293,13 @@ class _Data:
 
     def _effect(self, effect: Effect, scope: Types | None, path: Path) -> Iterator[Finding]:
         names = self._scope(scope, effect)
+        reader = TypeReader(names, self._subject.records)
+        try:
+            effect = plain_effect(effect, reader)
+        except InputError as error:
+            yield self._subject.caught(error, path, "effect")
+            return
+        names = {**names, **reader.read}
         if self._schema is None:
             yield from self._unbound(mentioned(effect), names, path, "effect")
             return
@@ -313,6 +329,17 @@ class _Data:
 
     def _term(self, term: Term, scope: Types | None, path: Path, *wanted: str | None) -> Iterator[Finding]:
         names = self._scope(scope, term)
+        reader = TypeReader(names, self._subject.records)
+        try:
+            if isinstance(term, Variable):
+                if reader.leads_to_part(term.name):
+                    names = {**names, term.name: reader.kind(term.name, term.place)}
+            else:
+                term = plain_term(term, reader)
+        except InputError as error:
+            yield self._subject.caught(error, path, "term")
+            return
+        names = {**names, **reader.read}
         unknown = sorted(free_variables(term) - names.keys())
         for name in unknown:
             message = f"there is no variable '?{name}' here"

@@ -229,6 +229,8 @@ class Schema:
 
     def require_type(self, name: str, place: Place | None = None) -> None:
         """Raise `UnknownNameError` unless `name` is a type of objects."""
+        if name.startswith("?"):
+            raise SchemaError(f"'{name}' would be a list, which only plots have; here a type is needed", place=place)
         if name not in self.types:
             raise UnknownNameError(f"there is no type '{name}'", place=place, found=name, valid=self.types)
 

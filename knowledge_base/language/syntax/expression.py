@@ -27,7 +27,8 @@ class Located:
 class TypedVariable(Located):
     """A parameter or quantified variable.
 
-    No types, or only `object`, means any type; several types mean `either`.
+    No types, or only `object`, means any type; several types mean `either`. A type that begins with `?` is the name of
+    a variable, whose value is a list of a plot: the quantified variable goes through its elements.
     """
 
     name: str
@@ -173,6 +174,8 @@ def _add_variables(e: Expression | Term, bound: frozenset[str], found: list[str]
         if e.name not in bound:
             found.append(e.name)
     elif isinstance(e, Exists | Forall):
+        for variable in e.variables:
+            found += [name[1:] for name in variable.types if name[:1] == "?" and name[1:] not in bound]
         _add_variables(e.body, bound.union([v.name for v in e.variables]), found)
     else:
         for part in parts_of(e):
@@ -260,6 +263,7 @@ def _entered(
     If a new term contains the name of a quantified variable, that variable is renamed.
     """
     own, free = {v.name for v in variables}, free_variables(body)
+    variables = tuple(replace(v, types=tuple(_new_list(name, bindings) for name in v.types)) for v in variables)
     inner = {name: value for name, value in bindings.items() if name in free and name not in own}
     met = {name for value in inner.values() if isinstance(value, Term) for name in variables_in_order(value)}
     if own.isdisjoint(met):
@@ -267,6 +271,12 @@ def _entered(
     names = {name: fresh(name, own | free | met) for name in own & met}
     inner |= {name: Variable(new) for name, new in names.items()}
     return tuple(replace(v, name=names.get(v.name, v.name)) for v in variables), inner
+
+
+def _new_list(type_name: str, bindings: Mapping[str, Value | Term]) -> str:
+    """Return a type; if it is a variable, the variable whose name the bindings give to it."""
+    new = bindings.get(type_name[1:]) if type_name[:1] == "?" else None
+    return f"?{new.name}" if isinstance(new, Variable) else type_name
 
 
 def fresh(name: str, taken: Container[str]) -> str:
