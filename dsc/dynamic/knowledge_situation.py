@@ -12,7 +12,15 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Plots
 from dsc.engine.situation import Bindings, Decision, Verdict
-from dsc.model.data_forms import Values, plain_condition, plain_effect, plain_term, reads_data
+from dsc.model.data_forms import (
+    Values,
+    is_literal,
+    literal_value,
+    plain_condition,
+    plain_effect,
+    plain_term,
+    reads_data,
+)
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState
 from knowledge_base.facts import Content, Delta
@@ -123,6 +131,8 @@ def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdi
 def _argument(term: Term, world: World, bindings: Mapping[str, Any]) -> Any:
     if isinstance(term, Variable):
         return Values(bindings).value(term.name)
+    if is_literal(term):
+        return literal_value(term, lambda part: _argument(part, world, bindings))
     return plain(evaluate_term(plain_term(term, Values(bindings)), world, bindings))
 
 

@@ -29,7 +29,7 @@ from dsc.model.actions import (
     Trigger,
     Withdraw,
 )
-from dsc.model.data_forms import Values
+from dsc.model.data_forms import Values, is_literal, literal_value
 from dsc.model.language import TermField
 from dsc.rank import Rank
 from dsc.run_log import run_logger
@@ -298,6 +298,8 @@ def _evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation) -> 
         return term.value
     if isinstance(term, Variable):
         return bindings[term.name] if term.name in bindings else Values(bindings).value(term.name, term.place)
+    if is_literal(term):
+        return literal_value(term, lambda part: _evaluate(part, bindings, situation))
     return situation.value(term, bindings)
 
 

@@ -5,6 +5,7 @@
 - `(in ?x ?items)` is true if a list has the element, or a map the key.
 - `(forall (?o - ?items) ...)` and `(exists (?o - ?items) ...)` go through the elements of a list or the keys of a map.
 - `(is-set ?x)` is true if an optional value is given.
+- `(list ?a 3)` and `(record item ?a score 0.5)` are values; in YAML also `[?a, 3]` and `{item: ?a, score: 0.5}`.
 
 The engine replaces these forms by plain ones before it evaluates a condition, so that the language of the knowledge
 base needs neither lists nor records. For any other value, `in` is a predicate and `size` a function of the domain.
@@ -12,7 +13,7 @@ base needs neither lists nor records. For any other value, `in` is a predicate a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -36,10 +37,47 @@ from knowledge_base.language.syntax.expression import (
     Variable,
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.spelling import is_plain_name
 
 IN, SIZE, IS_SET = "in", "size", "is-set"
 _FALSE = Or(())
 _READS: IdentityCache[Form, bool] = IdentityCache()
+
+
+def literal_parts(term: Term) -> dict[str, Term] | None:
+    """Return the parts of a list by number, or of a record by name; `None` for another term.
+
+    Raises:
+        InputError: a record has a part without a name.
+    """
+    match term:
+        case Call("list", args):
+            return {str(number): part for number, part in enumerate(args)}
+        case Call("record", args):
+            names = [one.value if isinstance(one, Constant) else None for one in args[::2]]
+            if len(args) % 2 or not all(isinstance(name, str) for name in names):
+                raise InputError("a record has names and values: (record item ?a score 0.5)", place=term.place)
+            return dict(zip(map(str, names), args[1::2], strict=True))
+        case _:
+            return None
+
+
+def literal(parts: Mapping[str, Term]) -> Call:
+    """Return the term for a record of these parts."""
+    names = [(Constant(name, quoted=not is_plain_name(name)), part) for name, part in parts.items()]
+    return Call("record", tuple(one for pair in names for one in pair))
+
+
+def literal_value(term: Term, value_of: Callable[[Term], Any]) -> Any:
+    """Return the value of a list or record; `value_of` returns the values of its parts."""
+    parts = literal_parts(term) or {}
+    found = {name: value_of(part) for name, part in parts.items()}
+    return list(found.values()) if isinstance(term, Call) and term.function == "list" else found
+
+
+def is_literal(term: Term) -> bool:
+    """Return whether a term is a list or record."""
+    return isinstance(term, Call) and term.function in {"list", "record"}
 
 
 def reads_data(form: Form) -> bool:

@@ -25,11 +25,12 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
+from dsc.model.data_forms import literal
 from dsc.model.reading import UNKNOWN_FORM, Form, FormPath
 from knowledge_base.errors import InputError, Place
 from knowledge_base.facts import Value
 from knowledge_base.language.syntax.effect import AllOf, Effect, check_depth
-from knowledge_base.language.syntax.expression import Constant, Expression, Term
+from knowledge_base.language.syntax.expression import Call, Constant, Expression, Term
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term, to_text
 
@@ -133,6 +134,10 @@ def _term(value: Any) -> Term:
         if not math.isfinite(value):
             raise ValueError(f"a finite number was expected; found {value!r}")
         return Constant(value)
+    if isinstance(value, list | tuple):
+        return Call("list", tuple(map(_term, value)))
+    if isinstance(value, Mapping) and all(isinstance(name, str) for name in value):
+        return literal({name: _term(part) for name, part in value.items()})
     if not isinstance(value, str):
         raise ValueError(f"a value was expected: a constant, ?variable or (+ ?n 1); found {value!r}")
     return _read(parse_term, value) if value.startswith(("?", "(")) or is_quoted(value) else _named(value)
@@ -239,8 +244,8 @@ TermField = Annotated[
         _term,
         _term_out,
         {
-            "type": ["string", "number", "boolean"],
-            "description": "a constant, a variable such as ?item or ?event.level, or arithmetic such as (+ ?n 1)",
+            "type": ["string", "number", "boolean", "array", "object"],
+            "description": "a constant, a variable such as ?item or ?event.level, (+ ?n 1), a list or a record",
         },
     ),
 ]

@@ -25,7 +25,7 @@ from dsc.engine.situation import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model import actions
-from dsc.model.data_forms import plain_condition, plain_effect, plain_term
+from dsc.model.data_forms import is_literal, literal_parts, plain_condition, plain_effect, plain_term
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
 from dsc.model.states import DynamicState, FinalState, HistoryState, State
@@ -328,6 +328,9 @@ class _Data:
             yield from self._term(term, scope, (*path, key), wanted.get(key))
 
     def _term(self, term: Term, scope: Types | None, path: Path, *wanted: str | None) -> Iterator[Finding]:
+        if is_literal(term):
+            yield from self._literal(term, scope, path, *wanted)
+            return
         names = self._scope(scope, term)
         reader = TypeReader(names, self._subject.records)
         try:
@@ -352,6 +355,22 @@ class _Data:
         for kind in wanted:
             yield from self._fits(term, kind, names, path)
 
+    def _literal(self, term: Term, scope: Types | None, path: Path, *wanted: str | None) -> Iterator[Finding]:
+        """Yield findings about the parts of a list or record."""
+        try:
+            parts = literal_parts(term) or {}
+        except InputError as error:
+            yield self._subject.caught(error, path, "term")
+            return
+        for text in wanted or (None,):
+            types = self._checker.parts_of(text, parts, is_list=to_text(term).startswith("(list"))
+            if isinstance(types, str):
+                message = f"'{path[-1]}' is of type {text}, and {to_text(term)} {types}"
+                yield self._subject.finding(path, "value fits", message, found=to_text(term))
+                continue
+            for name, part in parts.items():
+                yield from self._term(part, scope, (*path, int(name) if name.isdecimal() else name), types.get(name))
+
     def _scope(self, scope: Types | None, used: Expression | Term | Effect) -> Types:
         """Return the scope; for `None`, an unknown event, the plot's names and all attributes that `used` reads."""
         if scope is not None:
@@ -370,6 +389,9 @@ class _Data:
         self, term: Term | None, wanted: str | None, scope: Types, path: Path, what: str | None = None
     ) -> Iterator[Finding]:
         """Yield a finding about a value whose type does not fit; data in dialect `scxml` have no types."""
+        if term is not None and is_literal(term):
+            yield from self._literal(term, scope, path, wanted)
+            return
         given = None if term is None or wanted is None or not self._subject.strict else self._kind(term, scope)
         if term is None or wanted is None or given is None:
             return

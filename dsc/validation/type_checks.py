@@ -6,6 +6,7 @@ possible.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from dsc.data_types import ANY, WORDS, DataType, Records, data_type
@@ -42,6 +43,26 @@ class TypeChecker:
         if given.unit and wanted.unit and given.unit != wanted.unit:
             return f"in {given.unit}"
         return None
+
+    def parts_of(self, text: str | None, parts: Collection[str], *, is_list: bool) -> Mapping[str, str | None] | str:
+        """Return the types of the parts of a list or record that enters a type; or, as text, why it does not fit."""
+        kind = None if text is None else _inside_optional(data_type(text))
+        form = None if kind is None else self._form(kind)
+        if kind is None or form is None:
+            return {}
+        if is_list != (form in {"list", "geometry"}) or form not in {"list", "geometry", "map", "record"}:
+            return f"is a {'list' if is_list else 'record'}"
+        if form != "record":
+            inner = "number" if form == "geometry" else kind.inner and str(kind.inner)
+            return dict.fromkeys(parts, inner or None)
+        fields = self.records[kind.name]
+        for name in parts:
+            if name not in fields:
+                return f"has the part '{name}', which a {kind.name} lacks; its parts are {', '.join(fields)}"
+        for name, own in fields.items():
+            if name not in parts and (own is None or data_type(own).kind != "optional"):
+                return f"lacks the part '{name}'"
+        return fields
 
     def _form(self, kind: DataType) -> str | None:
         """Return the form of the values of a type; `None` for any form."""

@@ -12,7 +12,7 @@ from knowledge_base.errors import InputError, Place, UnknownNameError
 from knowledge_base.language.checking.binding import unbound_error
 from knowledge_base.language.syntax.expression import Constant, Term, Variable
 
-_COLLECTIONS = ("list", "map")
+_COLLECTIONS = ("list", "map", "geometry")
 
 
 class TypeReader:
@@ -35,9 +35,9 @@ class TypeReader:
 
     def term(self, variable: Variable) -> Term:
         """See `DataReader`; the variable of a part is unchanged, and its type is noted."""
-        kind = self._kind(variable.name, variable.place)
+        kind = self._given(variable.name, variable.place)
         if kind is not None and (kind.kind in _COLLECTIONS or kind.name in self._records):
-            message = f"'?{variable.name}' is a {kind}, and a condition reads its parts"
+            message = f"'?{variable.name}' is of type {kind}, and a condition reads its parts"
             raise InputError(message, place=variable.place, found=variable.name)
         renamed = self._renamed(variable.name)
         if renamed not in self._scope and self.leads_to_part(variable.name):
@@ -55,7 +55,7 @@ class TypeReader:
 
     def is_collection(self, name: str) -> bool:
         """See `DataReader`."""
-        kind = self._kind(name)
+        kind = self._given(name)
         return kind is not None and kind.kind in _COLLECTIONS
 
     def size(self, name: str) -> Term:
@@ -71,12 +71,12 @@ class TypeReader:
     def elements(self, name: str, variable: str) -> Iterator[DataReader]:
         """See `DataReader`; one reader stands for all elements."""
         self._require(name)
-        kind = self._kind(name)
+        kind = self._given(name)
         if kind is not None and kind.kind not in _COLLECTIONS:
-            raise InputError(f"'?{name}' is a {kind}, and has no elements", found=name)
+            raise InputError(f"'?{name}' is of type {kind}, and has no elements", found=name)
         element = None if kind is None or kind.inner is None else str(kind.inner)
-        if kind is not None and kind.kind == "map":
-            element = "text"
+        if kind is not None and kind.kind != "list":
+            element = "text" if kind.kind == "map" else "number"
         # Two quantifiers may give one name to elements of different types.
         inside = f"{name}.{variable}" if variable in self._used or variable in self._scope else variable
         self._used.add(variable)
@@ -111,6 +111,11 @@ class TypeReader:
         head, dot, rest = name.partition(".")
         return f"{self._own[head]}{dot}{rest}" if head in self._own else name
 
+    def _given(self, name: str, place: Place | None = None) -> DataType | None:
+        """Return the type of a value that is set."""
+        kind = self._kind(name, place)
+        return kind.inner if kind is not None and kind.kind == "optional" else kind
+
     def _kind(self, name: str, place: Place | None = None) -> DataType | None:
         name = self._renamed(name)
         head, parts = name, list[str]()
@@ -131,9 +136,11 @@ class TypeReader:
             return self._part(name, kind.inner, part, place)
         if kind.kind == "map" or (kind.kind == "list" and part.isdecimal()):
             return kind.inner
+        if kind.kind == "geometry" and part.isdecimal():
+            return data_type("number")
         fields = self._records.get(kind.name, {})
         if part not in fields:
-            message = f"'{name}' is a {kind}, and has no part '{part}'"
+            message = f"'{name}' is of type {kind}, and has no part '{part}'"
             raise UnknownNameError(message, place=place, found=part, valid=fields)
         text = fields[part]
         return None if text is None else data_type(text)
