@@ -15,6 +15,8 @@ from dsc.components.ports import query as query
 from dsc.components.ports import takes as takes
 from dsc.components.streams import Push as Push
 from dsc.components.streams import Stream as Stream
+from dsc.conversions import Conversion as Conversion
+from dsc.conversions import conversion as conversion
 from dsc.dynamic.library import Library as Library
 from dsc.engine.machine import Machine as Machine
 from dsc.errors import ChangedError as ChangedError

@@ -32,7 +32,7 @@ _NOT_IN_NAMES = frozenset("[]<>,")
 _TEXT = frozenset((str,))
 _EXACT: Mapping[str, frozenset[type]] = {
     "number": frozenset((int, float)), "integer": frozenset((int,)), "boolean": frozenset((bool,)),
-    **dict.fromkeys(WORDS, _TEXT),
+    **dict.fromkeys(WORDS, _TEXT), "plot": frozenset((str, dict)),
 }  # fmt: skip
 
 

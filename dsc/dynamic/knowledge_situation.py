@@ -13,9 +13,8 @@ from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Plots
 from dsc.engine.situation import Bindings, Decision, Verdict
 from dsc.model.data_forms import (
+    PLAIN,
     Values,
-    is_literal,
-    literal_value,
     plain_condition,
     plain_effect,
     plain_term,
@@ -55,19 +54,19 @@ class KnowledgeSituation:
 
     def holds(self, expression: Expression, bindings: Bindings) -> bool:
         """See `Situation`."""
-        if reads_data(expression):
+        if PLAIN.get(id(expression)) is not expression and reads_data(expression):
             expression = plain_condition(expression, Values(bindings))
         return holds(expression, self._world, bindings)
 
     def value(self, term: Term, bindings: Bindings) -> Any:
         """See `Situation`."""
-        if reads_data(term):
+        if PLAIN.get(id(term)) is not term and reads_data(term):
             term = plain_term(term, Values(bindings))
         return plain(evaluate_term(term, self._world, bindings))
 
     def tell(self, effect: Effect, bindings: Bindings) -> Delta:
         """See `Situation`."""
-        if reads_data(effect):
+        if PLAIN.get(id(effect)) is not effect and reads_data(effect):
             effect = plain_effect(effect, Values(bindings))
         delta = apply_effect(effect, self._world, scalars(bindings))
         self._world.apply(delta)
@@ -131,8 +130,6 @@ def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdi
 def _argument(term: Term, world: World, bindings: Mapping[str, Any]) -> Any:
     if isinstance(term, Variable):
         return Values(bindings).value(term.name)
-    if is_literal(term):
-        return literal_value(term, lambda part: _argument(part, world, bindings))
     return plain(evaluate_term(plain_term(term, Values(bindings)), world, bindings))
 
 

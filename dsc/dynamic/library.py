@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from dsc.conversions import Conversion, conversions_by_name
 from dsc.data_types import Records
 from dsc.dynamic.rule_expansion import expand
 from dsc.engine.tables import CompiledPlot, compile_plot
@@ -33,14 +34,18 @@ class Library:
 
     Attributes:
         records: the records that types of plots may name: those that plots or components declare.
+        conversions: the functions that terms of the plots may call.
     """
 
-    def __init__(self, plots: Iterable[ActionPlot] = ()) -> None:
+    def __init__(self, plots: Iterable[ActionPlot] = (), conversions: Iterable[Conversion[..., Any]] = ()) -> None:
         self._plots: dict[str, ActionPlot] = {}
         self._compiled: dict[str, CompiledPlot] = {}
         self._bound: dict[str, CompiledPlot] = {}
         self._made: dict[str, ActionPlot] = {}
         self.records: dict[str, Mapping[str, str | None]] = {}
+        self.conversions = conversions_by_name(conversions)
+        for one in self.conversions.values():
+            self.declare(one.records)
         self._received: frozenset[str] | None = None
         if isinstance(plots, ActionPlot | str) or not isinstance(plots, Iterable):
             raise InputError(f"a library is made of a list of plots, not of {shown(plots)[:60]}")
@@ -105,7 +110,7 @@ class Library:
             SchemaError: a host state of the old plot could not contain the new plot; see `substitute_for`.
         """
         other = substitute_for(self.plot(name), plot)
-        return Library(other if own.name == name else own for own in self)
+        return self._with(other if own.name == name else own for own in self)
 
     def with_default(self, plot: str, name: str, value: object, who: Who) -> Library:
         """Return a new library in which a plot's parameter has another default, set by the role `who`.
@@ -117,9 +122,17 @@ class Library:
             InputError: the value does not fit the parameter, or `who` may not set the parameter.
         """
         changed = self.plot(plot).with_default(name, value, who)
-        other = Library(changed if own.name == plot else own for own in self)
-        other._compiled = {known: tables for known, tables in self._compiled.items() if known != plot}
-        other._bound, other._made = self._bound, self._made
+        other = self._with(changed if own.name == plot else own for own in self)
+        compiled = {known: tables for known, tables in self._compiled.items() if known != plot}
+        other._compiled, other._bound, other._made = compiled, self._bound, self._made  # noqa: SLF001  # a library, too
+        return other
+
+    def _with(self, plots: Iterable[ActionPlot]) -> Library:
+        """Return a library of other plots with the same records and conversions."""
+        other = Library((), self.conversions.values())
+        other.records = self.records
+        for plot in plots:
+            other.add(plot)
         return other
 
     def expanded(self, plot: ActionPlot) -> ActionPlot:
@@ -133,8 +146,11 @@ class Library:
     def compiled(self, name: str) -> CompiledPlot:
         """Return the compiled plot of that name; raise `UnknownNameError` if there is none."""
         if name not in self._compiled:
-            self._compiled[name] = compile_plot(self.expanded(self.plot(name)), records=self.records)
+            self._compiled[name] = self._compile(self.expanded(self.plot(name)))
         return self._compiled[name]
+
+    def _compile(self, plot: ActionPlot, form: Mapping[str, Any] | None = None) -> CompiledPlot:
+        return compile_plot(plot, form, self.records, self.conversions)
 
     def expect(self, plot: ActionPlot) -> None:
         """Cache a plot; a later `bind` of its unchanged written form then need not read the form."""
@@ -153,8 +169,7 @@ class Library:
         key = json.dumps(form)  # keys stay unsorted, because the order of states is part of a plot
         compiled = self._bound.pop(key, None)
         if compiled is None:
-            plot = self.expanded(self._made.get(key) or _read(form))
-            compiled = compile_plot(plot, form, self.records)
+            compiled = self._compile(self.expanded(self._made.get(key) or _read(form)), form)
         self._bound[key] = compiled  # the least recently used plot is dropped first
         if len(self._bound) > MOST_BOUND:
             del self._bound[next(iter(self._bound))]

@@ -254,6 +254,9 @@ class Execution:
 
     def _decided(self, frame: Frame, name: str, state: DynamicState, passed: Mapping[str, Any]) -> Decision:
         bindings = self.performer.bindings(frame)
+        if state.arguments:
+            own = {key: term for key, term in state.arguments.items() if key not in passed}
+            passed = {**self.performer.values(frame, own), **passed}
         if passed:
             places = {given: Variable(f"passed.{given}") for given in passed}
             state = state.model_copy(update={"arguments": {**state.arguments, **places}})

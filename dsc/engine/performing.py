@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from dsc.data_types import check_all
@@ -34,7 +35,7 @@ from dsc.model.language import TermField
 from dsc.rank import Rank
 from dsc.run_log import run_logger
 from knowledge_base.errors import InputError, UnknownNameError, UserCodeError
-from knowledge_base.language.syntax.expression import Constant, Expression, Term, Variable
+from knowledge_base.language.syntax.expression import Arithmetic, Call, Constant, Expression, Term, Variable
 from knowledge_base.tracebacks import whole_traceback
 
 _LOG = run_logger(__package__)
@@ -105,7 +106,7 @@ class Performer:
 
     def value(self, frame: Frame, term: TermField) -> Any:
         """Return the value of a term in a frame; raise `InputError` if its evaluation fails."""
-        return _evaluate(term, self.bindings(frame), self.situation)
+        return evaluate(term, self.bindings(frame), self.situation, frame.compiled)
 
     def values(self, frame: Frame, terms: Mapping[str, TermField]) -> dict[str, Any]:
         """Return the values of named terms in a frame; raise `InputError` if an evaluation fails."""
@@ -271,7 +272,7 @@ def fill_parameters(compiled: CompiledPlot, arguments: Mapping[str, Any], situat
         if name in arguments:
             value = arguments[name]
         elif parameter.default is not None:
-            value = _evaluate(parameter.default, variables, situation)
+            value = evaluate(parameter.default, variables, situation, compiled)
         elif parameter.required:
             raise InputError(f"plot '{plot.name}' needs its parameter '{name}'")
         else:
@@ -280,7 +281,9 @@ def fill_parameters(compiled: CompiledPlot, arguments: Mapping[str, Any], situat
         if parameter.bounded and value is not None:
             variables[name] = parameter.range.check(f"{plot.name}.{name}", value)
     for name, variable in (*plot.variables.items(), *plot.outputs.items()):
-        variables[name] = None if variable.initial is None else _evaluate(variable.initial, variables, situation)
+        variables[name] = (
+            None if variable.initial is None else evaluate(variable.initial, variables, situation, compiled)
+        )
     if compiled.types:
         own = {name: value for name, value in variables.items() if value is not None or name in plot.parameters}
         check_all(f"'{plot.name}.{{}}'", own, compiled.types, compiled.records)
@@ -288,18 +291,25 @@ def fill_parameters(compiled: CompiledPlot, arguments: Mapping[str, Any], situat
     return variables
 
 
-def _evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation) -> Any:
-    """Return the value of a term; the value of a variable may have any type, e.g. a plot as data.
+def evaluate(term: Term, bindings: Mapping[str, Any], situation: Situation, compiled: CompiledPlot) -> Any:
+    """Return the value of a term of a plot; the value of a variable may have any type, e.g. a plot as data.
 
     Raises:
-        InputError: a variable is not bound, or an operand of arithmetic is not a number.
+        InputError: a variable is not bound, an operand of arithmetic is not a number, or a conversion fails.
     """
     if isinstance(term, Constant):
         return term.value
     if isinstance(term, Variable):
         return bindings[term.name] if term.name in bindings else Values(bindings).value(term.name, term.place)
-    if is_literal(term):
-        return literal_value(term, lambda part: _evaluate(part, bindings, situation))
+    if isinstance(term, Call):
+        if is_literal(term):
+            return literal_value(term, lambda part: evaluate(part, bindings, situation, compiled))
+        if term.function in compiled.conversions:
+            given = [evaluate(part, bindings, situation, compiled) for part in term.args]
+            return compiled.conversions[term.function].value(given, compiled.records)
+    if isinstance(term, Arithmetic) and compiled.conversions:
+        numbers = [evaluate(part, bindings, situation, compiled) for part in term.args]
+        term = replace(term, args=tuple(map(Constant, numbers)))
     return situation.value(term, bindings)
 
 

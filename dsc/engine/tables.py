@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, combinations, islice
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from dsc.conversions import Conversions
 from dsc.data_types import NO_RECORDS, Records
 from dsc.events import DONE
 from dsc.model import states
@@ -175,6 +177,7 @@ class CompiledPlot:
         scxml: whether the plot is in dialect `scxml`, where events match by prefix and have the names of SCXML.
         types: types of parameters, variables and outputs by name; empty in dialect `scxml`.
         records: the records of the plot's library, which later plots may extend.
+        conversions: the functions that terms may call.
         cache: cached configurations and the initial reaction (see `machine_state`).
     """
 
@@ -186,6 +189,7 @@ class CompiledPlot:
     scxml: bool = False
     types: Mapping[str, str] = field(default_factory=dict)
     records: Records = field(default_factory=dict)
+    conversions: Conversions = field(default_factory=dict)
     cache: dict[Any, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -211,7 +215,10 @@ class CompiledPlot:
 
 
 def compile_plot(
-    plot: ActionPlot, form: Mapping[str, Any] | None = None, records: Records = NO_RECORDS
+    plot: ActionPlot,
+    form: Mapping[str, Any] | None = None,
+    records: Records = NO_RECORDS,
+    conversions: Conversions = MappingProxyType({}),
 ) -> CompiledPlot:
     """Return the tables of a plot.
 
@@ -219,6 +226,7 @@ def compile_plot(
         plot: the plot, without rules and handlers.
         form: the plot's data if it was bound as data.
         records: the records that types of the plot may name.
+        conversions: the functions that terms of the plot may call.
 
     Raises:
         UnknownNameError: a transition or the initial state of a scope refers to a missing state.
@@ -230,7 +238,9 @@ def compile_plot(
     scxml = plot.dialect == "scxml"
     declared = {} if scxml else {**plot.parameters, **plot.variables, **plot.outputs}
     types = {name: one.type for name, one in declared.items()}
-    return CompiledPlot(plot, tuple(layout.nodes), layout.index, form, layout.defaults(), scxml, types, records)
+    return CompiledPlot(
+        plot, tuple(layout.nodes), layout.index, form, layout.defaults(), scxml, types, records, conversions
+    )
 
 
 class _Layout:

@@ -7,8 +7,7 @@
 - `(is-set ?x)` is true if an optional value is given.
 - `(list ?a 3)` and `(record item ?a score 0.5)` are values; in YAML also `[?a, 3]` and `{item: ?a, score: 0.5}`.
 
-The engine replaces these forms by plain ones before it evaluates a condition, so that the language of the knowledge
-base needs neither lists nor records. For any other value, `in` is a predicate and `size` a function of the domain.
+Plain forms replace these before an evaluation. For other values, `in` is a predicate and `size` a function.
 """
 
 from __future__ import annotations
@@ -36,12 +35,12 @@ from knowledge_base.language.syntax.expression import (
     TypedVariable,
     Variable,
 )
-from knowledge_base.language.syntax.identity_cache import IdentityCache
-from knowledge_base.spelling import is_plain_name
 
 IN, SIZE, IS_SET = "in", "size", "is-set"
 _FALSE = Or(())
-_READS: IdentityCache[Form, bool] = IdentityCache()
+PLAIN: dict[int, Form] = {}
+"""Forms that read no data, by their identity: a test that costs no call, for the conditions of most plots."""
+_MOST_PLAIN = 4096
 
 
 def literal_parts(term: Term) -> dict[str, Term] | None:
@@ -64,26 +63,30 @@ def literal_parts(term: Term) -> dict[str, Term] | None:
 
 def literal(parts: Mapping[str, Term]) -> Call:
     """Return the term for a record of these parts."""
-    names = [(Constant(name, quoted=not is_plain_name(name)), part) for name, part in parts.items()]
-    return Call("record", tuple(one for pair in names for one in pair))
+    return Call("record", tuple(one for name, part in parts.items() for one in (Constant(name), part)))
 
 
 def literal_value(term: Term, value_of: Callable[[Term], Any]) -> Any:
     """Return the value of a list or record; `value_of` returns the values of its parts."""
-    parts = literal_parts(term) or {}
-    found = {name: value_of(part) for name, part in parts.items()}
+    found = {name: value_of(part) for name, part in (literal_parts(term) or {}).items()}
     return list(found.values()) if isinstance(term, Call) and term.function == "list" else found
 
 
 def is_literal(term: Term) -> bool:
     """Return whether a term is a list or record."""
-    return isinstance(term, Call) and term.function in {"list", "record"}
+    return isinstance(term, Call) and term.function in ("list", "record")
 
 
 def reads_data(form: Form) -> bool:
-    """Return whether a condition, term or effect may contain one of these forms; cached by the identity of the form."""
-    known = _READS.find(form, None)
-    return _READS.keep(form, None, _reads_data(form)) if known is None else known
+    """Return whether a condition, term or effect may contain one of these forms; `PLAIN` keeps those that do not."""
+    if PLAIN.get(id(form)) is form:
+        return False
+    reads = _reads_data(form)
+    if not reads:
+        if len(PLAIN) >= _MOST_PLAIN:
+            PLAIN.clear()
+        PLAIN[id(form)] = form
+    return reads
 
 
 def _reads_data(form: Form) -> bool:
@@ -211,8 +214,7 @@ def _through_list(
 ) -> tuple[TypedVariable, str, tuple[TypedVariable, ...]] | None:
     """Return the first variable that goes through a list, the list, and the other variables."""
     for variable in variables:
-        name = list_of(variable)
-        if name is not None:
+        if (name := list_of(variable)) is not None:
             return variable, name, tuple(other for other in variables if other is not variable)
     return None
 

@@ -147,8 +147,9 @@ def _plain(
         if name not in attributes and (wanted is None or wanted.kind != "optional"):
             of_type = f" of type {kind}" if kind else ""
             raise InputError(f"the {what} '{event}' needs its attribute '{name}'{of_type}")
-        if wanted is not None:
-            checked[name] = wanted.check(f"the attribute '{name}' of '{event}'", attributes.get(name), records)
+        value = attributes.get(name)
+        if wanted is not None and (type(value) not in wanted.exact or (type(value) is str and len(value) > _LONG)):
+            checked[name] = wanted.check(f"the attribute '{name}' of '{event}'", value, records)
     plain: dict[str, Any] = _copied(checked, f"the attributes of '{event}'")
     return plain
 
@@ -214,6 +215,8 @@ def _require_objects(
             _require_object(place, value, wanted, *worlds)
 
 
+_LONG = 1_000
+"""Number of characters from which the length of a text is checked."""
 _SCALARS = frozenset({"number", "integer", "boolean", *WORDS})
 
 

@@ -7,8 +7,11 @@ variable may have a subtype.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
+from dsc.conversions import Conversion
 from dsc.data_types import data_type, names_in
 from dsc.dynamic.steps import (
     Outcomes,
@@ -39,7 +42,15 @@ from knowledge_base.errors import InputError
 from knowledge_base.language.checking.binding import unbound_error
 from knowledge_base.language.checking.check import check, check_effect, check_term
 from knowledge_base.language.syntax.effect import Effect, mentioned
-from knowledge_base.language.syntax.expression import Constant, Expression, Term, Variable, free_variables
+from knowledge_base.language.syntax.expression import (
+    Arithmetic,
+    Call,
+    Constant,
+    Expression,
+    Term,
+    Variable,
+    free_variables,
+)
 from knowledge_base.language.syntax.text import to_text
 
 _ANY: Types = {}
@@ -331,6 +342,14 @@ class _Data:
         if is_literal(term):
             yield from self._literal(term, scope, path, *wanted)
             return
+        if isinstance(term, Call) and term.function in self._library.conversions:
+            yield from self._conversion(self._library.conversions[term.function], term, scope, path, *wanted)
+            return
+        if isinstance(term, Call) and self._is_unknown(term.function):
+            message = f"there is no function or conversion '{term.function}'"
+            valid = {*self._library.conversions, *(self._schema.functions if self._schema is not None else ())}
+            yield self._subject.finding(path, "term", message, found=term.function, valid=valid)
+            return
         names = self._scope(scope, term)
         reader = TypeReader(names, self._subject.records)
         try:
@@ -338,6 +357,9 @@ class _Data:
                 if reader.leads_to_part(term.name):
                     names = {**names, term.name: reader.kind(term.name, term.place)}
             else:
+                if isinstance(term, Arithmetic) and self._library.conversions:
+                    yield from self._operands(term, scope, path)
+                    term = replace(term, args=tuple(map(self._operand, term.args)))
                 term = plain_term(term, reader)
         except InputError as error:
             yield self._subject.caught(error, path, "term")
@@ -355,6 +377,9 @@ class _Data:
         for kind in wanted:
             yield from self._fits(term, kind, names, path)
 
+    def _is_unknown(self, function: str) -> bool:
+        return self._schema is not None and function != "size" and function not in self._schema.functions
+
     def _literal(self, term: Term, scope: Types | None, path: Path, *wanted: str | None) -> Iterator[Finding]:
         """Yield findings about the parts of a list or record."""
         try:
@@ -370,6 +395,30 @@ class _Data:
                 continue
             for name, part in parts.items():
                 yield from self._term(part, scope, (*path, int(name) if name.isdecimal() else name), types.get(name))
+
+    def _conversion(
+        self, called: Conversion[..., Any], term: Call, scope: Types | None, path: Path, *wanted: str | None
+    ) -> Iterator[Finding]:
+        """Yield findings about the arguments and the result of a conversion."""
+        try:
+            called.require_arguments(len(term.args))
+        except InputError as error:
+            yield self._subject.caught(error, path, "term")
+            return
+        for (name, kind), part in zip(called.parameters.items(), term.args, strict=False):
+            yield from self._term(part, scope, (*path, name), kind)
+        for kind in wanted:
+            yield from self._fits(term, kind, _ANY, path)
+
+    def _operands(self, term: Arithmetic, scope: Types | None, path: Path) -> Iterator[Finding]:
+        """Yield findings about the conversions among the operands of arithmetic."""
+        for part in term.args:
+            if isinstance(part, Call) and part.function in self._library.conversions:
+                yield from self._term(part, scope, path, "number")
+
+    def _operand(self, term: Term) -> Term:
+        called = isinstance(term, Call) and term.function in self._library.conversions
+        return Constant(0, place=term.place) if called else term
 
     def _scope(self, scope: Types | None, used: Expression | Term | Effect) -> Types:
         """Return the scope; for `None`, an unknown event, the plot's names and all attributes that `used` reads."""
@@ -420,6 +469,8 @@ class _Data:
                 return "boolean"
             case Constant(str() as name):
                 return "text" if self._schema is None else self._schema.constants.get(name, "text")
+            case Call(function) if function in self._library.conversions:
+                return self._library.conversions[function].result
             case _:
                 return "number"
 

@@ -25,7 +25,7 @@ from knowledge_base.tracebacks import place_of, user_place
 from planning.engines.planner import Planner
 from planning.execution.shipped_plots import shipped_plots
 from planning.problem.construction import check_goal
-from planning.robot.bundles import Bundle, components_of, gathered, plots_of
+from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of
 from planning.robot.program import Origin
 from planning.robot.robot import Robot, kind_of
 from planning.robot.simulation import Setup, Simulation
@@ -230,4 +230,5 @@ _MAY_RAISE = (InputError, OSError)
 def _library(bundle: Bundle, profile: Profile | None) -> Library:
     if profile is None:
         return bundle.library
-    return Library([*adapted(plots_of(gathered([bundle])), profile), *shipped_plots()])
+    found = gathered([bundle])
+    return Library([*adapted(plots_of(found), profile), *shipped_plots()], conversions_of(found))

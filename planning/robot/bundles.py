@@ -16,6 +16,7 @@ from typing import Any, TypedDict, Unpack
 
 from dsc.components.component import Component
 from dsc.components.hooks import contained
+from dsc.conversions import Conversion
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.text.plot_files import load_library
@@ -52,6 +53,7 @@ class BundleParts(TypedDict, total=False):
     foresight: Foresight | None
     failures: Collection[str]
     profiles: Path | None
+    conversions: tuple[Conversion[..., Any], ...]
 
 
 @dataclass(frozen=True, eq=False)  # without slots, for the cached properties
@@ -75,6 +77,7 @@ class Bundle:
         failures: further outcomes of skills that count as failures in reports. By default these are the outcomes that
             plots pass on to their caller, and the failures of all skills, e.g. `timed_out`.
         profiles: a folder of settings profiles (`*.yaml`), which `dsc run --profile` finds by name.
+        conversions: the functions that terms of the plots may call, see `dsc.conversion`.
     """
 
     name: str
@@ -90,6 +93,7 @@ class Bundle:
     foresight: Foresight | None = None
     failures: Collection[str] = frozenset()
     profiles: Path | None = None
+    conversions: tuple[Conversion[..., Any], ...] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.failures, str):
@@ -132,7 +136,8 @@ class Bundle:
     @cached_property
     def library(self) -> Library:
         """The plots of the bundle and the bundles that it needs, with all derived tables; errors as for `plots_of`."""
-        return Library([*plots_of(gathered([self])), *shipped_plots()])
+        found = gathered([self])
+        return Library([*plots_of(found), *shipped_plots()], conversions_of(found))
 
     @property
     def primitive(self) -> tuple[str, ...]:
@@ -267,6 +272,11 @@ def plots_of(bundles: Collection[Bundle]) -> list[ActionPlot]:
             if other.digest != plot.digest:
                 raise InputError(f"the bundles '{whose}' and '{bundle.name}' have different plots '{plot.name}'")
     return [plot for plot, _ in found.values()]
+
+
+def conversions_of(bundles: Iterable[Bundle]) -> list[Conversion[..., Any]]:
+    """Return the conversions of the bundles, without repetitions."""
+    return list(dict.fromkeys(one for bundle in bundles for one in bundle.conversions))
 
 
 def components_of(bundles: Collection[Bundle]) -> list[Component]:

@@ -38,7 +38,7 @@ from planning.problem.construction import build_problem, check_goal
 from planning.problem.derived import derivation
 from planning.problem.relevance import numeric_constructs
 from planning.robot.bringup import begin, simulated
-from planning.robot.bundles import Bundle, components_of, gathered, plots_of, shipped_by
+from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of, shipped_by
 from planning.robot.simulation import Setup, Simulation
 from planning.robot.soundness import IMPLEMENTED, check_implementations
 from planning.robot.targets import bundle_at
@@ -175,7 +175,7 @@ class _Robot:
 
     def findings(self) -> list[Finding]:
         """Return the findings of the validator; other errors go to the list of `collecting`."""
-        library = Library([*self._plots, *shipped_plots()])
+        library = Library([*self._plots, *shipped_plots()], conversions_of(self._bundles))
         skills, declared, exclusive = self._skills(), self._declared(), self._exclusive()
         schema = None if self._domain is None else self._domain.schema
         found: list[Finding] = []

@@ -12,6 +12,7 @@ from typing import Any, Self
 
 from dsc.components.assembly import require_deployed, require_instances, require_wired
 from dsc.components.component import Component
+from dsc.conversions import Conversion
 from dsc.dynamic.library import Library
 from dsc.events import SKILL_FAILURES
 from dsc.model.plot import ActionPlot
@@ -35,7 +36,7 @@ from planning.execution.planning_component import PlanningComponent
 from planning.execution.search import Foresight
 from planning.execution.shipped_plots import shipped_plots
 from planning.model.domain import PlanningDomain
-from planning.robot.bundles import Bundle, components_of, domain_of, gathered, plots_of, shipped_by
+from planning.robot.bundles import Bundle, components_of, conversions_of, domain_of, gathered, plots_of, shipped_by
 from planning.robot.run import Run
 from planning.robot.simulation import Simulation
 from planning.robot.soundness import require_parts, require_sound
@@ -81,6 +82,7 @@ class RobotProgram:
         durability: Durability = "process",
         failures: Collection[str] = (),
         origin: Origin | None = None,
+        conversions: Iterable[Conversion[..., Any]] = (),
     ) -> None:
         require_parts(knowledge, planner, foresight, store)
         self.components = require_instances(components)
@@ -95,7 +97,7 @@ class RobotProgram:
         if knowledge is not None:
             require_extension(self.domain.schema, knowledge.schema)
         self.store = None if store is None else located(store)
-        self.library = plots if isinstance(plots, Library) else Library(plots)
+        self.library = plots if isinstance(plots, Library) else Library(plots, conversions)
         for plot in shipped_plots():
             if plot.name not in self.library:
                 self.library.add(plot)
@@ -146,6 +148,7 @@ class RobotProgram:
         """
         found = gathered(bundles)
         how.setdefault("failures", frozenset[str]().union(*(bundle.failures for bundle in found)))
+        how.setdefault("conversions", conversions_of(found))
         return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
 
     @property
@@ -171,7 +174,7 @@ class RobotProgram:
     def header(self) -> dict[str, Any]:
         """Return the inputs that determine a run, for the first line of the trace."""
         plots = "".join(sorted(plot.digest for plot in self.library))
-        domain = "\n".join(f"{name}\n{text}" for name, text in sorted(self.domain.statements().items()))
+        domain = "\n".join(f"{name}\n{text}" for name, text in sorted(self._statements().items()))
         origin, world = self.origin, self.simulation
         return {
             **({} if origin is None else {"run": origin.bundle.name}),
@@ -221,7 +224,12 @@ class RobotProgram:
         """Return the store of a run with these plain data, or `None` without a store."""
         if self.store is None:
             return None
-        return RunStore(self.knowledge, self.store, header, self.domain.statements())
+        return RunStore(self.knowledge, self.store, header, self._statements())
+
+    def _statements(self) -> dict[str, str]:
+        """Return what a resumed run must find unchanged besides its plots: the domain and the conversions."""
+        conversions = {f"conversion {name}": one.digest for name, one in self.library.conversions.items()}
+        return {**self.domain.statements(), **conversions}
 
     def prune(self, keep: int) -> int:
         """Delete all but the latest `keep` runs of the store, also during a run; return the number of deleted runs.

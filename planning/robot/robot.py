@@ -68,6 +68,7 @@ class Robot(RobotProgram):
         durability: with a store, "process" survives a crash of the process, and "power" also a power failure.
         failures: further outcomes with which a plot does not reach its goal, see `failures`.
         origin: the deployed bundle; `None` for a robot that was not made by `deploy`.
+        conversions: the functions that terms of the plots may call; a `Library` has its own.
 
     Attributes:
         clock: the kind of time; `None` for that of the event loop.

@@ -175,7 +175,8 @@ def _add_variables(e: Expression | Term, bound: frozenset[str], found: list[str]
             found.append(e.name)
     elif isinstance(e, Exists | Forall):
         for variable in e.variables:
-            found += [name[1:] for name in variable.types if name[:1] == "?" and name[1:] not in bound]
+            if variable.types and variable.types[0][:1] == "?" and variable.types[0][1:] not in bound:
+                found.append(variable.types[0][1:])  # noqa: PERF401  # a comprehension costs a call
         _add_variables(e.body, bound.union([v.name for v in e.variables]), found)
     else:
         for part in parts_of(e):

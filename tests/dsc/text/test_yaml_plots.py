@@ -84,7 +84,7 @@ BROKEN = [
     (HEAD + "    usee: q", 4, "did you mean 'use'?"),
     (HEAD + "    use: q\n    dynamic: [r]", 5, "unknown key 'dynamic'"),
     (HEAD + "    use: q\n    wiht: {a: 1}", 5, "did you mean 'with'?"),
-    (HEAD + "    use: q\n    with:\n      a: [1, 2]", 6, "a value was expected"),
+    (HEAD + "    use: q\n    with:\n      a: [1, null]", 6, "a value was expected"),
     (HEAD + "    use: q\n    with:\n      a:", 6, "a value was expected"),
     (HEAD + "    use: q\n    with:\n      a: .nan", 6, "a finite number"),
     (HEAD + "    dynamic: q", 4, "a list was expected"),
