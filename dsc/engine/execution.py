@@ -23,7 +23,7 @@ from dsc.engine.tables import CompiledPlot
 from dsc.errors import RunawayError
 from dsc.events import DONE, DONE_STATE, NO_CANDIDATE, Event
 from dsc.model.states import DynamicState, SubmachineState
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, SchemaError
 from knowledge_base.language.syntax.expression import Variable
 
 MAX_NESTING = 40
@@ -207,6 +207,7 @@ class Execution:
                     passed = {**self.performer.values(frame, own), **passed}
                 if state.use.startswith("?"):
                     compiled = self.chart.bind(frame.variables[state.use[1:]])
+                    self._require_handled(frame, name, compiled)
                 else:
                     compiled = self.chart.compiled(state.use)
                 if before is None:
@@ -221,6 +222,13 @@ class Execution:
         if before is not None:
             before.gone = True
             self.leave_plot(before)
+
+    def _require_handled(self, frame: Frame, name: str, inside: CompiledPlot) -> None:
+        """Raise `SchemaError` unless a state handles each outcome of a plot given as data; steps of plans may fail."""
+        edges = frame.compiled.nodes[frame.compiled.index[name]].edges
+        for event in () if inside.plot.generated or frame.compiled.scxml else inside.plot.emits:
+            if event not in edges:
+                raise SchemaError(f"state '{name}' does not handle '{event}' of plot '{inside.plot.name}'", found=event)
 
     def _replace_plot(self, before: Frame, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> None:
         """Enter a plot in place of another one; activated states that both have continue, and the others are exited.

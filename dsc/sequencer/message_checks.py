@@ -148,7 +148,8 @@ def _plain(
             of_type = f" of type {kind}" if kind else ""
             raise InputError(f"the {what} '{event}' needs its attribute '{name}'{of_type}")
         value = attributes.get(name)
-        if wanted is not None and (type(value) not in wanted.exact or (type(value) is str and len(value) > _LONG)):
+        fits = type(value) is not float and wanted is not None and type(value) in wanted.exact
+        if wanted is not None and not (fits and (type(value) is not str or len(value) < _LONG)):
             checked[name] = wanted.check(f"the attribute '{name}' of '{event}'", value, records)
     plain: dict[str, Any] = _copied(checked, f"the attributes of '{event}'")
     return plain

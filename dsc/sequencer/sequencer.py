@@ -97,6 +97,7 @@ class Sequencer:
             self.trace.listen(store.receive)
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id, library)
+        self._reactor.deployed = self.dispatcher.deployment
         self._open_ended = open_ended
         self._over = False
         self._stopped: str | None = None  # the reason to end the run, from outside; not kept with its state
@@ -346,8 +347,7 @@ class Sequencer:
 
     def _failure(self) -> str | None:
         """Return the last outcome of the plot if it is declared as a failure."""
-        emitted = self._reactor.emitted
-        last = emitted[-1].name if emitted else None
+        last = self._reactor.emitted[-1].name if self._reactor.emitted else None
         return last if last in self._failures else None
 
     async def _news(self) -> None:

@@ -15,7 +15,10 @@ from dsc.model.plot import ActionPlot
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.world.schema import Schema
 
-_VALUES = {"number": "float", "boolean": "bool", "text": "str", "symbol": "str", ROOT_TYPE: "str"}
+_VALUES = {
+    **dict.fromkeys(("text", "symbol", "condition", ROOT_TYPE), "str"),
+    "plot": "dict[str, Any]", ANY: "Any", "number": "float", "integer": "int", "boolean": "bool", "geometry": "list[float]",
+}  # fmt: skip
 
 
 def typed_plots(plots: Iterable[ActionPlot], schema: Schema | None = None) -> str:

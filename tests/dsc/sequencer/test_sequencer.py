@@ -755,3 +755,32 @@ def test_the_first_state_may_choose_its_content():
     free = "{plot: free, when: (not (p)), states: {f: {final: true}}}"
     ran = Ran(text, busy, free)
     assert ran.end.finished, ran.end
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        ("parameters: {x: text}\nstates: {s: {after: {seconds: 1, to: e}}, e: {final: true}}", "'made.x' is text, not 2"),
+        ("parameters: {x: number}\nstates: {s: {entry: {trigger: nobody.go}, on: {q: e}}, e: {final: true}}", "'nobody.go'"),
+        ("parameters: {x: number}\nstates: {s: {entry: {trigger: arm.fly}, on: {q: e}}, e: {final: true}}", "'arm.fly'"),
+        ("parameters: {x: number}\nemits: {odd: }\nstates: {s: {on: {done: {to: e, emit: odd}}}, e: {final: true}}",
+         "state 'run' does not handle 'odd'"),
+        ("parameters: {x: number}\nstates: {s: {on: {done: nowhere}}, e: {final: true}}", "nowhere"),
+        ("parameters: {x: sort}\nstates: {s: {after: {seconds: 1, to: e}}, e: {final: true}}", "there is no type 'sort'"),
+    ],
+)  # fmt: skip
+def test_a_plot_given_as_data_is_checked_as_one_of_the_library(made, said):
+    ran = Ran(
+        """
+        plot: p
+        parameters: {plan: plot}
+        emits: {failed: {reason: text}}
+        states:
+          run: {use: ?plan, with: {x: 2}, on: {done: e, error: {to: e, emit: failed, with: {reason: ?event.reason}}}}
+          e: {final: true}
+        """,
+        arm=Arm(),
+        arguments={"plan": plot(f"plot: made\n{made}").to_form()},
+    )
+    assert ran.end.finished
+    assert said in ran.end.emitted[0].attributes["reason"]

@@ -1,0 +1,51 @@
+"""Plots given as data, checked as plots of the library are before a state runs them (S2.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dsc.dynamic.library import Library
+from dsc.engine.tables import CompiledPlot
+from dsc.model.plot import ActionPlot
+from dsc.validation import validate_plot
+from dsc.validation.library import raise_findings
+from knowledge_base.world.schema import Schema
+
+Deployed = Callable[[], Mapping[str, Any] | None]
+"""Function that returns the arguments of `validate_plot` about the deployed components; `None` if they are unknown."""
+
+
+class CheckedPlots:
+    """A `Chart` of a library's plots that checks each plot given as data, except those made from plans.
+
+    Args:
+        library: the plots.
+        schema: the declared types and predicates.
+        deployed: the deployed skills and components; they may change during a run.
+    """
+
+    def __init__(self, library: Library, schema: Schema, deployed: Deployed) -> None:
+        self._library = library
+        self._schema = schema
+        self._deployed = deployed
+        self._accepted: set[CompiledPlot] = set()
+
+    def compiled(self, name: str) -> CompiledPlot:
+        """Return the compiled plot of that name; raise `UnknownNameError` if there is none."""
+        return self._library.compiled(name)
+
+    def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
+        """Return the compiled plot for data in the written form.
+
+        Raises:
+            InputError: the data are not a plot, or the plot does not pass the validator.
+        """
+        compiled = self._library.bind(form)
+        if not compiled.plot.generated and compiled not in self._accepted:
+            deployed = self._deployed()
+            if deployed is not None:
+                plot = ActionPlot.model_validate(form)
+                raise_findings(validate_plot(plot, self._library, self._schema, **deployed))
+            self._accepted.add(compiled)
+        return compiled
