@@ -10,15 +10,19 @@ from collections.abc import Iterable, Iterator, Mapping
 from keyword import iskeyword
 
 from dsc.annotations import domain_type, type_class
+from dsc.data_types import ANY, DataType, data_type, names_in
 from dsc.model.declarations import PlotParameter
 from dsc.model.plot import ActionPlot
+from knowledge_base.facts import GEOMETRY
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.world.schema import Schema
 
 _VALUES = {
     **dict.fromkeys(("text", "symbol", "condition", ROOT_TYPE), "str"),
-    "plot": "dict[str, Any]", ANY: "Any", "number": "float", "integer": "int", "boolean": "bool", "geometry": "list[float]",
+    "number": "float", "integer": "int", "boolean": "bool", GEOMETRY: "list[float]",
+    "plot": "dict[str, Any]", ANY: "Any",
 }  # fmt: skip
+_FROM_TYPING = ("Annotated", "Any", "Literal", "NewType", "NotRequired", "TypedDict")
 
 
 def typed_plots(plots: Iterable[ActionPlot], schema: Schema | None = None) -> str:
@@ -29,11 +33,15 @@ def typed_plots(plots: Iterable[ActionPlot], schema: Schema | None = None) -> st
         schema: the types of the domain; without a schema, no type is a subtype of another.
     """
     wanted = sorted((plot for plot in plots if not plot.generated), key=lambda plot: plot.name)
-    named = {one.type for plot in wanted for one in (*plot.parameters.values(), *plot.outputs.values())}
+    records = {name: fields for plot in wanted for name, fields in plot.types.items()}
+    texts = [one.type for plot in wanted for one in (*plot.parameters.values(), *plot.outputs.values())]
+    texts += [text for fields in records.values() for text in fields.values()]
+    named = {name for text in texts for name in names_in(data_type(text))} - records.keys()
     types = [_type_definition(name, schema) for name in _with_supertypes(named, schema)]
     parts = ["\n".join(types)] if types else []
+    parts += [_typed_dict(type_class(name), f"The record `{name}`.", _fields(own)) for name, own in records.items()]
     parts += [part for plot in wanted for part in (_outputs(plot), _function(plot)) if part]
-    used = [name for name in ("Annotated", "Literal", "NewType", "TypedDict") if any(f"{name}" in one for one in parts)]
+    used = [name for name in _FROM_TYPING if any(f"{name}" in one for one in parts)]
     head = '"""Typed calls of plots, made by `dsc plot types`."""\n\nfrom __future__ import annotations\n\n'
     imports = (f"from typing import {', '.join(used)}\n\n" if used else "") + "from dsc import PlotCall\n"
     return head + imports + ("\n" if types else "\n\n") + "\n\n\n".join(parts) + "\n"
@@ -55,8 +63,30 @@ def _type_definition(name: str, schema: Schema | None) -> str:
     return f'{made} = Annotated[{above}, "{name}"]'
 
 
-def _annotation(type_name: str) -> str:
-    return _VALUES.get(type_name) or type_class(type_name)
+def _annotation(text: str) -> str:
+    return _annotation_of(data_type(text))
+
+
+def _annotation_of(kind: DataType) -> str:
+    inner = "Any" if kind.inner is None else _annotation_of(kind.inner)
+    match kind.kind:
+        case "list":
+            return f"list[{inner}]"
+        case "map":
+            return f"dict[str, {inner}]"
+        case "optional":
+            return f"{inner} | None"
+        case "choice":
+            return f"Literal[{', '.join(map(repr, kind.values))}]".replace("'", '"')
+        case _:
+            return _VALUES.get(kind.name or kind.kind) or type_class(kind.name)
+
+
+def _fields(record: Mapping[str, str]) -> dict[str, str]:
+    return {
+        name: f"NotRequired[{_annotation(text)}]" if text.startswith("optional ") else _annotation(text)
+        for name, text in record.items()
+    }
 
 
 def _permitted(parameter: PlotParameter) -> str:
@@ -68,10 +98,14 @@ def _permitted(parameter: PlotParameter) -> str:
 def _outputs(plot: ActionPlot) -> str:
     if not plot.outputs:
         return ""
-    name, types = _outputs_class(plot), {name: _annotation(one.type) for name, one in plot.outputs.items()}
+    types = {name: _annotation(one.type) for name, one in plot.outputs.items()}
+    return _typed_dict(_outputs_class(plot), f"Outputs of the plot `{plot.name}`.", types)
+
+
+def _typed_dict(name: str, about: str, types: Mapping[str, str]) -> str:
     if all(map(_usable, types)):
-        lines = [f"    {output}: {annotation}" for output, annotation in types.items()]
-        return "\n".join([f"class {name}(TypedDict):", f'    """Outputs of the plot `{plot.name}`."""', "", *lines])
+        lines = [f"    {key}: {annotation}" for key, annotation in types.items()]
+        return "\n".join([f"class {name}(TypedDict):", f'    """{about}"""', "", *lines])
     items = ", ".join(f'"{output}": {annotation}' for output, annotation in types.items())
     return f'{name} = TypedDict("{name}", {{{items}}})'
 
@@ -89,7 +123,10 @@ def _function(plot: ActionPlot) -> str:
 
 
 def _taken(name: str, parameter: PlotParameter) -> str:
-    return f"{name}: {_permitted(parameter)}" + (" | None = None" if parameter.default is not None else "")
+    annotation = _permitted(parameter)
+    if parameter.required:
+        return f"{name}: {annotation}"
+    return f"{name}: {annotation.removesuffix(' | None')} | None = None"
 
 
 def _docstring(plot: ActionPlot) -> Iterator[str]:

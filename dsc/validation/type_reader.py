@@ -35,11 +35,11 @@ class TypeReader:
 
     def term(self, variable: Variable) -> Term:
         """See `DataReader`; the variable of a part is unchanged, and its type is noted."""
-        kind = self._given(variable.name, variable.place)
+        kind = self._kind_if_set(variable.name, variable.place)
         if kind is not None and (kind.kind in _COLLECTIONS or kind.name in self._records):
             message = f"'?{variable.name}' is of type {kind}, and a condition reads its parts"
             raise InputError(message, place=variable.place, found=variable.name)
-        renamed = self._renamed(variable.name)
+        renamed = self._name_in_scope(variable.name)
         if renamed not in self._scope and self.leads_to_part(variable.name):
             self.read[renamed] = None if kind is None else str(kind)
         return Variable(renamed, place=variable.place)
@@ -55,7 +55,7 @@ class TypeReader:
 
     def is_collection(self, name: str) -> bool:
         """See `DataReader`."""
-        kind = self._given(name)
+        kind = self._kind_if_set(name)
         return kind is not None and kind.kind in _COLLECTIONS
 
     def size(self, name: str) -> Term:
@@ -71,7 +71,7 @@ class TypeReader:
     def elements(self, name: str, variable: str) -> Iterator[DataReader]:
         """See `DataReader`; one reader stands for all elements."""
         self._require(name)
-        kind = self._given(name)
+        kind = self._kind_if_set(name)
         if kind is not None and kind.kind not in _COLLECTIONS:
             raise InputError(f"'?{name}' is of type {kind}, and has no elements", found=name)
         element = None if kind is None or kind.inner is None else str(kind.inner)
@@ -96,7 +96,7 @@ class TypeReader:
 
     def leads_to_part(self, name: str) -> bool:
         """Return whether a name begins with that of a variable of the scope."""
-        head = self._renamed(name)
+        head = self._name_in_scope(name)
         while head not in self._scope:
             head, dot, _ = head.rpartition(".")
             if not dot:
@@ -107,17 +107,17 @@ class TypeReader:
         if not self.leads_to_part(name):
             raise unbound_error(name, None, self._scope)
 
-    def _renamed(self, name: str) -> str:
+    def _name_in_scope(self, name: str) -> str:
         head, dot, rest = name.partition(".")
         return f"{self._own[head]}{dot}{rest}" if head in self._own else name
 
-    def _given(self, name: str, place: Place | None = None) -> DataType | None:
+    def _kind_if_set(self, name: str, place: Place | None = None) -> DataType | None:
         """Return the type of a value that is set."""
         kind = self._kind(name, place)
         return kind.inner if kind is not None and kind.kind == "optional" else kind
 
     def _kind(self, name: str, place: Place | None = None) -> DataType | None:
-        name = self._renamed(name)
+        name = self._name_in_scope(name)
         head, parts = name, list[str]()
         while head not in self._scope:
             if "." not in head:

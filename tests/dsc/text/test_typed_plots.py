@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import get_args, get_type_hints
+from typing import Any, Literal, get_args, get_type_hints
 
 import pytest
 from hypothesis import given
@@ -114,3 +114,22 @@ def test_the_command_prints_the_module_for_files_and_folders(tmp_path):
 
 
 TEXT = "{plot: count, parameters: {mug: mug}, states: {e: {final: true}}}"
+
+
+FIND = parse_plot("""
+plot: find
+types: {spot: {pose: geometry, label: optional text}, find: {item: mug, spots: list of spot}}
+parameters: {hand: optional left | right, near: {type: map of number, default: {}}, few: integer, plan: plot}
+outputs: {finds: list of find, rest: any}
+states: {e: {final: true}}
+""")
+
+
+def test_lists_records_and_choices_have_annotations():
+    made = module(FIND)
+    hints = get_type_hints(made.find, vars(made))
+    assert hints["hand"] == Literal["left", "right"] | None
+    assert (hints["near"], hints["few"], hints["plan"]) == (dict[str, float] | None, int, dict[str, Any])
+    assert made.FindOutputs.__annotations__["finds"].__forward_arg__ == "list[Find]"
+    assert made.Spot.__optional_keys__ == {"label"} or "NotRequired" in str(made.Spot.__annotations__["label"])
+    assert made.find(few=2, plan={}).arguments == {"few": 2, "plan": {}}
