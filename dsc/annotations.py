@@ -216,8 +216,9 @@ def parameter_annotations(body: Callable[..., Any], own: int, names: Namespace) 
     found: dict[str, object] = {}
     for one in list(inspect.signature(body).parameters.values())[own:]:
         if one.kind in {one.VAR_POSITIONAL, one.VAR_KEYWORD}:
-            message = f"a plot passes arguments by name, so '{one}' receives none; name the parameters, or take a list"
-            raise SchemaError(message, found=one.name)
+            stars = "*" if one.kind is one.VAR_POSITIONAL else "**"
+            message = f"plots pass arguments by name, and '{stars}{one.name}' receives none"
+            raise SchemaError(f"{message}: name the parameters, or take a list", found=one.name)
         found[one.name] = Any if one.annotation is one.empty else evaluated(one.annotation, names, f"'{one.name}'")
     return found
 

@@ -117,6 +117,7 @@ def conversion(body: Callable[_P, _R]) -> Conversion[_P, _R]:
         except InputError as error:
             error.place = error.place or Place(code.co_filename, code.co_firstlineno)
             raise
+    return Conversion(body.__name__, body, {}, 0, None, {}, {}, "")  # the caller collects errors
 
 
 def _declare(body: Callable[_P, _R], code: CodeType) -> Conversion[_P, _R]:

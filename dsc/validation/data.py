@@ -45,11 +45,13 @@ from knowledge_base.language.syntax.effect import Effect, mentioned
 from knowledge_base.language.syntax.expression import (
     Arithmetic,
     Call,
+    Comparison,
     Constant,
     Expression,
     Term,
     Variable,
     free_variables,
+    parts_of,
 )
 from knowledge_base.language.syntax.text import to_text
 
@@ -292,6 +294,7 @@ class _Data:
             yield self._subject.caught(error, path, "condition")
             return
         names = {**names, **reader.read}
+        yield from self._compared(condition, names, path)
         if self._schema is None:
             yield from self._unbound(free_variables(condition), names, path, "condition")
             return
@@ -301,6 +304,18 @@ class _Data:
                 self._schema.require_defined(condition)
         except InputError as error:
             yield self._subject.caught(error, path, "condition")
+
+    def _compared(self, condition: Expression, names: Types, path: Path) -> Iterator[Finding]:
+        """Yield findings about words that are compared as numbers, e.g. choices, whose types conditions do not know."""
+        if isinstance(condition, Comparison) and condition.operator not in {"=", "!="}:
+            for term in (condition.left, condition.right):
+                kind = names.get(term.name) if isinstance(term, Variable) else None
+                if kind is not None and self._checker.is_word(data_type(kind)):
+                    message = f"'{condition.operator}' works on numbers, and {to_text(term)} is of type {kind}"
+                    yield self._subject.finding(path, "condition", message)
+        for part in parts_of(condition):
+            if isinstance(part, Expression):
+                yield from self._compared(part, names, path)
 
     def _effect(self, effect: Effect, scope: Types | None, path: Path) -> Iterator[Finding]:
         names = self._scope(scope, effect)

@@ -44,6 +44,12 @@ class TypeChecker:
             return f"in {given.unit}"
         return None
 
+    def is_word(self, kind: DataType) -> bool:
+        """Return whether the values are words whose type is unknown to conditions: a choice, symbol or condition."""
+        kind = _inside_optional(kind)
+        words = kind.kind == "choice" and self._form(kind) == "word"
+        return words or kind.name in {"symbol", "condition", "plot"}
+
     def parts_of(self, text: str | None, parts: Collection[str], *, is_list: bool) -> Mapping[str, str | None] | str:
         """Return the types of the parts of a list or record that enters a type; or, as text, why it does not fit."""
         kind = None if text is None else _inside_optional(data_type(text))

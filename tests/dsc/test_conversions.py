@@ -141,7 +141,7 @@ def test_a_slow_conversion_is_reported_with_its_line(caplog):
     [
         (lambda: conversion(_without_result), "has no return annotation"),
         (lambda: conversion(_coroutine), "is a coroutine"),
-        (lambda: conversion(_any_number), "a plot passes arguments by name"),
+        (lambda: conversion(_any_number), "plots pass arguments by name"),
         (lambda: conversion(Size), "cannot be named 'Size'"),
         (lambda: Library([], [total, conversion(_other_total())]), "two conversions are named 'total'"),
         (lambda: Library([], [len]), "is not a conversion"),  # type: ignore[list-item]
