@@ -244,8 +244,17 @@ def _value(word: str) -> str | int | float | bool:
     return word[1:-1] if word[:1] == word[-1:] == '"' else word
 
 
-def check_all(subject: str, values: dict[str, Any], declared: Mapping[str, str | None], records: Records) -> None:
-    """Convert the values in place to their declared types; `subject` has `{}` for a name.
+def check_all(
+    subject: str, owner: str, values: dict[str, Any], declared: Mapping[str, str | None], records: Records
+) -> None:
+    """Convert the values in place to their declared types.
+
+    Args:
+        subject: the owner of a value in messages, with `{name}` and `{owner}`.
+        owner: the name of the plot, event or skill that declares the types.
+        values: the values by name.
+        declared: the types by name; other values are unchanged.
+        records: the known records.
 
     Raises:
         InputError: a value does not have its type.
@@ -255,7 +264,7 @@ def check_all(subject: str, values: dict[str, Any], declared: Mapping[str, str |
         if text is not None:
             wanted = data_type(text)
             if type(value) not in wanted.exact:
-                values[name] = wanted.check(subject.format(name), value, records)
+                values[name] = wanted.check(subject.format(name=name, owner=owner), value, records)
 
 
 def names_in(wanted: DataType) -> Iterator[str]:

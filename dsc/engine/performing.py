@@ -42,6 +42,8 @@ _LOG = run_logger(__package__)
 
 _EXPONENT_FROM = 1e21
 """Smallest number that ECMAScript writes with an exponent."""
+_OF_PLOT = "'{owner}.{name}'"
+_NO_CLASS: frozenset[type] = frozenset()
 SHORTEST_PERIOD = 0.001
 """Lower bound of a period in seconds; a shorter period would block all other events."""
 
@@ -183,8 +185,10 @@ class Performer:
         match action:
             case Assign(assign=terms):
                 values, compiled = self.values(frame, terms), frame.compiled
-                if compiled.types:
-                    check_all(f"'{compiled.plot.name}.{{}}'", values, compiled.types, compiled.records)
+                for name, value in values.items():
+                    if type(value) not in compiled.exact.get(name, _NO_CLASS):  # most values need no further check
+                        check_all(_OF_PLOT, compiled.plot.name, values, compiled.types, compiled.records)
+                        break
                 frame.variables = {**frame.variables, **values}
             case Tell(tell=effect):
                 told = self.situation.tell(effect, self.bindings(frame))
@@ -231,7 +235,7 @@ class Performer:
         types = frame.compiled.plot.emits.get(name)
         if types and not frame.compiled.scxml:
             attributes = dict(attributes)
-            check_all(f"the attribute '{{}}' of '{name}'", attributes, types, frame.compiled.records)
+            check_all("the attribute '{name}' of '{owner}'", name, attributes, types, frame.compiled.records)
         if name not in frame.compiled.plot.emits:
             self.internal.append(Event(name, attributes, frame=frame.serial))
         elif frame.parent is None:
@@ -286,7 +290,7 @@ def fill_parameters(compiled: CompiledPlot, arguments: Mapping[str, Any], situat
         )
     if compiled.types:
         own = {name: value for name, value in variables.items() if value is not None or name in plot.parameters}
-        check_all(f"'{plot.name}.{{}}'", own, compiled.types, compiled.records)
+        check_all(_OF_PLOT, plot.name, own, compiled.types, compiled.records)
         variables.update(own)
     return variables
 

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from dsc.conversions import Conversions
-from dsc.data_types import NO_RECORDS, Records
+from dsc.data_types import NO_RECORDS, Records, data_type
 from dsc.events import DONE
 from dsc.model import states
 from dsc.model.actions import ExternalAction, Internal
@@ -176,6 +176,7 @@ class CompiledPlot:
         defaults: default of each history, by node index.
         scxml: whether the plot is in dialect `scxml`, where events match by prefix and have the names of SCXML.
         types: types of parameters, variables and outputs by name; empty in dialect `scxml`.
+        exact: by name, the classes of which each value has the type.
         records: the records of the plot's library, which later plots may extend.
         conversions: the functions that terms may call.
         cache: cached configurations and the initial reaction (see `machine_state`).
@@ -188,6 +189,7 @@ class CompiledPlot:
     defaults: Mapping[int, Default] = field(default_factory=dict)
     scxml: bool = False
     types: Mapping[str, str] = field(default_factory=dict)
+    exact: Mapping[str, frozenset[type]] = field(default_factory=dict)
     records: Records = field(default_factory=dict)
     conversions: Conversions = field(default_factory=dict)
     cache: dict[Any, Any] = field(default_factory=dict)
@@ -238,8 +240,9 @@ def compile_plot(
     scxml = plot.dialect == "scxml"
     declared = {} if scxml else {**plot.parameters, **plot.variables, **plot.outputs}
     types = {name: one.type for name, one in declared.items()}
+    exact = {name: data_type(text).exact for name, text in types.items()}
     return CompiledPlot(
-        plot, tuple(layout.nodes), layout.index, form, layout.defaults(), scxml, types, records, conversions
+        plot, tuple(layout.nodes), layout.index, form, layout.defaults(), scxml, types, exact, records, conversions
     )
 
 

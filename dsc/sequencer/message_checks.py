@@ -96,8 +96,8 @@ def arguments_for(start: Start, signature: SkillSignature) -> dict[str, Any]:
         InputError: an argument does not have its type.
     """
     arguments: dict[str, Any] = encoded(start.arguments)
-    subject = f"the argument '{{}}' of {start.component}.{start.skill}"
-    check_all(subject, arguments, signature.parameters, signature.records)
+    skill = f"{start.component}.{start.skill}"
+    check_all("the argument '{name}' of {owner}", skill, arguments, signature.parameters, signature.records)
     return arguments
 
 
