@@ -35,4 +35,4 @@ def test_the_tutorial_page_has_the_present_programs():
 
 
 def test_the_steps_are_numbered_without_a_gap():
-    assert [file.stem.partition("_")[0] for file in tutorial.STEPS] == [f"step{n}" for n in range(1, 9)]
+    assert [file.stem.partition("_")[0] for file in tutorial.STEPS] == [f"step{n}" for n in range(1, 10)]

@@ -1,4 +1,4 @@
-"""The tutorial page: eight programs with their outputs. `python tests/tutorial.py` writes docs/tutorial.md anew."""
+"""The tutorial page: nine programs with their outputs. `python tests/tutorial.py` writes docs/tutorial.md anew."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ READ_ON = {
     6: "[event handlers](plots.md#event-handlers)",
     7: "[Tests](testing.md)",
     8: "[Running a robot](run.md) and [the viewer](viewer.md)",
+    9: "[Data in plots](data.md)",
 }
 BEGINNING = """# Tutorial
 
-A delivery robot in eight steps. Each step is a program in [examples/tutorial](../examples/tutorial) that ends with its
+A delivery robot in nine steps. Each step is a program in [examples/tutorial](../examples/tutorial) that ends with its
 output; a later step imports the parts of earlier ones. After `make demo`, run a
 step with `.venv/bin/python examples/tutorial/step1_skill.py`.
 
