@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, fields, is_dataclass
 from enum import EnumType
+from functools import cache
 from types import FrameType, UnionType
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, NewType, Union, get_args, get_origin, get_type_hints
 
@@ -22,6 +23,7 @@ from pydantic import BaseModel
 
 from dsc.data_types import ANY, DataType, data_type
 from knowledge_base.errors import InputError, Place, SchemaError, nearest, tolerated
+from knowledge_base.spelling import is_plain_name
 
 _PLAIN: Mapping[object, str] = {bool: "boolean", int: "integer", float: "number", str: "text"}
 _WORDS = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
@@ -128,15 +130,31 @@ class RecordField(NamedTuple):
     required: bool
 
 
+@cache
 def record_fields(kind: Any) -> dict[str, RecordField]:
-    """Return the fields of a class of records by name."""
-    hints = get_type_hints(kind, include_extras=True)
+    """Return the fields of a class of records by name; the first call is made where the names of annotations exist.
+
+    Raises:
+        SchemaError: an annotation names something that does not exist, or a field has no name of plots.
+    """
+    module = vars(sys.modules[kind.__module__])
+    try:
+        hints = get_type_hints(kind, localns=dict(names_around(module)), include_extras=True)
+    except NameError as error:
+        message = f"an annotation of {kind.__qualname__} names '{error.name}', which does not exist when it is read"
+        raise SchemaError(message, found=str(error.name)) from None
     if issubclass(kind, BaseModel):
-        return {name: RecordField(hints[name], one.is_required()) for name, one in kind.model_fields.items()}
-    return {
-        one.name: RecordField(hints[one.name], one.default is MISSING and one.default_factory is MISSING)
-        for one in fields(kind)
-    }
+        found = {name: RecordField(hints[name], one.is_required()) for name, one in kind.model_fields.items()}
+    else:
+        found = {
+            one.name: RecordField(hints[one.name], one.default is MISSING and one.default_factory is MISSING)
+            for one in fields(kind)
+        }
+    for name in found:
+        if not is_plain_name(name):
+            message = f"field '{name}' of {kind.__qualname__} cannot be read in plots, which have lower-case names"
+            raise SchemaError(f"{message}; write '{lower_name(name)}'", found=name)
+    return found
 
 
 def _record(kind: Any, records: FoundRecords) -> str:

@@ -296,10 +296,3 @@ def objects_in(wanted: DataType, value: Any, records: Records, at: str = "") -> 
 
 def _path(at: str, key: object) -> str:
     return f"{at}.{key}" if at else str(key)
-
-
-def element(wanted: DataType) -> DataType | None:
-    """Return the type of the elements of a list or map; `None` for another type, or for elements of any type."""
-    if wanted.kind == "optional" and wanted.inner is not None:
-        return element(wanted.inner)
-    return wanted.inner if wanted.kind in {"list", "map"} else None

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
-from enum import Enum
-from typing import Any, get_args, get_origin
+from enum import Enum, EnumType
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import BaseModel
 
 from dsc.annotations import is_record, record_fields
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, described
 
 Builder = Callable[[Any], Any]
 """Function that makes the value of Python for plain data."""
@@ -33,17 +34,14 @@ def plain_value(value: Any) -> Any:
 
 def builder(annotation: object) -> Builder | None:
     """Return a function that makes values for an annotation with records or enumerations; `None` without these."""
-    if not any(is_record(one) or (isinstance(one, type) and issubclass(one, Enum)) for one in _parts(annotation)):
+    if not any(is_record(one) or isinstance(one, EnumType) for one in _parts(annotation)):
         return None
-    adapter: TypeAdapter[Any] = TypeAdapter(annotation)  # type: ignore[arg-type]  # any annotation may be one
 
     def build(value: Any) -> Any:
         try:
-            return adapter.validate_python(_complete(annotation, value))
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"]))
-            raise InputError(f"{where}: {first['msg']}" if where else first["msg"]) from None
+            return _build(annotation, value)
+        except (ValueError, TypeError) as error:  # of a class's own checks, e.g. those of pydantic
+            raise InputError(f"{value!r} is refused: {described(error)}") from error
 
     return build
 
@@ -52,15 +50,20 @@ def _parts(annotation: object) -> list[object]:
     return [annotation, *(part for inside in get_args(annotation) for part in _parts(inside))]
 
 
-def _complete(annotation: object, value: Any) -> Any:
-    """Return the data with `None` for each unset field of a record that has no default in its class."""
+def _build(annotation: Any, value: Any) -> Any:
+    """Return the value of Python for checked data; an unset field has the default of its class, or `None`."""
     inside = [one for one in get_args(annotation) if one is not type(None)]
-    if is_record(annotation) and isinstance(value, Mapping):
+    if isinstance(value, Mapping) and is_record(annotation):
         own = record_fields(annotation)
-        unset = {name: None for name, field in own.items() if field.required and name not in value}
-        return {**unset, **{key: _complete(own[key].annotation, one) for key, one in value.items()}}
+        given = {name: field for name, field in own.items() if field.required or name in value}
+        return annotation(**{name: _build(field.annotation, value.get(name)) for name, field in given.items()})
+    if isinstance(annotation, EnumType) and value is not None:
+        return annotation(value)
     if isinstance(value, list) and inside:
-        return [_complete(inside[0], one) for one in value]
+        return [_build(inside[0], one) for one in value]
     if isinstance(value, Mapping) and get_origin(annotation) is dict:
-        return {key: _complete(inside[1], one) for key, one in value.items()}
-    return _complete(inside[0], value) if len(inside) == 1 else value
+        return {key: _build(inside[1], one) for key, one in value.items()}
+    return _build(inside[0], value) if get_origin(annotation) in _WRAPPERS and inside else value
+
+
+_WRAPPERS = (Annotated, Union, UnionType)

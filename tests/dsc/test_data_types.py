@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from dataclasses import dataclass, field, make_dataclass
+from enum import Enum
+from typing import Annotated, Any, Literal, NewType
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import BaseModel, Field
 from typed_values import PLAIN, RECORDS, typed_values
 
 from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, parse_plot, skill
+from dsc.annotations import type_of
 from dsc.data_types import data_type, objects_in
+from dsc.python_values import builder, plain_value
 from dsc.runs.archive import records_of
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import run_simulated
@@ -210,3 +215,95 @@ states:
 def test_each_form_of_type_is_tested():
     kinds = {data_type(text).kind for text in PLAIN} | {"list", "map", "optional"}
     assert kinds == {"number", "integer", "boolean", "name", "geometry", "choice", "list", "map", "optional"}
+
+
+# -- annotations ---------------------------------------------------------------------------------------------
+
+
+class Colour(Enum):
+    RED = "red"
+    BLUE = "blue"
+
+
+@dataclass
+class Leaf:
+    colour: Colour
+    veins: list[float] = field(default_factory=list)
+
+
+class Branch(BaseModel):
+    leaves: list[Leaf]
+    parts: dict[str, Branch] = {}
+    owner: str | None = None
+
+
+@pytest.mark.parametrize(
+    ("annotation", "text"),
+    [
+        (int, "integer"),
+        (float, "number"),
+        (list[str], "list of text"),
+        (list, "list of any"),
+        (list[Any], "list of any"),
+        (dict[str, list[int]], "map of list of integer"),
+        (dict[int, str], None),
+        (str | None, "optional text"),
+        (list[str] | None, "optional list of text"),
+        (int | str, None),
+        (Literal["a", "b"], "a | b"),
+        (Literal[1, 2] | None, "optional 1 | 2"),
+        (Colour, "red | blue"),
+        (NewType("CleanItem", str), "clean-item"),
+        (Annotated[str, "list of item"], "list of item"),
+        (Annotated[float, 3], "number"),
+        (Leaf, "leaf"),
+        (list[Branch], "list of branch"),
+        (tuple[float, ...], None),
+    ],
+)
+def test_an_annotation_has_a_type(annotation, text):
+    assert type_of(annotation) == text
+
+
+def test_classes_of_records_have_fields_and_values():
+    records: dict[str, dict[str, str | None]] = {}
+    assert type_of(Branch, records) == "branch"
+    leaf = {"colour": "red | blue", "veins": "optional list of number"}
+    branch = {"leaves": "list of leaf", "parts": "optional map of branch", "owner": "optional text"}
+    assert records == {"leaf": leaf, "branch": branch}
+    value = Branch(leaves=[Leaf(Colour.RED)], parts={"top": Branch(leaves=[])}, owner="me")
+    plain = data_type("branch").check("it", plain_value(value), records)
+    assert plain["parts"]["top"] == {"leaves": [], "parts": {}}
+    build = builder(Branch)
+    assert build is not None
+    assert build(json.loads(json.dumps(plain))) == value
+    assert builder(list[float] | None) is None
+
+
+def test_the_checks_of_a_class_refuse_a_value():
+    class Age(BaseModel):
+        years: int = Field(ge=0)
+
+    build = builder(list[Age])
+    assert build is not None
+    with pytest.raises(InputError, match="greater than or equal to 0"):
+        build([{"years": -1}])
+
+
+def test_a_field_that_plots_cannot_read_is_refused():
+    @dataclass
+    class Wheel:
+        maxSpeed: float  # noqa: N815
+
+    with pytest.raises(InputError, match="write 'max_speed'"):
+        type_of(Wheel)
+
+
+def test_two_classes_with_one_name_and_other_fields_are_refused():
+    def made(kind: type) -> type:
+        return make_dataclass("Spot", [("x", kind)])
+
+    records: dict[str, dict[str, str | None]] = {}
+    type_of(made(float), records)
+    with pytest.raises(InputError, match="two classes of records are named 'spot'"):
+        type_of(made(str), records)
