@@ -285,12 +285,6 @@ def _reported_outcomes(
     return {event: attributes for one in found for event, attributes in one.items()}
 
 
-def require_names(declared: object, what: str, example: str) -> None:
-    """Raise `InputError` unless `declared` is a mapping whose keys are names."""
-    if not isinstance(declared, Mapping) or not all(isinstance(name, str) for name in declared):
-        raise InputError(f"{what} are a mapping of names, as in {example}, not {shown(declared)}")
-
-
 async def _awaited(_: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
     coming = body(call, **arguments)
     if not inspect.isawaitable(coming):

@@ -2,7 +2,7 @@
 
 ```python
 class Butler(Component):
-    @tree_skill(success="served", failure="not_served", outcomes={"not_served": {}, "served": {}})
+    @tree_skill(success=Served, failure=NotServed)
     def serve(self, call: SkillCall[Any], item: str) -> Behaviour:
         return sequence(
             retry(action("grasp", lambda: self.arm.grasp(call, item), ends={"grasped"}), 3),
@@ -16,20 +16,21 @@ No other module imports py_trees. Any `Behaviour` of py_trees may be a child.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Collection, Mapping
+from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
 from contextvars import ContextVar
-from typing import Any, TypeVar
+from typing import Any, TypeVar, Union
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Repeat, Retry
 
+from dsc.annotations import FoundRecords, names_around
 from dsc.calls import SkillCall
 from dsc.components.hooks import contained
-from dsc.outcomes import Outcome
-from dsc.skills import AfterCrash, Declared, SkillBody, require_names
-from knowledge_base.errors import InputError, UnknownNameError
+from dsc.outcomes import Outcome, declared_outcomes
+from dsc.skills import AfterCrash, SkillBody, declaration, named
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from knowledge_base.language.checking.inputs import shown
 
@@ -43,32 +44,31 @@ _Body = TypeVar("_Body", bound=Callable[..., Behaviour])
 
 
 def tree_skill(
-    success: str,
-    failure: str,
-    outcomes: Mapping[str, Mapping[str, str | None]],
-    types: Mapping[str, str] | None = None,
+    success: type[Outcome],
+    failure: type[Outcome],
+    *,
+    reports: Iterable[type[Outcome]] = (),
     period: float = PERIOD,
     after_crash: AfterCrash = "sense",
 ) -> Callable[[_Body], _Body]:
     """Declare a method that returns a behaviour tree as a skill; each call creates a new tree.
 
-    The observation of an action is asserted when the action ends, regardless of the skill's outcome.
+    The annotations of parameters are their types, as for `skill`. The observation of an action is asserted when the
+    action ends, regardless of the skill's outcome.
 
     Args:
-        success: the outcome if the root of the tree succeeds.
-        failure: the outcome if the root of the tree fails.
-        outcomes: `success` and `failure`, both without attributes, and the outcomes that actions report.
-        types: types of the parameters, as for `skill`.
+        success: the outcome if the root of the tree succeeds, a class without attributes.
+        failure: the outcome if the root of the tree fails, a class without attributes.
+        reports: the classes of the outcomes that actions report before the end.
         period: seconds of run time between two ticks.
         after_crash: as for `skill`; a repeated skill starts its tree again from the root.
 
     Raises:
-        UnknownNameError: `success` or `failure` is not among the outcomes.
-        InputError: `success` or `failure` has attributes, or the outcomes are not a mapping.
+        InputError: an outcome is not a class, or `success` or `failure` has attributes.
+        SchemaError: an annotation has no valid type.
     """
-    require_names(outcomes, "the outcomes of a tree", "outcomes={'served': {}, 'not_served': {}}")
     for end in (success, failure):
-        _require_bare(end, outcomes)
+        _require_bare(end)
 
     async def execute(_: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         _observe.set(call.observe)
@@ -81,17 +81,22 @@ def tree_skill(
             succeeded = root.status is Status.SUCCESS
         finally:
             await _halt(root)
-        return Outcome(success if succeeded else failure)
+        return Outcome((success if succeeded else failure).event)
 
-    declared = {name: dict(one) for name, one in outcomes.items()}
-    return Declared(dict(types or {}), declared, execute, after_crash=after_crash)
+    def declare(body: _Body) -> _Body:
+        records, names = FoundRecords(), names_around(body.__globals__)
+        classes = Union.__getitem__((success, failure, *reports))
+        outcomes = declared_outcomes(classes, names, f"'{named(body)}'", records)
+        return declaration(body, 2, names, outcomes, records, execute=execute, after_crash=after_crash)(body)
+
+    return declare
 
 
-def _require_bare(end: str, outcomes: Mapping[str, Mapping[str, str | None]]) -> None:
-    if end not in outcomes:
-        raise UnknownNameError(f"a tree ends with '{end}', which is not declared", found=end, valid=outcomes)
-    if outcomes[end]:
-        raise InputError(f"a tree ends with '{end}', for whose attributes it has no values", found=end)
+def _require_bare(end: object) -> None:
+    if not (isinstance(end, type) and issubclass(end, Outcome)):
+        raise InputError(f"a tree ends with a class of an outcome, as in success=Served, not with {shown(end)}")
+    if end.declared:
+        raise InputError(f"a tree ends with {end.__name__}, for whose attributes it has no values", found=end.__name__)
 
 
 def sequence(*children: Behaviour, name: str = "sequence", reactive: bool = False) -> Behaviour:

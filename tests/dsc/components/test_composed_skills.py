@@ -7,8 +7,11 @@ import asyncio
 import pytest
 from dsc_charts import plot
 from dsc_runs import SCHEMA, Arm, Ran
+from py_trees.behaviour import Behaviour
 
+from dsc.calls import SkillCall
 from dsc.components.behaviour_trees import action, condition, fallback, repeat, retry, sequence, tree_skill
+from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.outcomes import Outcome
 from dsc.sequencer.plot_skill import PlotComponent
@@ -17,7 +20,15 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
 
-ENDS: dict[str, dict[str, str | None]] = {"served": {}, "not_served": {}}
+
+class Served(Outcome): ...
+
+
+class NotServed(Outcome): ...
+
+
+class Counted(Outcome):
+    count: int
 
 
 class Butler(Arm):
@@ -45,15 +56,15 @@ class Butler(Arm):
         self.ticks += 1
         return True
 
-    @tree_skill("served", "not_served", ENDS)
+    @tree_skill(Served, NotServed)
     def retries(self, call):
         return retry(action("try", lambda: self.try_it(call), {"grasped"}), 3)
 
-    @tree_skill("served", "not_served", ENDS, period=0.5)
+    @tree_skill(Served, NotServed, period=0.5)
     def repeats(self, call, times: int = 3):
         return repeat(action("try", lambda: self.try_it(call), {"grasped"}), times)
 
-    @tree_skill("served", "not_served", ENDS)
+    @tree_skill(Served, NotServed)
     def falls_back(self, call):
         return sequence(
             fallback(
@@ -62,7 +73,7 @@ class Butler(Arm):
             action("take", lambda: self.try_it(call, "cup"), {"grasped"}),
         )
 
-    @tree_skill("served", "not_served", ENDS, period=0.5)
+    @tree_skill(Served, NotServed, period=0.5)
     def watches(self, call):
         return fallback(
             condition("open", lambda: self.counts() and self.open),
@@ -70,23 +81,23 @@ class Butler(Arm):
             reactive=True,
         )
 
-    @tree_skill("served", "not_served", ENDS)
+    @tree_skill(Served, NotServed)
     def takes_then(self, call, then=None):
         take = action("take", lambda: self.try_it(call), {"grasped"})
         if then == "broken":
             return sequence(take, action("broken", lambda: self.breaks(call), {"ok"}))
         return sequence(take, action("wait", lambda: self.try_it(call, "cup2", 1e6), {"grasped"}))
 
-    @tree_skill("served", "not_served", ENDS, period=0.5)
+    @tree_skill(Served, NotServed, period=0.5)
     def guards(self, call, reactive: bool):
         closed = condition("closed", lambda: not self.open)
         return sequence(closed, action("wait", lambda: self.try_it(call, "door", 10.0), {"grasped"}), reactive=reactive)
 
-    @tree_skill("served", "not_served", ENDS)
+    @tree_skill(Served, NotServed)
     def says_nothing(self, call):
         return action("mute", lambda: asyncio.sleep(1), {"ok"})  # type: ignore[arg-type, return-value]
 
-    @tree_skill("served", "not_served", ENDS)
+    @tree_skill(Served, NotServed)
     def raises(self, call, how: str = "raise"):
         return action("broken", lambda: self.breaks(call, how), {"ok"})
 
@@ -170,14 +181,26 @@ def test_a_sequence_asks_conditions_again_if_it_is_reactive(reactive, end):
     assert ran.at == pytest.approx(3.5 if reactive else 10)
 
 
-@pytest.mark.parametrize(("success", "outcomes", "why"), [
-    ("serve", ENDS, "a tree ends with 'serve', which is not declared; did you mean 'served'"),
-    ("served", {"served": {"item": "item"}, "not_served": {}}, "'served', for whose attributes it has no values"),
-    ("served", ["served"], "the outcomes of a tree are a mapping"),
+@pytest.mark.parametrize(("success", "why"), [
+    ("served", "a tree ends with a class of an outcome, as in success=Served, not with 'served'"),
+    (Counted, "a tree ends with Counted, for whose attributes it has no values"),
 ])  # fmt: skip
-def test_how_a_tree_ends_is_declared(success, outcomes, why):
+def test_how_a_tree_ends_is_declared(success, why):
     with pytest.raises(InputError, match=why):
-        tree_skill(success, "not_served", outcomes)
+        tree_skill(success, NotServed)
+
+
+def test_a_tree_has_the_types_of_its_annotations_and_the_outcomes_that_it_reports():
+    class Counter(Component):
+        name = "counter"
+
+        @tree_skill(Served, NotServed, reports=[Counted])
+        def count(self, call: SkillCall[Counted], times: int, names: list[str] | None = None) -> Behaviour:
+            return condition("yes", lambda: True)
+
+    skill = Counter().skills()["count"]
+    assert skill.parameters == {"times": "integer", "names": "optional list of text"}
+    assert skill.outcomes == {"served": {}, "not_served": {}, "counted": {"count": "integer"}}
 
 
 def test_an_action_of_a_tree_that_ends_with_no_outcome_is_a_programming_error():

@@ -111,6 +111,9 @@ RETURNED = {
 class Ok(Outcome): ...
 
 
+class No(Outcome): ...
+
+
 class Hostile(Component):
     """Does what it is made for, in a coroutine, a thread, a behaviour tree, or while it is told something."""
 
@@ -140,14 +143,14 @@ class Hostile(Component):
         except asyncio.CancelledError:
             return self.does()  # type: ignore[no-any-return]
 
-    @tree_skill(success="ok", failure="no", outcomes={"ok": {}, "no": {}})
+    @tree_skill(success=Ok, failure=No)
     def tree(self, call):
         async def act():
             return self.does()
 
         return sequence(action("act", act, {"ok"}))
 
-    @tree_skill(success="ok", failure="no", outcomes={"ok": {}, "no": {}})
+    @tree_skill(success=Ok, failure=No)
     def tests(self, call):
         return sequence(condition("test", self.does))
 

@@ -36,6 +36,9 @@ class Seen(Outcome): ...
 class Did(Outcome): ...
 
 
+class Failed(Outcome): ...
+
+
 class Station(Robot):
     """A robot with all ports; what it was told it remembers, as one that never died would."""
 
@@ -88,7 +91,7 @@ class Station(Robot):
         call.sleep(0.001)
         return Did()
 
-    @tree_skill(success="did", failure="failed", outcomes={"did": {}, "failed": {}}, after_crash="repeat")
+    @tree_skill(success=Did, failure=Failed, after_crash="repeat")
     def climb(self, call):
         async def nap():
             await call.clock.sleep(1)
