@@ -11,14 +11,14 @@ from typing import Any
 
 from dsc.components.frames import encoded
 from dsc.components.life_cycle import Life, LifeCycle
+from dsc.data_types import data_type
 from dsc.errors import NoAnswerError
 from dsc.loop_calls import LoopCalls
-from dsc.model.ranges import Range
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
 
 Values = Mapping[str, str | None]
-"""Names of pushed values with types: `number`, `boolean`, another type for a word, or `None` for any plain data."""
+"""Names of pushed values with types, see `dsc.data_types`; `None` accepts any plain data."""
 Receiver = Callable[[dict[str, Any], float], None]
 """Function that receives pushed values, as a separate copy, and their age: the seconds since their `put`."""
 _EXAMPLE = "{'metres': 'number'}"
@@ -78,7 +78,7 @@ class Push:
             if name not in values:
                 raise InputError(f"'{self._name}' needs its value '{name}'")
             if kind is not None:
-                Range(kind).check(f"{self._name}.{name}", values[name])
+                data_type(kind).check(f"'{self._name}.{name}'", values[name])
         self._calls.call(self._take, encoded(dict(values)), age)
 
     def _take(self, newest: bytes, age: float) -> None:
@@ -220,4 +220,4 @@ def _checked(values: object, what: str) -> Values:
         for name, kind in values.items()
     ):
         raise InputError(f"the values of {what} are names with types, as in {_EXAMPLE}, not {shown(values)}")
-    return dict(values)
+    return {name: None if kind is None else str(data_type(kind)) for name, kind in values.items()}

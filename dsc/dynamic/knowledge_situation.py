@@ -142,8 +142,8 @@ def _defaults(plot: ActionPlot) -> dict[str, Any]:
 
 
 def plain(content: Content) -> Any:
-    """Return a value of the knowledge base as plain JSON for a chart's variable; a geometry is a list of numbers."""
-    return list(content) if isinstance(content, tuple) else content
+    """Return a value of the knowledge base as plain JSON: a geometry as a list of numbers, an unknown one as `None`."""
+    return (list(content) or None) if isinstance(content, tuple) else content
 
 
 def scalars(bindings: Mapping[str, Any]) -> dict[str, Any]:

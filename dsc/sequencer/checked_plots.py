@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from dsc.dynamic.library import Library
@@ -12,23 +12,21 @@ from dsc.validation import validate_plot
 from dsc.validation.library import raise_findings
 from knowledge_base.world.schema import Schema
 
-Deployed = Callable[[], Mapping[str, Any] | None]
-"""Function that returns the arguments of `validate_plot` about the deployed components; `None` if they are unknown."""
-
 
 class CheckedPlots:
     """A `Chart` of a library's plots that checks each plot given as data, except those made from plans.
 
+    The check reads only plots and schema, so that a replay has the same result. The dispatcher answers triggers of
+    missing skills.
+
     Args:
         library: the plots.
         schema: the declared types and predicates.
-        deployed: the deployed skills and components; they may change during a run.
     """
 
-    def __init__(self, library: Library, schema: Schema, deployed: Deployed) -> None:
+    def __init__(self, library: Library, schema: Schema) -> None:
         self._library = library
         self._schema = schema
-        self._deployed = deployed
         self._accepted: set[CompiledPlot] = set()
 
     def compiled(self, name: str) -> CompiledPlot:
@@ -43,9 +41,6 @@ class CheckedPlots:
         """
         compiled = self._library.bind(form)
         if not compiled.plot.generated and compiled not in self._accepted:
-            deployed = self._deployed()
-            if deployed is not None:
-                plot = ActionPlot.model_validate(form)
-                raise_findings(validate_plot(plot, self._library, self._schema, **deployed))
+            raise_findings(validate_plot(ActionPlot.model_validate(form), self._library, self._schema))
             self._accepted.add(compiled)
         return compiled

@@ -122,12 +122,6 @@ class Dispatcher:
         if self._asked:
             self.give_turns()
 
-    def deployment(self) -> dict[str, Any]:
-        """Return the deployed skills and the declared parameters of the components, as arguments of `validate_plot`."""
-        deployed = self._components.values()
-        skills = [skill for component in deployed for skill in component.skills().values()]
-        return {"skills": skills, "components": {one.name: one.parameters.declared for one in deployed}}
-
     @property
     def is_part(self) -> bool:
         """Whether the run is a part of another run."""

@@ -18,7 +18,7 @@ from dsc.errors import RunawayError
 from dsc.events import EVERY, PROGRAMMING_ERROR, RESERVED, SKILL_FAILURES, Event
 from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
 from dsc.runs.kept import Kept
-from dsc.sequencer.checked_plots import CheckedPlots, Deployed
+from dsc.sequencer.checked_plots import CheckedPlots
 from dsc.sequencer.phase_watch import PhaseWatch, described
 from dsc.sequencer.step_tracing import StepTracer
 from dsc.trace import Trace
@@ -60,7 +60,6 @@ class Reactor:
             `MOST_UNHEARD`.
         in_vain: activation and number of periods without any effect since the last other message.
         settings: an operator's settings of plots, by plot and parameter.
-        deployed: returns the deployed skills and components for checks of plots given as data; `None` omits the checks.
         caused_by: by action id, the number of the trace record about the start of a skill that may still answer. Of
             cancelled skills, only the latest `MOST_CANCELLED` are kept.
         listeners: functions that are called with each macrostep, before its actions are dispatched.
@@ -74,12 +73,11 @@ class Reactor:
         phases: PhaseWatch | None = None,
         run: str = "",
     ) -> None:
-        self.deployed: Deployed | None = None
         self._phases = phases or PhaseWatch()
         self._run = run
         self.library = library
         self.knowledge = knowledge
-        self.machine = Machine(self._chart())
+        self.machine = Machine(CheckedPlots(library, knowledge.schema))
         self.trace = trace
         self.tracer = StepTracer(trace)
         trace.blame = lambda error: self._note(error, "a listener of the trace")
@@ -95,12 +93,6 @@ class Reactor:
         self.caused_by: dict[str, int] = {}
         self._cancelled: deque[str] = deque()
         self._noted: set[str] = set()
-
-    def _chart(self) -> CheckedPlots:
-        """Return the provider of plots, which checks plots given as data."""
-        return CheckedPlots(
-            self.library, self.knowledge.schema, lambda: None if self.deployed is None else self.deployed()
-        )
 
     def restore(self, kept: Kept) -> None:
         """Restore the state after the last macrostep of an interrupted run."""
@@ -229,7 +221,7 @@ class Reactor:
         """Change the default of a plot's parameter for later entries."""
         self.settings[setting.owner, setting.name] = setting
         self.library = self.library.with_default(setting.owner, setting.name, setting.value, "operator")
-        self.machine.chart = self._chart()
+        self.machine.chart = CheckedPlots(self.library, self.knowledge.schema)
 
     def _due(self, message: TimerMessage) -> Event:
         self.trace.cause = None

@@ -97,7 +97,6 @@ class Sequencer:
             self.trace.listen(store.receive)
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id, library)
-        self._reactor.deployed = self.dispatcher.deployment
         self._open_ended = open_ended
         self._over = False
         self._stopped: str | None = None  # the reason to end the run, from outside; not kept with its state

@@ -168,8 +168,8 @@ def test_a_timed_port_is_silent_when_its_component_is_gone(end):
     ("values", "said"),
     [
         ({"metres": 1}, "'laser.scan' needs its value 'points'"),
-        ({"metres": "far", "points": []}, "'laser.scan.metres' is a number; found far"),
-        ({"metres": True, "points": []}, "is a number"),
+        ({"metres": "far", "points": []}, "'laser.scan.metres' is a finite number, not 'far'"),
+        ({"metres": True, "points": []}, "is a finite number"),
         ({"meters": 1, "points": []}, "has no value 'meters'; did you mean 'metres'"),
         ({"metres": 1, "points": object()}, "only plain data"),
     ],

@@ -22,3 +22,8 @@ def test_a_chart_reads_and_tells_content():
     )
     assert situation.value(parse_term("(pose cup map)"), {}) == [1, 2]
     assert situation.value(parse_term("(label cup)"), {}) == "blue"
+
+
+def test_an_unknown_geometry_has_no_value():
+    situation = KnowledgeSituation(world(ROOM, "cup map - thing"), Library([]))
+    assert situation.value(parse_term("(pose cup map)"), {}) is None

@@ -761,8 +761,6 @@ def test_the_first_state_may_choose_its_content():
     ("made", "said"),
     [
         ("parameters: {x: text}\nstates: {s: {after: {seconds: 1, to: e}}, e: {final: true}}", "'made.x' is text, not 2"),
-        ("parameters: {x: number}\nstates: {s: {entry: {trigger: nobody.go}, on: {q: e}}, e: {final: true}}", "'nobody.go'"),
-        ("parameters: {x: number}\nstates: {s: {entry: {trigger: arm.fly}, on: {q: e}}, e: {final: true}}", "'arm.fly'"),
         ("parameters: {x: number}\nemits: {odd: }\nstates: {s: {on: {done: {to: e, emit: odd}}}, e: {final: true}}",
          "state 'run' does not handle 'odd'"),
         ("parameters: {x: number}\nstates: {s: {on: {done: nowhere}}, e: {final: true}}", "nowhere"),
