@@ -24,7 +24,7 @@ Records = Mapping[str, Mapping[str, str | None]]
 """The records by name: the type of each field as text; `None` accepts any plain data."""
 NO_RECORDS: Records = {}
 MOST_ELEMENTS = 10_000
-"""The maximum number of elements in a list or map, and of characters in a text times ten."""
+"""The maximum number of elements in a list or map; a text has at most ten times as many characters."""
 WORDS = ("text", "symbol", "condition", "plot")
 """Types of texts. Other names are types of the domain, whose values are names of objects, or records."""
 _NUMBER = re.compile(r"(number|integer)( from \S+)?( to \S+)?( in \S.*)?")

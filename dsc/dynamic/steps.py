@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Protocol
 
 from dsc.events import (
@@ -17,12 +18,14 @@ from dsc.events import (
     TIMED_OUT,
 )
 from dsc.model.actions import Configure, Send, Switch
+from dsc.model.data_forms import literal_parts
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import STEP, Command, Handler, Response, Rule
 from dsc.model.states import AnyState, DynamicState, SubmachineState
 from knowledge_base.errors import SchemaError
 from knowledge_base.language.syntax.effect import mentioned, quantified_in, substitute_effect
-from knowledge_base.language.syntax.expression import Term, free_variables, substitute
+from knowledge_base.language.syntax.expression import Term, Variable, free_variables, substitute
+from knowledge_base.language.syntax.text import to_text
 
 Outcomes = Mapping[str, Mapping[str, str] | None]
 """Types of attributes by attribute name, by event name; `None` if the attributes are unknown."""
@@ -176,7 +179,11 @@ def about_step(rule: Rule, step: Step, plot: ActionPlot) -> Rule:
         SchemaError: an argument reads a variable whose name the rule uses for another value.
     """
     read = mentioned_in(rule)
-    arguments = {STEP + name: term for name, term in step.arguments.items() if STEP + name in read}
+    arguments = {}
+    for name in read:
+        given, _, part = name.removeprefix(STEP).partition(".")
+        if name.startswith(STEP) and given in step.arguments:
+            arguments[name] = _part_of(step.arguments[given], part)
     if not arguments:
         return rule
     _refuse_capture(rule, arguments, plot)
@@ -190,6 +197,19 @@ def about_step(rule: Rule, step: Step, plot: ActionPlot) -> Rule:
             "passed": filled(do.passed, arguments),
         }),
     })  # fmt: skip
+
+
+def _part_of(term: Term, path: str) -> Term:
+    """Return the term for a part of the value of a term; an empty path is the value itself."""
+    if not path:
+        return term
+    if isinstance(term, Variable):
+        return replace(term, name=f"{term.name}.{path}")
+    name, _, rest = path.partition(".")
+    parts = literal_parts(term) or {}
+    if name not in parts:
+        raise SchemaError(f"a rule reads the part '{path}' of {to_text(term)}, which has no such part", found=path)
+    return _part_of(parts[name], rest)
 
 
 def filled(terms: Terms, values: Mapping[str, Term]) -> dict[str, Term]:

@@ -175,3 +175,44 @@ def test_a_form_is_replaced_by_a_plain_condition():
 def test_a_planning_domain_has_no_lists(where):
     with pytest.raises(InputError, match="'\\?found' would be a list, which only plots have"):
         PlanningDomain.parse(DOMAIN[:-1] + f" (:action look :parameters () {where}))")
+
+
+USED = """
+plot: used
+types: {order: {item: item, places: list of place}}
+parameters: {order: order}
+states: {s: {after: {seconds: 1, to: e}}, e: {final: true}}
+"""
+RULED = """
+plot: ruled
+types: {{order: {{item: item, places: list of place}}}}
+variables: {{mine: {{type: order, initial: {{item: a, places: [table]}}}}, other: {{type: item, initial: b}}}}
+states:
+  step: {{use: used, with: {{order: {given}}}, on: {{done: over}}}}
+  over: {{final: true}}
+rules:
+  - before: step
+    when: {when}
+    do: {{tell: (seen ?step.order.item), then: continue}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "when", "seen"),
+    [
+        ("?mine", "(= ?step.order.item a)", ["a"]),
+        ("?mine", "(= ?step.order.places.0 table)", ["a"]),
+        ("?mine", "(= ?step.order.item b)", []),
+        ("{item: ?other, places: [table]}", "(= ?step.order.item b)", ["b"]),
+        ("{item: ?other, places: [table]}", "(= ?step.order.places.0 table)", ["b"]),
+    ],
+)
+def test_a_rule_reads_parts_of_the_arguments_of_its_step(given, when, seen):
+    async def main() -> list[str]:
+        knowledge = KnowledgeBase(SCHEMA)
+        library = Library([parse_plot(RULED.format(given=given, when=when)), parse_plot(USED)])
+        end = await Sequencer(library, knowledge, [], LoopClock()).run("ruled")
+        assert end.finished, end.problem
+        return [str(one["i"]) for one in knowledge.query("(seen ?i)")]
+
+    assert run_simulated(main()) == seen
