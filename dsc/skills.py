@@ -113,6 +113,7 @@ class Declared:
         within: as in `SkillSignature`.
         records: as in `SkillSignature`.
         builders: functions that make the values of Python for arguments with records or enumerations.
+        values: for an event, the types of the values that `update` passes to its test, by name.
     """
 
     types: Mapping[str, str | None]
@@ -125,6 +126,7 @@ class Declared:
     within: float | None = None
     records: Records = field(default_factory=dict)
     builders: Mapping[str, Builder] = field(default_factory=dict)
+    values: Mapping[str, str | None] = field(default_factory=dict)
 
     def build(self, arguments: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return the arguments as the body's annotations state; raise `InputError` for data that have no such value."""

@@ -17,6 +17,7 @@ from dsc.components.parameters import Configuration, Parameters
 from dsc.components.ports import TAKES, EventActivations
 from dsc.components.streams import Push, Stream
 from dsc.components.turns import Turns
+from dsc.data_types import check_all, data_type
 from dsc.outcomes import Outcome
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
@@ -288,8 +289,13 @@ class Component(ComponentHooks, RestartHooks):
         taking = {n: m for n, m in inspect.getmembers(type(self), inspect.isfunction) if hasattr(m, TAKES)}
         if port not in taking:
             raise UnknownNameError(f"component '{self.name}' takes no '{port}'", found=port, valid=taking)
-        check_arguments(signature_of(self.name, port, taking[port], getattr(taking[port], TAKES)), message)
-        await getattr(self, port)(**message)
+        declared: Declared = getattr(taking[port], TAKES)
+        check_arguments(signature_of(self.name, port, taking[port], declared), message)
+        parts = dict(message)
+        check_all(
+            "the part '{name}' of the message {owner}", f"{self.name}.{port}", parts, declared.types, declared.records
+        )
+        await getattr(self, port)(**declared.build(parts))
 
     def update(self, event: str, *values: Any) -> None:
         """Pass new values to the test of each activation of the event; later activations begin with these values.
@@ -298,10 +304,18 @@ class Component(ComponentHooks, RestartHooks):
 
         Raises:
             UnknownNameError: the component has no such event.
+            InputError: the number of values, or a value's type, is not that of the parameters of the event's test.
         """
         events = [name for name, signature in self.skills().items() if signature.pattern == "event"]
         if event not in events:
             raise UnknownNameError(f"component '{self.name}' has no event '{event}'", found=event, valid=events)
+        declared: Declared = getattr(getattr(self, event), DECLARED)
+        if len(values) != len(declared.values):
+            wanted = f"({', '.join(declared.values)})"
+            raise InputError(f"event '{self.name}.{event}' has the values {wanted}; found {len(values)}", found=event)
+        for (value, kind), one in zip(declared.values.items(), values, strict=True):
+            if kind is not None:
+                data_type(kind).check(f"the value '{value}' of event '{self.name}.{event}'", one, declared.records)
         self.activations.update(event, values)
 
     async def diagnose(self) -> dict[str, Any]:

@@ -34,7 +34,7 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from dsc.annotations import FoundRecords, names_around
+from dsc.annotations import FoundRecords, names_around, parameter_annotations, type_of
 from dsc.calls import SkillCall
 from dsc.components.hooks import contained
 from dsc.loop_calls import LoopCalls
@@ -96,7 +96,9 @@ def event(test: _Test) -> _Test:
         events = returned_outcomes(test, names, records, optional=True)
         if len(events) != 1:
             raise SchemaError(f"event '{name}' returns one outcome class or None, not {len(events)} classes")
-        how = {"execute": _activate, "own": own, "pattern": "event", "after_crash": "repeat"}
+        given = list(parameter_annotations(test, 1, names).items())[: own - 1]
+        values = {value: type_of(annotation, records) for value, annotation in given}
+        how = {"execute": _activate, "own": own, "pattern": "event", "after_crash": "repeat", "values": values}
         return declaration(test, own, names, events, records, **how)(test)
     return test
 

@@ -12,6 +12,7 @@ from dsc.components.component import Component
 from dsc.components.ports import event, query, takes
 from dsc.dynamic.library import Library
 from dsc.outcomes import Outcome
+from dsc.sequencer.clock import run_simulated
 from dsc.skills import skill
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError, UnknownNameError
@@ -245,3 +246,47 @@ def test_the_sequencer_says_how_the_run_is_going():
     assert said[1]["working"] == ["battery.low", "battery.run"]
     assert said[1]["in_use"] == ["battery"]
     assert done.sequencer.diagnose()["finished"]
+
+
+class Heavy(Outcome): ...
+
+
+class Scale(Component):
+    name = "scale"
+
+    def __init__(self):
+        super().__init__()
+        self.heard = []
+
+    @event
+    def heavy(self, grams: float, things: list[str], above: float = 10.0) -> Heavy | None:
+        return Heavy() if grams > above and things else None
+
+    @takes
+    async def show(self, text: str, lines: list[int]):
+        self.heard.append((text, lines))
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (("much", []), "the value 'grams' of event 'scale.heavy' is a finite number, not 'much'"),
+        ((1.0, [3]), "the value 'things' of event 'scale.heavy' at 0 is text, not 3"),
+        ((1.0,), "event 'scale.heavy' has the values (grams, things); found 1"),
+    ],
+)
+def test_updated_values_have_the_types_of_the_test(values, said):
+    with pytest.raises(InputError) as refused:
+        Scale().update("heavy", *values)
+    assert said in str(refused.value)
+
+
+def test_the_parts_of_a_message_have_their_types():
+    async def main():
+        scale = Scale()
+        await scale.receive("show", {"text": "hi", "lines": [1, 2]})
+        with pytest.raises(InputError, match=r"the part 'lines' of the message scale.show at 1 is an integer, not 'x'"):
+            await scale.receive("show", {"text": "hi", "lines": [1, "x"]})
+        return scale.heard
+
+    assert run_simulated(main()) == [("hi", [1, 2])]
