@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Literal
 
-from dsc.type_words import brief, choice_text, in_words, not_a_type
+from dsc.type_words import brief, choice_text, choice_value, in_words, not_a_type
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import GEOMETRY, MOST_NUMBERS
 from knowledge_base.language.checking.inputs import shown
@@ -25,6 +25,9 @@ Records = Mapping[str, Mapping[str, str | None]]
 NO_RECORDS: Records = {}
 MOST_ELEMENTS = 10_000
 """The maximum number of elements in a list or map; a text has at most ten times as many characters."""
+DEEPEST = 64
+"""The maximum number of levels of a type, and of a value."""
+_LONGEST_FOUND = 80
 WORDS = ("text", "symbol", "condition", "plot")
 """Types of texts. Other names are types of the domain, whose values are names of objects, or records."""
 _NUMBER = re.compile(r"(number|integer)( from \S+)?( to \S+)?( in \S.*)?")
@@ -94,6 +97,8 @@ class DataType:
         Raises:
             InputError: the value does not have the type; the message names the part that differs.
         """
+        if at.count(".") > DEEPEST:
+            raise InputError(f"{subject} has more than {DEEPEST} levels")
         if self.kind == "optional":
             return None if value is None or self.inner is None else self.inner.check(subject, value, records, at)
         if self.kind == "name" and self.name in records:
@@ -199,13 +204,15 @@ def data_type(text: str) -> DataType:
         InputError: the text is not a type; the message names the form that is nearest.
     """
     words = " ".join(text.split())
+    if words.count(" of ") + words.count("optional ") > DEEPEST:
+        raise InputError(f"a type has at most {DEEPEST} levels", found=words[:_LONGEST_FOUND])
     for kind in ("list", "map"):
         if words.startswith(f"{kind} of "):
             return DataType(kind, inner=_inner(words.removeprefix(f"{kind} of ")))
     if words.startswith("optional "):
         return DataType("optional", inner=data_type(words.removeprefix("optional ")))
     if "|" in words:
-        return DataType("choice", values=tuple(map(_value, filter(None, map(str.strip, words.split("|"))))))
+        return DataType("choice", values=tuple(map(choice_value, filter(None, map(str.strip, words.split("|"))))))
     if words in {"boolean", GEOMETRY}:
         return DataType(words)  # type: ignore[arg-type]  # both are kinds
     if (number := _NUMBER.fullmatch(words)) is not None:
@@ -227,21 +234,12 @@ def _number_type(text: str, kind: str, least: str | None, most: str | None, unit
         raise InputError(
             f"'{text}' is not a type: a bound is a number, as in `{kind} from 0 to 5`", found=text
         ) from None
+    if not all(math.isfinite(bound) for bound in (low, high) if bound is not None):
+        raise InputError(f"'{text}' is not a type: a bound is a finite number", found=text)
     if low is not None and high is not None and not low <= high:
         raise InputError(f"'{text}' has no values: no number is {low:g} or more and {high:g} or less", found=text)
     unit = "" if unit is None else unit.removeprefix(" in ")
     return DataType("integer" if kind == "integer" else "number", least=low, most=high, unit=unit)
-
-
-def _value(word: str) -> str | int | float | bool:
-    if word in {"true", "false"}:
-        return word == "true"
-    for read in (int, float):
-        try:
-            return read(word)
-        except ValueError:
-            continue
-    return word[1:-1] if word[:1] == word[-1:] == '"' else word
 
 
 def check_all(

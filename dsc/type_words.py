@@ -43,6 +43,18 @@ def choice_text(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) and not is_plain_name(value) else str(value)
 
 
+def choice_value(word: str) -> str | int | float | bool:
+    """Return the value that `choice_text` writes as this word."""
+    if word in {"true", "false"}:
+        return word == "true"
+    for read in (int, float):
+        try:
+            return read(word)
+        except ValueError:
+            continue
+    return word[1:-1] if word[:1] == word[-1:] == '"' else word
+
+
 def not_a_type(text: str) -> InputError:
     """Return the error for a text that is not a type, with the form that is nearest."""
     python = _LIKE_PYTHON.fullmatch(text)

@@ -73,6 +73,10 @@ def test_a_type_is_read_from_its_text(drawn):
         ("two words", "a type is a name"),
         ("number from low", "a bound is a number"),
         ("number from 3 to 1", "has no values"),
+        ("number to inf", "a bound is a finite number"),
+        ("number from nan", "a bound is a finite number"),
+        ("list of " * 5_000 + "text", "at most 64 levels"),
+        ("optional " * 5_000 + "text", "at most 64 levels"),
         ("", "is not a type"),
     ],
 )
@@ -92,6 +96,14 @@ def test_the_message_names_the_part_that_differs():
 def test_a_list_that_is_too_long_is_refused():
     with pytest.raises(InputError, match="10001 elements"):
         data_type("list of number").check("'x'", [1] * 10_001)
+
+
+def test_a_value_that_is_too_deep_is_refused():
+    value: dict[str, Any] = {"inside": []}
+    for _ in range(400):
+        value = {"inside": [value]}
+    with pytest.raises(InputError, match="more than 64 levels"):
+        data_type("tree").check("'x'", value, {"tree": {"inside": "list of tree"}})
 
 
 def test_the_objects_inside_of_a_value_are_found():
