@@ -112,10 +112,10 @@ def _compound_type(annotation: object, records: FoundRecords) -> str | None:
 def add_records(records: FoundRecords, more: Mapping[str, Mapping[str, str | None]]) -> None:
     """Add records; raise `SchemaError` for a second record of one name with other fields."""
     for name, own in more.items():
-        if records.setdefault(name, dict(own)) != own:
-            raise SchemaError(
-                f"two records are named '{name}', with the fields {', '.join(own)} and others", found=name
-            )
+        known = records.setdefault(name, dict(own))
+        if known != own:
+            said = f"two records are named '{name}', with the fields {', '.join(known)} and {', '.join(own)}"
+            raise SchemaError(said, found=name)
 
 
 def is_record(annotation: object) -> bool:

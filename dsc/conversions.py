@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from types import CodeType
 from typing import Any, Generic, ParamSpec, TypeVar
 
-from dsc.annotations import FoundRecords, evaluated, names_around, parameter_annotations, type_of
+from dsc.annotations import FoundRecords, evaluated, names_around, type_of
 from dsc.data_types import Records, data_type
-from dsc.python_values import Builder, builder, plain_value
+from dsc.python_values import Builder, plain_value, typed_parameters
 from dsc.run_log import run_logger
 from knowledge_base.errors import InputError, Place, SchemaError, described, tolerated
 from knowledge_base.spelling import is_plain_name
@@ -129,12 +129,8 @@ def _declare(body: Callable[_P, _R], code: CodeType) -> Conversion[_P, _R]:
     signature, names = inspect.signature(body), names_around(inspect.unwrap(body).__globals__)
     if signature.return_annotation is inspect.Signature.empty:
         raise SchemaError(f"conversion '{name}' has no return annotation, which is the type of its result")
-    records, builders = FoundRecords(), dict[str, Builder]()
-    annotations = parameter_annotations(body, 0, names)
-    types = {one: type_of(annotation, records) for one, annotation in annotations.items()}
-    for one, annotation in annotations.items():
-        if (build := builder(annotation)) is not None:
-            builders[one] = build
+    records = FoundRecords()
+    types, builders = typed_parameters(body, 0, names, records)
     result = type_of(evaluated(signature.return_annotation, names, f"the result of '{name}'"), records)
     required = sum(one.default is inspect.Parameter.empty for one in signature.parameters.values())
     return Conversion(name, body, types, required, result, records, builders, _digest(code))

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
-from dsc.annotations import is_record, record_fields
+from dsc.annotations import FoundRecords, Namespace, is_record, parameter_annotations, record_fields, type_of
 from knowledge_base.errors import InputError, described
 
 Builder = Callable[[Any], Any]
@@ -44,6 +44,20 @@ def builder(annotation: object) -> Builder | None:
             raise InputError(f"{value!r} is refused: {described(error)}") from error
 
     return build
+
+
+def typed_parameters(
+    body: Callable[..., Any], first: int, names: Namespace, records: FoundRecords
+) -> tuple[dict[str, str | None], dict[str, Builder]]:
+    """Return the types and the builders of a function's parameters from number `first`, by name.
+
+    Raises:
+        SchemaError: an annotation has no valid type, or a parameter cannot be passed by name.
+    """
+    annotations = parameter_annotations(body, first, names)
+    types = {name: type_of(annotation, records) for name, annotation in annotations.items()}
+    built = {name: builder(annotation) for name, annotation in annotations.items()}
+    return types, {name: build for name, build in built.items() if build is not None}
 
 
 def _parts(annotation: object) -> list[object]:

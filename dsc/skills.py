@@ -32,14 +32,14 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Literal, TypeVar, cast, get_args, overload
 
-from dsc.annotations import FoundRecords, Namespace, evaluated, names_around, parameter_annotations, type_of
+from dsc.annotations import FoundRecords, Namespace, evaluated, names_around
 from dsc.blocking import in_process, in_thread
 from dsc.calls import SkillCall
 from dsc.data_types import Records
 from dsc.events import EXECUTIVES
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome, declared_outcomes
-from dsc.python_values import Builder, builder
+from dsc.python_values import Builder, typed_parameters
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
 from knowledge_base.language.checking.inputs import shown
 
@@ -250,12 +250,8 @@ def declaration(
         SchemaError: an annotation has no valid type, or the parameter cannot be passed by name.
     """
     types, builders = dict[str, str | None](), dict[str, Builder]()
-    with refused_at(body):
-        for name, annotation in parameter_annotations(body, first, names).items():
-            types[name] = type_of(annotation, records)
-            build = builder(annotation)
-            if build is not None:
-                builders[name] = build
+    with refused_at(body):  # which may collect errors
+        types, builders = typed_parameters(body, first, names, records)
     return Declared(types, outcomes, records=records, builders=builders, **how)
 
 

@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from dsc.annotations import FoundRecords, add_records
 from dsc.conversions import Conversion, conversions_by_name
 from dsc.data_types import Records
 from dsc.dynamic.rule_expansion import expand
@@ -42,7 +43,7 @@ class Library:
         self._compiled: dict[str, CompiledPlot] = {}
         self._bound: dict[str, CompiledPlot] = {}
         self._made: dict[str, ActionPlot] = {}
-        self.records: dict[str, Mapping[str, str | None]] = {}
+        self.records: FoundRecords = {}
         self.conversions = conversions_by_name(conversions)
         for one in self.conversions.values():
             self.declare(one.records)
@@ -79,11 +80,7 @@ class Library:
 
     def declare(self, records: Records) -> None:
         """Add records; raise `SchemaError` for a second record of one name with other fields."""
-        for name, fields in records.items():
-            known = self.records.setdefault(name, fields)
-            if known != fields:
-                said = f"two records are named '{name}', with the fields {', '.join(known)} and {', '.join(fields)}"
-                raise SchemaError(said, found=name)
+        add_records(self.records, records)
 
     def plot(self, name: str) -> ActionPlot:
         """Return the plot of that name, without expansion; raise `UnknownNameError` if there is none."""

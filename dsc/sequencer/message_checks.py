@@ -278,8 +278,9 @@ def checked_event(said: object, plots: Library, knowledge: KnowledgeBase) -> Eve
         declared = plot.receives.get(said.name)
         if declared is not None:
             try:
-                attributes = _plain(said.name, attributes, declared, plots.records, "event")
-                _require_objects(said.name, attributes, declared, plots.records, knowledge)
+                checked = _plain(said.name, attributes, declared, plots.records, "event")
+                _require_objects(said.name, checked, declared, plots.records, knowledge)
+                attributes = checked
                 break
             except InputError as error:
                 errors.append(error)
