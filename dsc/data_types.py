@@ -1,6 +1,6 @@
 """Types of data in plots: numbers, texts, objects, enumerations, lists, maps, records, optional values (S2.21).
 
-A type is choice_text as text, e.g. `number from 0 to 100 in %`, `list of item`, `left | right` or `optional text`.
+A type is written as text, e.g. `number from 0 to 100 in %`, `list of item`, `left | right` or `optional text`.
 Values are plain JSON data, so that a store, a trace and another process have equal values.
 """
 
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Literal
 
-from dsc.type_words import brief, choice_text, choice_value, in_words, not_a_type
+from dsc.type_words import bound_text, brief, choice_text, choice_values, collapse_blanks, in_words, not_a_type
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import GEOMETRY, MOST_NUMBERS
 from knowledge_base.language.checking.inputs import shown
@@ -30,6 +30,7 @@ DEEPEST = 64
 _LONGEST_FOUND = 80
 WORDS = ("text", "symbol", "condition", "plot")
 """Types of texts. Other names are types of the domain, whose values are names of objects, or records."""
+_LEVELS = re.compile(r"(?:(?:list|map) of |optional )*")
 _NUMBER = re.compile(r"(number|integer)( from \S+)?( to \S+)?( in \S.*)?")
 _NOT_IN_NAMES = frozenset("[]<>,")
 _TEXT = frozenset((str,))
@@ -79,8 +80,8 @@ class DataType:
             case "choice":
                 return " | ".join(map(choice_text, self.values)) + (" |" if len(self.values) == 1 else "")
             case _:
-                least = "" if self.least is None else f" from {self.least:g}"
-                most = "" if self.most is None else f" to {self.most:g}"
+                least = "" if self.least is None else f" from {bound_text(self.least)}"
+                most = "" if self.most is None else f" to {bound_text(self.most)}"
                 return f"{self.kind}{least}{most}" + (f" in {self.unit}" if self.unit else "")
 
     def check(self, subject: str, value: Any, records: Records = NO_RECORDS, at: str = "") -> Any:
@@ -203,8 +204,9 @@ def data_type(text: str) -> DataType:
     Raises:
         InputError: the text is not a type; the message names the form that is nearest.
     """
-    words = " ".join(text.split())
-    if words.count(" of ") + words.count("optional ") > DEEPEST:
+    words = collapse_blanks(text)
+    levels = _LEVELS.match(words)
+    if levels is not None and levels[0].count(" of ") + levels[0].count("optional ") > DEEPEST:
         raise InputError(f"a type has at most {DEEPEST} levels", found=words[:_LONGEST_FOUND])
     for kind in ("list", "map"):
         if words.startswith(f"{kind} of "):
@@ -212,7 +214,7 @@ def data_type(text: str) -> DataType:
     if words.startswith("optional "):
         return DataType("optional", inner=data_type(words.removeprefix("optional ")))
     if "|" in words:
-        return DataType("choice", values=tuple(map(choice_value, filter(None, map(str.strip, words.split("|"))))))
+        return DataType("choice", values=choice_values(words))
     if words in {"boolean", GEOMETRY}:
         return DataType(words)  # type: ignore[arg-type]  # both are kinds
     if (number := _NUMBER.fullmatch(words)) is not None:

@@ -39,7 +39,7 @@ from dsc.data_types import Records
 from dsc.events import EXECUTIVES
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome, declared_outcomes
-from dsc.python_values import Builder, typed_parameters
+from dsc.python_values import Builder, plain_value, typed_parameters
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
 from knowledge_base.language.checking.inputs import shown
 
@@ -55,7 +55,7 @@ SkillBody = Callable[..., Any]
 _Body = TypeVar("_Body", bound=SkillBody)
 _Coroutine = TypeVar("_Coroutine", bound=Callable[..., Awaitable[Outcome]])
 _Plain = TypeVar("_Plain", bound=Callable[..., Outcome])
-Pattern = Literal["skill", "query", "event"]
+Pattern = Literal["skill", "query", "event", "message"]
 """The communication pattern of a `trigger` (S1.1).
 
 A `skill` ends by itself, and a `query` ends with its answer. An `event` stays active until its state is left.
@@ -326,15 +326,13 @@ def refuse_reserved(skill_name: str, outcomes: Iterable[str]) -> None:
 
 def check_arguments(signature: SkillSignature, arguments: Mapping[str, Any]) -> None:
     """Raise `InputError` for an argument that is missing or that the skill does not declare."""
-    name = f"{signature.component}.{signature.name}"
+    name = f"{signature.pattern} '{signature.component}.{signature.name}'"
     for given in arguments:
         if given not in signature.parameters:
-            raise UnknownNameError(
-                f"skill '{name}' has no parameter '{given}'", found=given, valid=signature.parameters
-            )
+            raise UnknownNameError(f"{name} has no parameter '{given}'", found=given, valid=signature.parameters)
     for wanted in signature.parameters:
         if wanted not in arguments and wanted not in signature.defaults:
-            raise InputError(f"skill '{name}' needs its parameter '{wanted}'")
+            raise InputError(f"{name} needs its parameter '{wanted}'")
 
 
 def signature_of(component: str, name: str, body: SkillBody, declared: Declared) -> SkillSignature:
@@ -344,7 +342,7 @@ def signature_of(component: str, name: str, body: SkillBody, declared: Declared)
         component=component,
         name=name,
         parameters={p.name: declared.types.get(p.name) for p in given},
-        defaults={p.name: p.default for p in given if p.default is not inspect.Parameter.empty},
+        defaults={p.name: plain_value(p.default) for p in given if p.default is not inspect.Parameter.empty},
         outcomes=declared.outcomes,
         pattern=declared.pattern,
         after_crash=declared.after_crash,

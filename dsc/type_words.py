@@ -7,7 +7,7 @@ import re
 from knowledge_base.errors import InputError
 from knowledge_base.facts import GEOMETRY, MOST_NUMBERS
 from knowledge_base.language.checking.inputs import shown
-from knowledge_base.spelling import is_plain_name
+from knowledge_base.spelling import TRUTH_VALUES, is_plain_name, value_text
 
 _LIKE_PYTHON = re.compile(r"(list|map|dict|optional)[\[(<](.*)[\])>]", re.IGNORECASE)
 
@@ -36,23 +36,47 @@ def brief(value: object) -> str:
 _LONGEST_SHOWN = 80
 
 
-def choice_text(value: object) -> str:
-    """Return a value as a choice writes it: a text that is not a name has quotes."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f'"{value}"' if isinstance(value, str) and not is_plain_name(value) else str(value)
+_QUOTED = r'"(?:[^"\\]|\\.)*"'
+_BLANKS = re.compile(rf"({_QUOTED})|\s+", re.DOTALL)
+_CHOICE = re.compile(rf'(?:{_QUOTED}|[^"|])+', re.DOTALL)
+_ESCAPE = re.compile(r"\\(.)", re.DOTALL)
+_ENDS = {"n": "\n", "r": "\r"}
 
 
-def choice_value(word: str) -> str | int | float | bool:
+def collapse_blanks(text: str) -> str:
+    """Return the text of a type with one blank between two words; quoted values are unchanged."""
+    return _BLANKS.sub(lambda found: found[1] or " ", text).strip()
+
+
+def choice_text(value: str | float) -> str:
+    """Return a value as a choice writes it: a text that could be read as something else has quotes."""
+    return value_text(value, quoted=isinstance(value, str) and ("|" in value or value == "optional"))
+
+
+def choice_values(text: str) -> tuple[str | float, ...]:
+    """Return the values of a choice; raise `InputError` for a quote without its end."""
+    words = [word.strip() for word in _CHOICE.findall(text)]
+    if '"' in re.sub(_QUOTED, "", text):
+        raise InputError(f"'{text}' is not a type: a quote has no end", found=text)
+    return tuple(_choice_value(word) for word in words if word)
+
+
+def _choice_value(word: str) -> str | float:
     """Return the value that `choice_text` writes as this word."""
-    if word in {"true", "false"}:
-        return word == "true"
+    if word in TRUTH_VALUES:
+        return TRUTH_VALUES[word]
     for read in (int, float):
         try:
             return read(word)
         except ValueError:
             continue
-    return word[1:-1] if word[:1] == word[-1:] == '"' else word
+    return _ESCAPE.sub(lambda found: _ENDS.get(found[1], found[1]), word[1:-1]) if word[:1] == '"' else word
+
+
+def bound_text(bound: float) -> str:
+    """Return a bound as the shortest text that is read as an equal number."""
+    short = f"{bound:g}"
+    return short if float(short) == bound else repr(bound)
 
 
 def not_a_type(text: str) -> InputError:

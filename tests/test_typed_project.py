@@ -18,7 +18,7 @@ CHECKED = [
     ("plots/tidy.yaml", "least: {type: number from 0 to 1, default: 0.5}", "least: {type: number from 0 to 1, default: 50}",
      "'default' is a number from 0 to 1, not 50"),
     ("plots/tidy.yaml", "found: {type: list of detection, initial: []}", "found: {type: detection, initial: []}",
-     "'initial' is of type detection, and (list) is a list"),
+     "'initial' is of type detection, and [] is a list"),
     ("plots/tidy.yaml", "found: {type: list of detection,", "found: {type: list of detections,", "did you mean 'detection'?"),
     ("plots/tidy.yaml", "with: {area: {x: 0, size: 2.5}}", "with: {area: {x: left}}", "'x' is of type number, and left is of type text"),
     ("plots/tidy.yaml", "with: {area: {x: 0, size: 2.5}}", "with: {area: {y: 0}}", "has the part 'y', which a area lacks"),

@@ -12,14 +12,15 @@ from typing import Any, ClassVar
 
 from dsc.annotations import Namespace, class_statement, evaluated
 from dsc.calls import Ended, SkillCall, Status
+from dsc.components.interface import Interface
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
 from dsc.components.parameters import Configuration, Parameters
-from dsc.components.ports import TAKES, EventActivations
+from dsc.components.ports import TAKES, EventActivations, messages
 from dsc.components.streams import Push, Stream
 from dsc.components.turns import Turns
 from dsc.data_types import check_all, data_type
 from dsc.outcomes import Outcome
-from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signature_of, signatures
+from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signatures
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
 from knowledge_base.language.checking.inputs import shown
 
@@ -271,9 +272,7 @@ class Component(ComponentHooks, RestartHooks):
 
     def _require_mode(self, mode: str) -> None:
         """Raise `UnknownNameError` unless the component may enter the mode from its present one."""
-        if self.modes and mode not in (NEUTRAL, *self.modes):
-            valid = (NEUTRAL, *self.modes)
-            raise UnknownNameError(f"component '{self.name}' has no mode '{mode}'", found=mode, valid=valid)
+        Interface(modes=self.modes).require_mode(self.name, mode)
         next_modes = self.modes.get(self.mode) if isinstance(self.modes, Mapping) else None
         if next_modes is not None and mode not in (NEUTRAL, self.mode, *next_modes):
             message = f"component '{self.name}' cannot change from mode '{self.mode}' to '{mode}'"
@@ -286,16 +285,22 @@ class Component(ComponentHooks, RestartHooks):
             UnknownNameError: the component has no such method.
             InputError: a part of the message is missing or unknown.
         """
-        taking = {n: m for n, m in inspect.getmembers(type(self), inspect.isfunction) if hasattr(m, TAKES)}
-        if port not in taking:
-            raise UnknownNameError(f"component '{self.name}' takes no '{port}'", found=port, valid=taking)
-        declared: Declared = getattr(taking[port], TAKES)
-        check_arguments(signature_of(self.name, port, taking[port], declared), message)
-        parts = dict(message)
-        check_all(
-            "the part '{name}' of the message {owner}", f"{self.name}.{port}", parts, declared.types, declared.records
-        )
-        await getattr(self, port)(**declared.build(parts))
+        taken = Interface(messages=self._taken()).message(self.name, port)
+        assert taken is not None  # noqa: S101
+        check_arguments(taken, message)
+        name, parts = f"{self.name}.{port}", dict(message)
+        check_all("the part '{name}' of the message {owner}", name, parts, taken.parameters, taken.records)
+        body = getattr(self, port)
+        declared: Declared = getattr(body, TAKES)
+        await body(**declared.build(parts))
+
+    def _taken(self) -> Mapping[str, SkillSignature]:
+        return messages(type(self), self.name)  # type: ignore[arg-type]  # mypy: classes are hashable
+
+    def interface(self) -> Interface:
+        """Return the parameters, modes and messages for the checks of charts before a run."""
+        own = type(self).receive is Component.receive
+        return Interface(self.parameters.declared, self.modes, self._taken() if own else None)
 
     def update(self, event: str, *values: Any) -> None:
         """Pass new values to the test of each activation of the event; later activations begin with these values.

@@ -32,6 +32,7 @@ import inspect
 from collections import defaultdict
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, TypeVar
 
 from dsc.annotations import FoundRecords, names_around, parameter_annotations, type_of
@@ -39,7 +40,15 @@ from dsc.calls import SkillCall
 from dsc.components.hooks import contained
 from dsc.loop_calls import LoopCalls
 from dsc.outcomes import Outcome
-from dsc.skills import SkillBody, declaration, refused_at, require_function, returned_outcomes
+from dsc.skills import (
+    SkillBody,
+    SkillSignature,
+    declaration,
+    refused_at,
+    require_function,
+    returned_outcomes,
+    signature_of,
+)
 from knowledge_base.errors import SchemaError
 
 ANSWERED = "answered"
@@ -108,8 +117,16 @@ def takes(body: _Body) -> _Body:
     require_function(body, "takes")
     with refused_at(body):
         names = names_around(body.__globals__)
-        setattr(body, TAKES, declaration(body, 1, names, {}, FoundRecords(), execute=_ask, own=1))
+        how = {"execute": _ask, "own": 1, "pattern": "message"}
+        setattr(body, TAKES, declaration(body, 1, names, {}, FoundRecords(), **how))
     return body
+
+
+@cache
+def messages(kind: type[object], name: str) -> Mapping[str, SkillSignature]:
+    """Return the messages that a component class takes, by name, for a component with that `name`."""
+    taking = inspect.getmembers(kind, lambda one: inspect.isfunction(one) and hasattr(one, TAKES))
+    return {port: signature_of(name, port, body, getattr(body, TAKES)) for port, body in taking}
 
 
 class EventActivations:

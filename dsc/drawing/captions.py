@@ -23,6 +23,7 @@ from dsc.model.actions import (
     Withdraw,
 )
 from dsc.model.declarations import PlotParameter, PlotVariable
+from dsc.model.language import term_text
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import Handler, Reaction, Rule
 from dsc.model.states import State
@@ -127,7 +128,7 @@ def _brief(transition: Transition, *, terse: bool) -> tuple[str, ...]:
 
 def _handed(transition: Transition, *, brief: bool = False) -> list[str]:
     """Return texts of the arguments that a transition passes to its target's plot, and of the histories it clears."""
-    passed = ", ".join(name if brief else f"{name} = {to_text(value)}" for name, value in transition.passed.items())
+    passed = ", ".join(name if brief else f"{name} = {term_text(value)}" for name, value in transition.passed.items())
     cleared = ", ".join(transition.clear)
     return [f"{word} {what}" for word, what in (("pass", passed), ("clear", cleared)) if what]
 
@@ -214,13 +215,13 @@ def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> st
             later = "" if action.delay is None else f" after {to_text(action.delay)} s"
             return f"^{event}" + (_values(arguments) if arguments and not brief else "") + later
         case Assign(assign=values):
-            return ", ".join(f"{name} := {to_text(value)}" for name, value in values.items())
+            return ", ".join(f"{name} := {term_text(value)}" for name, value in values.items())
         case Tell(tell=effect):
             return f"tell {to_text(effect)}"
         case Trigger(trigger=skill, arguments=arguments, within=within):
             return f"{skill}{_values(arguments)}" + (f" within {within:g} s" if within is not None else "")
         case Configure(set=parameter, to=value):
-            return f"{parameter} := {to_text(value)}"
+            return f"{parameter} := {term_text(value)}"
         case Send(send=port, arguments=arguments):
             return f"{port}!{_values(arguments)}"
         case Switch(switch=component, to=mode):
@@ -237,7 +238,7 @@ def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> st
 
 
 def _values(arguments: Mapping[str, Term]) -> str:
-    return "(" + ", ".join(to_text(value) for value in arguments.values()) + ")"
+    return "(" + ", ".join(term_text(value) for value in arguments.values()) + ")"
 
 
 def content_text(use: str, arguments: Mapping[str, Term]) -> str:

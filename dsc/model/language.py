@@ -25,7 +25,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from dsc.model.data_forms import literal
+from dsc.model.data_forms import literal, literal_parts, literal_value
 from dsc.model.reading import UNKNOWN_FORM, Form, FormPath
 from knowledge_base.errors import InputError, Place
 from knowledge_base.facts import Value
@@ -179,9 +179,29 @@ def _text_out(part: Expression | Effect) -> str:
     return _texts.find(part, None) or _texts.keep(part, None, to_text(part))
 
 
+def term_text(term: Term) -> str:
+    """Return a term in the notation of plots: `(+ ?n 1)`, `[cup1, ?item]`, `{item: ?item, score: 0.5}`."""
+    parts = _parts(term)
+    if parts is None:
+        return to_text(term)
+    texts = {name: term_text(part) for name, part in parts.items()}
+    if isinstance(term, Call) and term.function == "list":
+        return f"[{', '.join(texts.values())}]"
+    return f"{{{', '.join(f'{name}: {text}' for name, text in texts.items())}}}"
+
+
+def _parts(term: Term) -> dict[str, Term] | None:
+    """Return the parts of a list or record; `None` for another term, and for a record that validation refuses."""
+    try:
+        return literal_parts(term)
+    except InputError:
+        return None
+
+
 def _term_out(term: Term) -> Any:
     if not isinstance(term, Constant):
-        return to_text(term)
+        is_valid = isinstance(term, Call) and _parts(term) is not None
+        return literal_value(term, _term_out) if is_valid else to_text(term)
     value = term.value
     return _in_quotes(value) if isinstance(value, str) and value[:1] in _MARKS else value
 

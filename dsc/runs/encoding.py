@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, replace
 from typing import Any
 
 from dsc.engine.machine_state import NOTHING, FrameState
@@ -25,6 +26,7 @@ from dsc.messages import (
 )
 from dsc.outcomes import Outcome
 from dsc.runs.tables import Form
+from dsc.skills import SkillSignature
 from knowledge_base.exchange import delta_form, delta_of
 
 Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode | SendMessage
@@ -54,10 +56,14 @@ class Shortener:
         """Return the hash form of a plot, or any other value unchanged."""
         if not isinstance(value, Mapping) or not ({"plot", "states"} <= value.keys() or _BY_HASH in value):
             return value
+        return self.reference(value)
+
+    def reference(self, value: Mapping[str, Any]) -> Form:
+        """Store plain data, and return their hash form."""
         return {_BY_HASH: self.hash(value)}
 
     def hash(self, value: Mapping[str, Any]) -> str:
-        """Store a plot, and return its hash."""
+        """Store a plot, or other plain data, and return its hash."""
         known = self._known.get(id(value))
         if known is None:
             text = json.dumps(value)  # the order of states is significant
@@ -67,6 +73,21 @@ class Shortener:
                 self._known.clear()
             self._known[id(value)] = known
         return known[1]
+
+
+SKILLS = "skills"
+"""Key of a run's header with the hash of the deployed skills."""
+
+
+def signature_forms(skills: Iterable[SkillSignature]) -> Form:
+    """Return the signatures of skills as plain data; of a default, only its presence remains."""
+    return {f"{one.component}.{one.name}": asdict(replace(one, defaults=dict.fromkeys(one.defaults))) for one in skills}
+
+
+def signatures_in(header: Mapping[str, Any], form: Callable[[str], Any]) -> list[SkillSignature] | None:
+    """Return the deployed skills in a run's header; `None` if it has none."""
+    forms = _full(header.get(SKILLS), form)
+    return None if forms is None else [SkillSignature(**one) for one in forms.values()]
 
 
 def full(values: Mapping[str, Any], form: Callable[[str], Any]) -> Form:

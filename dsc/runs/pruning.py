@@ -14,7 +14,7 @@ from knowledge_base.store import KnowledgeBase
 
 _SEAL = "SELECT seal FROM runs WHERE run = ?"
 _NAMES_PLOTS = (
-    "SELECT plots || arguments FROM runs",
+    "SELECT plots || arguments || header FROM runs",
     "SELECT message || change FROM steps",
 )
 _HASH = re.compile(r"\b[0-9a-f]{64}\b")

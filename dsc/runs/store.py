@@ -15,10 +15,11 @@ from dsc.dynamic.library import Library
 from dsc.engine.steps import Output, SendMessage, Start
 from dsc.messages import LateMessage, Message, Told
 from dsc.runs.archive import RunArchive, archive, unfinished
-from dsc.runs.encoding import Shortener, message_form
+from dsc.runs.encoding import SKILLS, Shortener, message_form, signature_forms
 from dsc.runs.kept import Kept, read, require_unchanged
 from dsc.runs.state import ReactorState, RunState
 from dsc.runs.tables import CHAIN, FORMAT, TABLES, require_tables_of_runs
+from dsc.skills import SkillSignature
 from dsc.trace import Record, text_of
 from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.integrity import NOTHING, Tip, link, put_ends
@@ -217,8 +218,20 @@ class RunStore:
         """Whether a write failed, so that memory has changes that the file lacks."""
         return self.writing.lost
 
-    def begin(self, plot: str, arguments: Mapping[str, Any], library: Library) -> int:
+    def begin(
+        self,
+        plot: str,
+        arguments: Mapping[str, Any],
+        library: Library,
+        skills: Iterable[SkillSignature] | None = None,
+    ) -> int:
         """Begin a new run with the present knowledge.
+
+        Args:
+            plot: the plot's name.
+            arguments: values of the plot's parameters.
+            library: the plots.
+            skills: the deployed skills, which a replay needs; `None` if more may be deployed.
 
         Returns:
             The last serial number that earlier runs have used.
@@ -234,9 +247,10 @@ class RunStore:
             raise StoreError(said, place=Place(str(self.path)))
         self._number, self._state = 0, RunState(self._short)
         plots = {one.name: self._short.hash(one.to_form()) for one in library}
+        deployed = {} if skills is None else {SKILLS: self._short.reference(signature_forms(skills))}
         row = (
-            plot, text_of(self._short(arguments)), self._knowledge.version, text_of(self._header), text_of(plots),
-            text_of(self._domain),
+            plot, text_of(self._short(arguments)), self._knowledge.version, text_of({**self._header, **deployed}),
+            text_of(plots), text_of(self._domain),
         )  # fmt: skip
         earlier = RunArchive(self.writing.connection, self.path, latest=True)
         serials = earlier.serials_before(max((one.number for one in earlier.runs()), default=0) + 1)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from dsc.dynamic.library import Library
 from dsc.engine.tables import CompiledPlot
 from dsc.model.plot import ActionPlot
+from dsc.skills import SkillSignature
 from dsc.validation import validate_plot
 from dsc.validation.library import raise_findings
 from knowledge_base.world.schema import Schema
@@ -16,17 +17,18 @@ from knowledge_base.world.schema import Schema
 class CheckedPlots:
     """A `Chart` of a library's plots that checks each plot given as data, except those made from plans.
 
-    The check reads only plots and schema, so that a replay has the same result. The dispatcher answers triggers of
-    missing skills.
+    The check reads only plots, schema and skills, which the store keeps, so that a replay has the same result.
 
     Args:
         library: the plots.
         schema: the declared types and predicates.
+        skills: the deployed skills; `None` if more may be deployed, so that triggers are not checked.
     """
 
-    def __init__(self, library: Library, schema: Schema) -> None:
+    def __init__(self, library: Library, schema: Schema, skills: Collection[SkillSignature] | None = None) -> None:
         self._library = library
         self._schema = schema
+        self._skills = skills
         self._accepted: set[CompiledPlot] = set()
 
     def compiled(self, name: str) -> CompiledPlot:
@@ -41,6 +43,7 @@ class CheckedPlots:
         """
         compiled = self._library.bind(form)
         if not compiled.plot.generated and compiled not in self._accepted:
-            raise_findings(validate_plot(ActionPlot.model_validate(form), self._library, self._schema))
+            plot = ActionPlot.model_validate(form)
+            raise_findings(validate_plot(plot, self._library, self._schema, self._skills))
             self._accepted.add(compiled)
         return compiled

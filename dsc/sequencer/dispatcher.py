@@ -40,13 +40,13 @@ from dsc.sequencer.inbox import Timers
 from dsc.sequencer.message_checks import arguments_for, encoded, late, validated
 from dsc.sequencer.outbox import CLOSING, Outbox, command, failure, port_of
 from dsc.sequencer.running_skills import InterruptedSkill, PendingCleanups, RunningSkill, WaitObserver
-from dsc.sequencer.undeployed import Undeployed
+from dsc.sequencer.undeployed import Undeployed, no_component
 from dsc.skills import SkillSignature
 from dsc.supervision.activation import ComponentActivation
 from dsc.supervision.component_registry import ComponentRegistry
 from dsc.supervision.lives import ComponentLives
 from dsc.supervision.skill_dependencies import SkillDependencies
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError
 
 _LOG = run_logger(__package__)
 DEFAULT_WITHIN = 300.0
@@ -94,7 +94,7 @@ class Dispatcher:
         self.activation = ComponentActivation(ComponentRegistry(self._components), self._in_use)
         self.outbox = Outbox(self._refused)
         self._lives = ComponentLives(self._components.values(), self._failed, self._recovered)
-        self._undeployed = Undeployed(clock, post, self._components.keys())
+        self._undeployed = Undeployed(clock, post, self._refused, self._components.keys())
         self._wiring = Wiring(self._components)
         self._faults: list[str] = []
         self._failures: dict[str, str] = {}  # reasons of the components that have failed and not recovered
@@ -109,8 +109,12 @@ class Dispatcher:
         self.timers = Timers(clock, post)
         clock.attend(self._tasks_of)
 
-    def deploy(self, component: Component) -> None:
-        """Add a component, which replaces one with an equal name; skills and commands that wait for it begin."""
+    def deploy(self, component: Component, *, last: bool = False) -> None:
+        """Add a component, which replaces one with an equal name; skills and commands that wait for it begin.
+
+        After the `last` component, a skill or command for a missing component fails without waiting.
+        """
+        self._undeployed.complete = last
         self._lives.add(component)
         self.activation.deploy(component)
         self._wiring.deployed(component)
@@ -121,6 +125,12 @@ class Dispatcher:
                 self._send(held.output)
         if self._asked:
             self.give_turns()
+
+    def skills(self) -> list[SkillSignature] | None:
+        """Return the signatures of all deployed skills; `None` if more components may be deployed."""
+        if not self._undeployed.complete:
+            return None
+        return [skill for component in self._components.values() for skill in component.skills().values()]
 
     @property
     def is_part(self) -> bool:
@@ -170,7 +180,7 @@ class Dispatcher:
             self.give_turns()
 
     def dispatch(self, output: steps.Output) -> None:
-        """Execute one output of the machine; an output for a component that is not deployed yet waits."""
+        """Execute one output of the machine; an output for a component that is not deployed waits, or fails."""
         if isinstance(output, _FOR_COMPONENTS) and output.component not in self._components:
             within = output.within if isinstance(output, steps.Start) else None
             self._undeployed.hold(output, within or DEFAULT_WITHIN)
@@ -209,7 +219,7 @@ class Dispatcher:
     def component(self, name: str) -> Component:
         """Return the component of that name; raise `UnknownNameError` if it is missing."""
         if name not in self._components:
-            raise UnknownNameError(f"there is no component '{name}'", found=name, valid=self._components)
+            raise no_component(name, self._components)
         return self._components[name]
 
     def unfinished(self) -> Iterator[str]:

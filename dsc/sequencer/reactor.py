@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from dsc.runs.kept import Kept
 from dsc.sequencer.checked_plots import CheckedPlots
 from dsc.sequencer.phase_watch import PhaseWatch, described
 from dsc.sequencer.step_tracing import StepTracer
+from dsc.skills import SkillSignature
 from dsc.trace import Trace
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
@@ -77,6 +78,7 @@ class Reactor:
         self._run = run
         self.library = library
         self.knowledge = knowledge
+        self._skills: Collection[SkillSignature] | None = None
         self.machine = Machine(CheckedPlots(library, knowledge.schema))
         self.trace = trace
         self.tracer = StepTracer(trace)
@@ -93,6 +95,15 @@ class Reactor:
         self.caused_by: dict[str, int] = {}
         self._cancelled: deque[str] = deque()
         self._noted: set[str] = set()
+
+    def know_skills(self, skills: Collection[SkillSignature] | None) -> None:
+        """Check plots given as data also against the deployed skills; `None` if they are unknown."""
+        self._skills = skills
+        self._check_with(self.library)
+
+    def _check_with(self, library: Library) -> None:
+        self.library = library
+        self.machine.chart = CheckedPlots(library, self.knowledge.schema, self._skills)
 
     def restore(self, kept: Kept) -> None:
         """Restore the state after the last macrostep of an interrupted run."""
@@ -220,8 +231,7 @@ class Reactor:
     def _set_default(self, setting: ParameterMessage) -> None:
         """Change the default of a plot's parameter for later entries."""
         self.settings[setting.owner, setting.name] = setting
-        self.library = self.library.with_default(setting.owner, setting.name, setting.value, "operator")
-        self.machine.chart = CheckedPlots(self.library, self.knowledge.schema)
+        self._check_with(self.library.with_default(setting.owner, setting.name, setting.value, "operator"))
 
     def _due(self, message: TimerMessage) -> Event:
         self.trace.cause = None

@@ -9,7 +9,7 @@ from pathlib import Path
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output, Start
 from dsc.runs.archive import RunArchive, RunRow, StepRow, archive
-from dsc.runs.encoding import full, message_of
+from dsc.runs.encoding import full, message_of, signatures_in
 from dsc.runs.kept import plots_of
 from dsc.sequencer.reactor import Reactor
 from dsc.trace import Trace, text_of
@@ -97,6 +97,7 @@ class _ReplayedRun:
         self._knowledge = KnowledgeBase(past.schema, lambda: 0.0, MemoryHistory(start))
         of_run = str(row.header.get("action_ids", ""))
         self._reactor = Reactor(library, self._knowledge, Trace(lambda: 0.0), run=of_run)
+        self._reactor.know_skills(signatures_in(row.header, runs.form))
         self._started: dict[str, Start] = {}
 
     def take(self, step: StepRow) -> Divergence | None:

@@ -277,6 +277,7 @@ class Sequencer:
         unsubscribe = self.knowledge.subscribe(reactor.tracer.knowledge)
         livelock = LivelockGuard(self.clock) if self.clock.simulated else None
         limit = self.clock.call_at(self._until, self._expire) if math.isfinite(self._until) else None
+        reactor.know_skills(self.dispatcher.skills())
         try:
             await begin()
             self._reacts = False
@@ -407,7 +408,7 @@ class Sequencer:
             self.dispatcher.dispatch_all(reactor.start(plot, arguments))
             return
         with store.writing:
-            serials = store.begin(plot, arguments, self.library)
+            serials = store.begin(plot, arguments, self.library, self.dispatcher.skills())
             self._record_world()
             for late, due, _ in self.dispatcher.timers:
                 if isinstance(late, LateMessage):

@@ -11,7 +11,7 @@ from dsc.engine.steps import Start
 from dsc.messages import SkillMessage, Told
 from dsc.run_log import run_logger
 from dsc.sequencer.clock import LoopClock, ScheduledCall
-from dsc.sequencer.message_checks import late
+from dsc.sequencer.message_checks import faulty, late
 from dsc.sequencer.outbox import command
 from knowledge_base.errors import UnknownNameError
 
@@ -27,18 +27,35 @@ class Held:
     timer: ScheduledCall | None = None
 
 
+def no_component(name: str, deployed: Collection[str]) -> UnknownNameError:
+    """Return the error for a component that is not among the deployed ones."""
+    return UnknownNameError(f"there is no component '{name}'", found=name, valid=deployed)
+
+
 class Undeployed:
     """The outputs that wait for their components, in the order of their dispatch.
 
     Args:
         clock: run time.
         post: receives the end of a skill whose component was not deployed within the skill's time limit.
+        refuse: receives a command without a component, after the last deployment.
         deployed: names of the deployed components.
+
+    Attributes:
+        complete: whether no further component will be deployed, so that outputs fail instead of waiting.
     """
 
-    def __init__(self, clock: LoopClock, post: Callable[[SkillMessage], None], deployed: Collection[str]) -> None:
+    def __init__(
+        self,
+        clock: LoopClock,
+        post: Callable[[SkillMessage], None],
+        refuse: Callable[[Told, Exception], None],
+        deployed: Collection[str],
+    ) -> None:
+        self.complete = False
         self._clock = clock
         self._post = post
+        self._refuse = refuse
         self._deployed = deployed
         self._held: list[Held] = []
 
@@ -57,11 +74,21 @@ class Undeployed:
 
     def hold(self, output: Start | Told, within: float) -> None:
         """Let an output wait for its component; a skill ends with `timed_out` after `within` seconds."""
+        if self.complete:
+            self._fail(output)
+            return
         held = Held(output, self._clock.now())
         self._held.append(held)
         _LOG.warning("%s", self._described(held))
         if isinstance(output, Start) and math.isfinite(within):
             held.timer = self._clock.call_at(held.at + within, partial(self._expire, held, within))
+
+    def _fail(self, output: Start | Told) -> None:
+        missing = no_component(output.component, self._deployed)
+        if isinstance(output, Start):
+            self._post(SkillMessage(output, faulty(output, str(missing)), final=True))
+        else:
+            self._refuse(output, missing)
 
     def describe(self) -> Iterator[str]:
         """Yield each output with its reason to wait, as text."""
@@ -73,8 +100,7 @@ class Undeployed:
         return f"{what} waits: {self._reason(output)}"
 
     def _reason(self, output: Start | Told) -> str:
-        message = f"there is no component '{output.component}'"
-        return str(UnknownNameError(message, found=output.component, valid=self._deployed))
+        return str(no_component(output.component, self._deployed))
 
     def _expire(self, held: Held, within: float) -> None:
         self._held.remove(held)

@@ -7,22 +7,18 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from dsc.components.declarations import Parameter, known
 from dsc.dynamic.steps import Step, concerns, contents_of, entered_by
 from dsc.errors import Finding
-from dsc.model.actions import Assign, Configure, ExternalAction, Internal, Trigger, component_of, flat
+from dsc.model.actions import Assign, ExternalAction, Internal, flat
 from dsc.model.declarations import PlotParameter
 from dsc.model.plot import ActionPlot, Path, initial_of
 from dsc.model.ranges import Who, refuse_change
 from dsc.model.rules import Rule
 from dsc.model.states import AnyState, FinalState, HistoryState, State, SubmachineState
 from dsc.model.transitions import Transition, TransitionSource
-from dsc.validation.subject import Subject
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from dsc.validation.subject import ALLOW, Subject
+from knowledge_base.errors import InputError, SchemaError
 from knowledge_base.language.syntax.expression import Constant, Term
-
-_ALLOW = "set it in a profile, or let `changed_by` allow it"
-
 
 # -- values and roles ----------------------------------------------------------------------------------------
 
@@ -70,7 +66,7 @@ def _handed(
             try:
                 refuse_change(full, who, parameter.changed_by)
             except SchemaError as refused:
-                yield subject.caught(refused, here, "parameter roles", _ALLOW)
+                yield subject.caught(refused, here, "parameter roles", ALLOW)
                 continue
             if isinstance(term, Constant) and parameter.bounded:
                 yield from _fits(subject, full, parameter, term, here)
@@ -81,38 +77,6 @@ def _fits(subject: Subject, name: str, parameter: PlotParameter, term: Constant,
         parameter.range.check(name, term.value)
     except InputError as error:
         yield subject.caught(error, path, "parameter roles")
-
-
-def check_components(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about `set`, `send` and `switch` actions with missing components or undeclared parameters."""
-    components = subject.components
-    for path, action, who in subject.actions() if components is not None else ():
-        name = None if isinstance(action, Trigger) else component_of(action)  # the check of skills covers triggers
-        if name is not None and name not in (components or ()):
-            message = f"there is no component '{name}'"
-            yield subject.finding(path, "known component", message, found=name, valid=components)
-        elif isinstance(action, Configure) and isinstance(components, Mapping):
-            yield from _setting(subject, action, path, who, components)
-
-
-def _setting(
-    subject: Subject, action: Configure, path: Path, who: Who, components: Mapping[str, Mapping[str, Parameter]]
-) -> Iterator[Finding]:
-    component, _, parameter = action.set.partition(".")
-    if not components[component]:
-        return
-    try:
-        declared = known(component, parameter, components[component])
-        if isinstance(action.to, Constant):
-            declared.range.check(action.set, action.to.value)
-    except InputError as error:
-        key = "set" if isinstance(error, UnknownNameError) else "to"
-        yield subject.caught(error, (*path, key), "component parameter")
-        return
-    try:
-        refuse_change(action.set, who, declared.changed_by)
-    except SchemaError as refused:
-        yield subject.caught(refused, (*path, "set"), "component parameter", _ALLOW)
 
 
 def check_outputs(subject: Subject) -> Iterator[Finding]:

@@ -28,7 +28,8 @@ from dsc.engine.situation import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model import actions
-from dsc.model.data_forms import is_literal, literal_parts, plain_condition, plain_effect, plain_term
+from dsc.model.data_forms import is_literal, literal_parts, literal_value, plain_condition, plain_effect, plain_term
+from dsc.model.language import term_text
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
 from dsc.model.states import DynamicState, FinalState, HistoryState, State
@@ -200,22 +201,30 @@ class _Data:
                 yield from self._actions(inside, scope, (*path, "block"))
             case actions.Configure(to=value):
                 yield from self._term(value, scope, (*path, "to"))
-            case actions.Send(arguments=values):
-                yield from self._terms(values, scope, (*path, "with"))
+            case actions.Send(send=port, arguments=values):
+                yield from self._arguments(self._message(port), values, scope, path, "send")
             case actions.Switch():
                 pass
             case actions.Trigger(trigger=skill, arguments=values):
-                signature = self._skills.get(skill)
-                wanted = _ANY if signature is None else signature.parameters
-                yield from self._terms(values, scope, (*path, "with"), wanted)
-                if signature is not None:
-                    yield from self._skill_arguments(signature, action, path)
+                yield from self._arguments(self._skills.get(skill), values, scope, path, "trigger")
 
-    def _skill_arguments(self, signature: SkillSignature, action: actions.Trigger, path: Path) -> Iterator[Finding]:
+    def _message(self, port: str) -> SkillSignature | None:
+        """Return the parts of a message; `None` if they are unknown, or for a message that another check reports."""
+        component, _, name = port.partition(".")
+        interface = self._subject.interfaces.get(component)
+        return None if interface is None else (interface.messages or {}).get(name)
+
+    def _arguments(
+        self, signature: SkillSignature | None, values: Mapping[str, Term], scope: Types | None, path: Path, key: str
+    ) -> Iterator[Finding]:
+        """Yield findings about the arguments for a skill, or the parts of a message, whose port is at `key`."""
+        yield from self._terms(values, scope, (*path, "with"), _ANY if signature is None else signature.parameters)
+        if signature is None:
+            return
         try:
-            check_arguments(signature, action.arguments)
+            check_arguments(signature, values)
         except InputError as error:
-            here = (*path, "with", error.found) if error.found else (*path, "trigger")
+            here = (*path, "with", error.found) if error.found else (*path, key)
             yield self._subject.caught(error, here, "skill arguments")
 
     def _variable(self, name: str, path: Path) -> Iterator[Finding]:
@@ -403,10 +412,10 @@ class _Data:
             yield self._subject.caught(error, path, "term")
             return
         for text in wanted or (None,):
-            types = self._checker.parts_of(text, parts, is_list=to_text(term).startswith("(list"))
+            types = self._checker.parts_of(text, parts, is_list=isinstance(literal_value(term, str), list))
             if isinstance(types, str):
-                message = f"'{path[-1]}' is of type {text}, and {to_text(term)} {types}"
-                yield self._subject.finding(path, "value fits", message, found=to_text(term))
+                message = f"'{path[-1]}' is of type {text}, and {term_text(term)} {types}"
+                yield self._subject.finding(path, "value fits", message, found=term_text(term))
                 continue
             for name, part in parts.items():
                 yield from self._term(part, scope, (*path, int(name) if name.isdecimal() else name), types.get(name))
@@ -480,14 +489,21 @@ class _Data:
         match term:
             case Variable(name):
                 return scope.get(name)
-            case Constant(bool()):
-                return "boolean"
             case Constant(str() as name):
                 return "text" if self._schema is None else self._schema.constants.get(name, "text")
-            case Call(function) if function in self._library.conversions:
-                return self._library.conversions[function].result
-            case _:
-                return "number"
+            case Constant(value):
+                return "boolean" if isinstance(value, bool) else "number"
+            case Call(function):
+                return self._result(function)
+            case Arithmetic(operator=operator):
+                return "geometry" if operator == "geometry" else "number"
+
+    def _result(self, function: str) -> str | None:
+        """Return the type of the values of a conversion, or of a function of the world."""
+        if function in self._library.conversions:
+            return self._library.conversions[function].result
+        schema = self._schema
+        return schema.result(function) if schema is not None and function in schema.functions else "number"
 
 
 def _types(plot: ActionPlot) -> dict[str, str]:

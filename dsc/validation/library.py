@@ -11,7 +11,8 @@ from dsc.errors import Finding, PlotError
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import Rule
 from dsc.skills import SkillSignature
-from dsc.validation.arguments import check_arguments, check_components, check_outputs, check_parameters
+from dsc.validation.arguments import check_arguments, check_outputs, check_parameters
+from dsc.validation.commands import check_commands
 from dsc.validation.data import check_data
 from dsc.validation.flow import check_wiring
 from dsc.validation.reach import check_reach
@@ -24,7 +25,7 @@ from knowledge_base.world.schema import Schema
 MAX_FINDINGS = 50
 """Upper bound of findings about one plot: authors read no more, and each finding needs a search for similar names."""
 _CHECKS = (
-    check_reach, check_wiring, check_arguments, check_parameters, check_outputs, check_data, check_components,
+    check_reach, check_wiring, check_arguments, check_parameters, check_outputs, check_data, check_commands,
 )  # fmt: skip
 
 
@@ -56,7 +57,7 @@ def validate_plot(
         library: provider of the plots to which the plot refers.
         schema: declared types and predicates; with `None`, types and conditions are not checked.
         skills: the deployed skills; with `None`, triggers are not checked.
-        components: names of the deployed components, or their declared parameters by name; with `None`, `set`, `send`
+        components: names of the deployed components, or their interfaces by name; with `None`, `set`, `send`
             and `switch` are not checked.
         thorough: whether a plot with an unsound structure is checked further; a mistake may then have two findings.
 
@@ -80,7 +81,7 @@ def _with_others(findings: list[Finding], subject: Subject) -> list[Finding]:
     A check may be unable to read a plot of unsound structure; then its findings come after the structure is repaired.
     """
     found = {finding.place: finding for finding in reversed(findings)}
-    for check in (check_data, check_components, _check_outcomes):
+    for check in (check_data, check_commands, _check_outcomes):
         with suppress(InputError, LookupError):
             for finding in islice(check(subject), MAX_FINDINGS):
                 found.setdefault(finding.place, finding)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Literal
 
-from dsc.components.declarations import Parameter
+from dsc.components.interface import Interface
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Step, contents_of, is_planned
 from dsc.errors import Finding
@@ -23,8 +23,10 @@ Types = Mapping[str, str | None]
 """Declared types by name; `None` means any type."""
 Skills = Mapping[str, SkillSignature] | None
 """The deployed skills by `component.skill`; `None` if the deployment is unknown."""
-Components = Collection[str] | Mapping[str, Mapping[str, Parameter]]
-"""Names of components, or declared parameters by component; names alone allow any parameter."""
+Components = Collection[str] | Mapping[str, Interface]
+"""Names of components, or their interfaces by name; names alone allow any parameter, mode and message."""
+ALLOW = "set it in a profile, or let `changed_by` allow it"
+"""The remedy for a role that may not change a parameter."""
 Way = tuple[Path, str, Transition]
 """Path, label of the trigger, and transition."""
 
@@ -43,7 +45,8 @@ class Subject:
         planned: whether a dynamic state has a goal.
         assigned: declared types of variables and outputs, by name.
         types: declared types of variables, outputs and parameters, by name.
-        records: the records of the library and of the skills.
+        interfaces: interfaces of the components by name; empty if unknown.
+        records: the records of the library, of the skills and of messages.
     """
 
     def __init__(
@@ -64,8 +67,10 @@ class Subject:
         self.assigned = {name: one.type for name, one in (plot.variables | plot.outputs).items()}
         self.types: Types = {**{name: one.type for name, one in plot.parameters.items()}, **self.assigned}
         self.records: dict[str, Mapping[str, str | None]] = dict(library.records)
-        for skill in (skills or {}).values():
-            self.records.update(skill.records)
+        self.interfaces: Mapping[str, Interface] = components if isinstance(components, Mapping) else {}
+        messages = [one for interface in self.interfaces.values() for one in (interface.messages or {}).values()]
+        for declared in (*(skills or {}).values(), *messages):
+            self.records.update(declared.records)
         self._states = {path: state for _, state, path in self.states}
         self._leaving = {
             path: tuple(((*path, *inside), trigger, way) for inside, trigger, way in state.placed_transitions())

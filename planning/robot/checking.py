@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from dsc.components.assembly import require_deployed, require_instances, require_whole, require_wired
 from dsc.components.component import Component
-from dsc.components.declarations import Parameter
 from dsc.components.hooks import contained
+from dsc.components.interface import Interface
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, ProgrammingError
 from dsc.model.plot import ActionPlot, initial_of
@@ -40,7 +40,7 @@ from planning.problem.relevance import numeric_constructs
 from planning.robot.bringup import begin, simulated
 from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of, shipped_by
 from planning.robot.simulation import Setup, Simulation
-from planning.robot.soundness import IMPLEMENTED, check_implementations
+from planning.robot.soundness import IMPLEMENTED, check_implementations, interfaces
 from planning.robot.targets import bundle_at
 
 READABLE = "readable"
@@ -176,11 +176,11 @@ class _Robot:
     def findings(self) -> list[Finding]:
         """Return the findings of the validator; other errors go to the list of `collecting`."""
         library = Library([*self._plots, *shipped_plots()], conversions_of(self._bundles))
-        skills, declared, exclusive = self._skills(), self._declared(), self._exclusive()
+        skills, interfaces, exclusive = self._skills(), self._interfaces(), self._exclusive()
         schema = None if self._domain is None else self._domain.schema
         found: list[Finding] = []
         for plot in self._plots:
-            mistakes = validate_plot(plot, library, schema, skills, declared, thorough=True)
+            mistakes = validate_plot(plot, library, schema, skills, interfaces, thorough=True)
             found += mistakes or review_plot(plot, library, exclusive)
         found = without_consequences(found, self._broken_files())
         if self._domain is not None:
@@ -205,11 +205,8 @@ class _Robot:
             if component.takes_turns(skill)
         )
 
-    def _declared(self) -> dict[str, Mapping[str, Parameter]] | None:
-        if self._components is None:
-            return None
-        declared = {one.name: one.parameters.declared for one in self._components}
-        return {PlanningComponent.name: {}, **declared}
+    def _interfaces(self) -> dict[str, Interface] | None:
+        return None if self._components is None else interfaces(self._components)
 
     def _check_task(self, schema: Schema) -> None:
         """Check the initial knowledge, the goal and the main plot."""

@@ -39,7 +39,7 @@ from planning.model.domain import PlanningDomain
 from planning.robot.bundles import Bundle, components_of, conversions_of, domain_of, gathered, plots_of, shipped_by
 from planning.robot.run import Run
 from planning.robot.simulation import Simulation
-from planning.robot.soundness import require_parts, require_sound
+from planning.robot.soundness import interfaces, require_parts, require_sound
 from planning.robot.task import Task
 
 
@@ -114,12 +114,8 @@ class RobotProgram:
         self.origin = origin
         skills = [s for c in self.components for s in c.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
-        declared = {
-            PlanningComponent.name: {},
-            **{c.name: c.parameters.declared for c in self.components},
-        }
         schema = self.domain.schema if knowledge is None else knowledge.schema
-        require_sound(self.library, self.domain, schema, skills, declared)
+        require_sound(self.library, self.domain, schema, skills, interfaces(self.components))
         if knowledge is not None:
             self.knowledge = knowledge
         else:  # last, since the caller must close an opened knowledge base
@@ -217,7 +213,7 @@ class RobotProgram:
             foresight=self._foresight,
         )  # fmt: skip
         sequencer.listen(planning.note)
-        sequencer.dispatcher.deploy(planning)
+        sequencer.dispatcher.deploy(planning, last=True)
         return sequencer, planning
 
     def run_store(self, header: Mapping[str, Any]) -> RunStore | None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 
-from dsc.components.declarations import Parameter
+from dsc.components.component import Component
+from dsc.components.interface import Interface
+from dsc.components.ports import messages
 from dsc.dynamic.library import Library
 from dsc.errors import Finding
 from dsc.skills import SkillSignature
@@ -15,6 +17,7 @@ from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import require, shown
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
+from planning.execution.planning_component import PlanningComponent
 from planning.model.domain import PlanningDomain
 
 IMPLEMENTED = "every action has a plot"
@@ -75,15 +78,22 @@ _sound: dict[tuple[int, ...], tuple[object, ...]] = {}
 _MOST_SOUND = 16
 
 
+def interfaces(components: Iterable[Component]) -> dict[str, Interface]:
+    """Return the interfaces by name of a robot's components and of its planning component."""
+    planning = Interface(messages=messages(PlanningComponent, PlanningComponent.name))
+    return {PlanningComponent.name: planning, **{one.name: one.interface() for one in components}}
+
+
 def require_sound(
     library: Library,
     domain: PlanningDomain,
     schema: Schema,
     skills: Collection[SkillSignature],
-    declared: Mapping[str, Mapping[str, Parameter]],
+    declared: Mapping[str, Interface],
 ) -> None:
     """Raise `PlotError` with the findings of the validator; a combination that passed before is not checked again."""
-    parts = (domain, schema, *library, *skills, *declared, *declared.values())
+    shared = [part for one in declared.values() for part in (one.parameters, one.modes, one.messages)]
+    parts = (domain, schema, *library, *skills, *declared, *shared)
     key = tuple(map(id, parts))
     if key in _sound:
         return

@@ -15,7 +15,7 @@ from typed_values import PLAIN, RECORDS, typed_values
 
 from dsc import Component, Library, LoopClock, Outcome, Sequencer, SkillCall, parse_plot, skill
 from dsc.annotations import type_of
-from dsc.data_types import data_type, objects_in
+from dsc.data_types import DataType, data_type, objects_in
 from dsc.python_values import builder, plain_value
 from dsc.runs.archive import records_of
 from dsc.runs.store import RunStore
@@ -59,6 +59,38 @@ def test_a_value_that_differs_in_one_part_is_refused(drawn):
 def test_a_type_is_read_from_its_text(drawn):
     kind = data_type(drawn[0])
     assert data_type(str(kind)) == kind
+
+
+_words = st.text(st.sampled_from("ab |\"\\\n\r\t'0.-é"), min_size=1, max_size=6) | st.sampled_from(
+    ["optional", "true", "1", "1e3", "list of x"]
+)
+
+
+@given(
+    st.lists(
+        _words | st.integers() | st.booleans() | st.floats(allow_nan=False, allow_infinity=False),
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_each_value_of_a_choice_is_read_from_the_text_of_its_type(values):
+    kind = DataType("choice", values=tuple(values))
+    for text in (str(kind), f"list of {kind}", str(data_type(f"optional {kind}"))):
+        found = data_type(text)
+        read = (found.inner or found).values
+        assert [(type(one), one) for one in read] == [(type(one), one) for one in values]
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(2**53), 2**53))
+def test_a_bound_is_read_from_the_text_of_its_type(bound):
+    kind = DataType("number", least=float(bound))
+    assert data_type(str(kind)) == kind
+    assert kind.check("it", bound) == bound
+
+
+def test_a_quote_without_its_end_is_named():
+    with pytest.raises(InputError, match="a quote has no end"):
+        data_type('"left | right')
 
 
 @pytest.mark.parametrize(

@@ -75,10 +75,7 @@ INNER = parse_plot("plot: q\nemits: {lost: }\nstates: {b: {on: {done: {to: f, em
 
 def findings_of(text, setting):
     plot = parse_plot(text % setting, "p.yaml")
-    return [
-        str(one)
-        for one in validate_plot(plot, Library([plot, INNER]), None, [], {"base": Base.parameter_class.declared})
-    ]
+    return [str(one) for one in validate_plot(plot, Library([plot, INNER]), None, [], {"base": Base().interface()})]
 
 
 @pytest.mark.parametrize(

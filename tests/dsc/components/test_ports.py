@@ -16,6 +16,7 @@ from dsc.sequencer.clock import run_simulated
 from dsc.skills import skill
 from dsc.validation import validate_plot
 from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.world.schema import Schema
 
 
 class Low(Outcome):
@@ -221,6 +222,34 @@ def test_ports_are_checked_before_the_run():
     assert any("outcome 'low_bat'" in one or "'low_bat'" in one for one in findings("{send: battery.label}"))
     (unknown,) = findings("[{send: batery.label}, {trigger: battery.lasts}]", "answered: e")
     assert "did you mean 'battery'" in unknown
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ("{send: battery.labl}", "did you mean 'label'"),
+        ("{send: battery.label}", "message 'battery.label' needs its parameter 'text'"),
+        ("{send: battery.label, with: {text: a, sise: 2}}", "did you mean 'size'"),
+        ("{send: battery.calibrate, with: {full: high}}", "'full' is of type number, and high is of type text"),
+        ("{send: battery.calibrate, with: {full: (geometry 1 2)}}", "(geometry 1 2) is of type geometry"),
+        ("{send: battery.calibrate, with: {full: 2}}", None),
+        ("{switch: battery, to: restng}", "did you mean 'resting'"),
+        ("{switch: battery, to: init}", None),
+        ("{switch: battery, to: neutral}", None),
+    ],
+)
+def test_messages_and_modes_are_checked_before_the_run(entry, said):
+    class Careful(Battery):
+        modes = ("resting",)
+
+        @takes
+        async def calibrate(self, full: float): ...
+
+    made = plot(f"{{plot: p, states: {{a: {{entry: {entry}, after: {{seconds: 1, to: e}}}}, e: {{final: true}}}}}}")
+    battery = Careful()
+    found = validate_plot(made, Library([made]), Schema(), battery.skills().values(), {"battery": battery.interface()})
+    assert [one for one in map(str, found) if said is None or said not in one] == []
+    assert len(found) == (said is not None)
 
 
 def test_a_component_says_how_it_is():

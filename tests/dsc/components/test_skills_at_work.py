@@ -569,7 +569,7 @@ def test_arguments_are_checked_against_the_signature():
 
     signature = Strict().skills()["go"]
     check_arguments(signature, {"to": 1})
-    with pytest.raises(InputError, match=r"'strict\.go' needs its parameter 'to'"):
+    with pytest.raises(InputError, match=r"skill 'strict\.go' needs its parameter 'to'"):
         check_arguments(signature, {})
     with pytest.raises(UnknownNameError, match="did you mean 'speed'"):
         check_arguments(signature, {"to": 1, "sped": 2})

@@ -11,6 +11,7 @@ from dsc_charts import plot
 
 from dsc.components.component import Component
 from dsc.components.declarations import Parameter
+from dsc.components.interface import Interface
 from dsc.dynamic.library import Library
 from dsc.errors import PlotError
 from dsc.model.plot import ActionPlot
@@ -56,9 +57,13 @@ class Arm(Component):
 
 SKILLS = list(Arm().skills().values())
 COMPONENTS = {
-    "arm": {},
-    "base": {},
-    "lift": {"pace": Parameter("number", default=1, least=0, most=2), "port": Parameter("text", changed_by="profile")},
+    "arm": Interface(),
+    "base": Interface(),
+    "lift": Interface(
+        {"pace": Parameter("number", default=1, least=0, most=2), "port": Parameter("text", changed_by="profile")},
+        modes=("high", "low"),
+        messages={},
+    ),
 }
 HELPERS = [
     plot("""
@@ -505,6 +510,8 @@ WRONG = [
     ("parameter roles", "parameters:\n  n: {type: number, changed_by: profile}\n" + S + E, 2, "'n' needs a default", "a profile may set another one"),
     ("component parameter", S + "  a:\n    entry:\n      set: lift.pace\n      to: 3\n    on: {done: e}\n" + E, 6, "from 0 to 2; found 3", ""),
     ("component parameter", S + "  a:\n    entry:\n      set: lift.port\n      to: x\n    on: {done: e}\n" + E, 5, "not changed by plots", "changed_by"),
+    ("component mode", S + "  a:\n    entry:\n      switch: lift\n      to: hihg\n    on: {done: e}\n" + E, 6, "did you mean 'high'", ""),
+    ("component message", S + "  a:\n    entry:\n      send: lift.lable\n    on: {done: e}\n" + E, 5, "takes no 'lable'", ""),
     # -- rules are transitions too
     (
         "no border crossing",

@@ -214,7 +214,7 @@ def test_the_checks_before_a_run(where):
     async def main():
         component, host = await connected(where, Arm())
         text = plot(asked("{set: arm.speed, to: 9}, {set: arm.spede, to: 1}, {trigger: arm.mvoe}", "moved"))
-        declared = {component.name: component.configuration.declared}
+        declared = {component.name: component.interface()}
         found = validate_library(Library([text]), Schema(), list(component.skills().values()), declared)
         if host is not None:
             await host.close()
