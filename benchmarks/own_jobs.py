@@ -39,7 +39,7 @@ def holder(use: str) -> Form:
         "plot": "holder", "variables": {"plan": "plot"}, "receives": {"again": {"plan": "plot"}},
         "states": {
             "idle": {"on": {"again": again}},
-            "host": {"use": use, "on": {"again": again, "done": "idle"}},
+            "host": {"use": use, "on": {"again": again, **({"done": "idle"} if use == "?plan" else {})}},
         },
     }  # fmt: skip
 

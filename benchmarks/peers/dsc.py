@@ -37,8 +37,7 @@ def _states(states: Mapping[str, State]) -> dict[str, Any]:
 def _state(name: str, state: State) -> list[tuple[str, Any]]:
     if state.regions:
         regions = {region: {"states": _states(states)} for region, states in state.regions.items()}
-        # The validator requires a transition on completion, although these regions never complete.
-        return [(name, {"on": {**state.on, "done": "over"}, "regions": regions}), ("over", {"final": True})]
+        return [(name, {"on": state.on, "regions": regions})]
     inside = {"states": _states(state.states)} if state.states else {}
     return [(name, {"on": dict(state.on), **inside})]
 

@@ -24,35 +24,29 @@ from dsc.dynamic.steps import (
     outputs_of,
     terms_of,
 )
-from dsc.engine.situation import asked_states, settle
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model import actions
-from dsc.model.data_forms import is_literal, literal_parts, literal_value, plain_condition, plain_effect, plain_term
+from dsc.model.data_forms import is_literal, literal_parts, literal_value
 from dsc.model.language import term_text
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
 from dsc.model.states import DynamicState, FinalState, HistoryState, State
 from dsc.model.transitions import SelectState, TimedTransition, Transition, TransitionSource, case_value
 from dsc.skills import SkillSignature, check_arguments
+from dsc.validation.language_checks import LanguageChecker
 from dsc.validation.rules import RuleScope, attributes_of, read_as
 from dsc.validation.subject import Subject, Types
-from dsc.validation.type_checks import FREE_TYPES, TypeChecker, language_type
-from dsc.validation.type_reader import TypeReader
+from dsc.validation.type_checks import FREE_TYPES, TypeChecker
 from knowledge_base.errors import InputError
-from knowledge_base.language.checking.binding import unbound_error
-from knowledge_base.language.checking.check import check, check_effect, check_term
 from knowledge_base.language.syntax.effect import Effect, mentioned
 from knowledge_base.language.syntax.expression import (
     Arithmetic,
     Call,
-    Comparison,
     Constant,
     Expression,
     Term,
     Variable,
-    free_variables,
-    parts_of,
 )
 from knowledge_base.language.syntax.text import to_text
 
@@ -78,6 +72,7 @@ class _Data:
         self._skills = subject.skills or {}
         self._assigned, self._own = subject.assigned, subject.types
         self._rules = RuleScope(subject)
+        self._language = LanguageChecker(subject, self._checker)
 
     def findings(self) -> Iterator[Finding]:
         yield from self._declarations()
@@ -288,64 +283,10 @@ class _Data:
     def _condition(
         self, condition: Expression, scope: Types | None, path: Path, *, planned: bool = False
     ) -> Iterator[Finding]:
-        """Yield findings about a condition; `planned` is whether planning reads it, so that it may be recursive."""
-        for name in asked_states(condition):
-            if name not in self._subject.names:
-                message, valid = f"there is no state '{name}'", self._subject.names
-                yield self._subject.finding(path, "condition", message, found=name, valid=valid)
-        names = self._scope(scope, condition)
-        if not self._subject.strict:
-            condition = settle(condition, lambda _: True)
-        reader = TypeReader(names, self._subject.records)
-        try:
-            condition = plain_condition(condition, reader)
-        except InputError as error:
-            yield self._subject.caught(error, path, "condition")
-            return
-        names = {**names, **reader.read}
-        yield from self._compared(condition, names, path)
-        if self._schema is None:
-            yield from self._unbound(free_variables(condition), names, path, "condition")
-            return
-        try:
-            check(condition, self._schema, self._known(names))
-            if not planned:
-                self._schema.require_defined(condition)
-        except InputError as error:
-            yield self._subject.caught(error, path, "condition")
-
-    def _compared(self, condition: Expression, names: Types, path: Path) -> Iterator[Finding]:
-        """Yield findings about words that are compared as numbers, e.g. choices, whose types conditions do not know."""
-        if isinstance(condition, Comparison) and condition.operator not in {"=", "!="}:
-            for term in (condition.left, condition.right):
-                kind = names.get(term.name) if isinstance(term, Variable) else None
-                if kind is not None and self._checker.is_word(data_type(kind)):
-                    message = f"'{condition.operator}' works on numbers, and {to_text(term)} is of type {kind}"
-                    yield self._subject.finding(path, "condition", message)
-        for part in parts_of(condition):
-            if isinstance(part, Expression):
-                yield from self._compared(part, names, path)
+        yield from self._language.condition(condition, self._scope(scope, condition), path, planned=planned)
 
     def _effect(self, effect: Effect, scope: Types | None, path: Path) -> Iterator[Finding]:
-        names = self._scope(scope, effect)
-        reader = TypeReader(names, self._subject.records)
-        try:
-            effect = plain_effect(effect, reader)
-        except InputError as error:
-            yield self._subject.caught(error, path, "effect")
-            return
-        names = {**names, **reader.read}
-        if self._schema is None:
-            yield from self._unbound(mentioned(effect), names, path, "effect")
-            return
-        try:
-            check_effect(effect, self._schema, self._known(names))
-        except InputError as error:
-            yield self._subject.caught(error, path, "effect")
-
-    def _unbound(self, read: Iterable[str], names: Types, path: Path, rule: str) -> Iterator[Finding]:
-        for name in sorted(set(read) - names.keys()):
-            yield self._subject.caught(unbound_error(name, None, names), path, rule)
+        yield from self._language.effect(effect, self._scope(scope, effect), path)
 
     def _given(
         self, terms: Mapping[str, Term], scope: Types | None, path: Path, used: Iterable[ActionPlot]
@@ -375,31 +316,14 @@ class _Data:
             yield self._subject.finding(path, "term", message, found=term.function, valid=valid)
             return
         names = self._scope(scope, term)
-        reader = TypeReader(names, self._subject.records)
-        try:
-            if isinstance(term, Variable):
-                if reader.leads_to_part(term.name):
-                    names = {**names, term.name: reader.kind(term.name, term.place)}
-            else:
-                if isinstance(term, Arithmetic) and self._library.conversions:
-                    yield from self._operands(term, scope, path)
-                    term = replace(term, args=tuple(map(self._operand, term.args)))
-                term = plain_term(term, reader)
-        except InputError as error:
-            yield self._subject.caught(error, path, "term")
+        if isinstance(term, Arithmetic) and self._library.conversions:
+            yield from self._operands(term, scope, path)
+            term = replace(term, args=tuple(map(self._operand, term.args)))
+        read = yield from self._language.term(term, names, path)
+        if read is None:
             return
-        names = {**names, **reader.read}
-        unknown = sorted(free_variables(term) - names.keys())
-        for name in unknown:
-            message = f"there is no variable '?{name}' here"
-            yield self._subject.finding(path, "declared variable", message, found=name, valid=names)
-        if not unknown and self._schema is not None and self._subject.strict:
-            try:
-                check_term(term, self._schema, self._known(names))
-            except InputError as error:
-                yield self._subject.caught(error, path, "term")
         for kind in wanted:
-            yield from self._fits(term, kind, names, path)
+            yield from self._fits(term, kind, read, path)
 
     def _is_unknown(self, function: str) -> bool:
         return self._schema is not None and function != "size" and function not in self._schema.functions
@@ -451,11 +375,6 @@ class _Data:
         attributes = [name for name in mentioned(used) if name.startswith("event.")]
         return {**self._own, **dict.fromkeys(attributes)} if attributes else self._own
 
-    def _known(self, scope: Types) -> dict[str, str | None]:
-        """Return the scope with `None` for each type that conditions do not know."""
-        assert self._schema is not None  # noqa: S101
-        return {name: kind and language_type(kind, self._schema) for name, kind in scope.items()}
-
     # -- types -------------------------------------------------------------------------------------------
 
     def _fits(
@@ -483,6 +402,9 @@ class _Data:
                 kind.check(f"'{name}'", term.value, self._subject.records)
             except InputError as error:
                 yield self._subject.caught(error, path, "value fits")
+                return
+            if isinstance(term.value, str):
+                yield from self._language.unknown_object(term.value, wanted, path)
 
     def _kind(self, term: Term, scope: Types) -> str | None:
         """Return the type of a term's value, or `None` if it is unknown."""

@@ -216,7 +216,8 @@ class _Traffic:
 
 def _traffic(subject: Subject) -> _Traffic:
     anywhere = {*(RESERVED - TIMERS), *subject.plot.receives}
-    anywhere.update(event for _, _, way in subject.ways() for event in way.emitted)
+    # A transition that fires its own event needs another source of it.
+    anywhere.update(event for _, trigger, way in subject.ways() for event in way.emitted if event != trigger)
     inside: defaultdict[Path, set[str]] = defaultdict(set)
     heard: set[str] = {handler.on for handler in subject.plot.handlers}
     received_at: dict[Path, AbstractSet[str]] = {}

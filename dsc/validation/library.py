@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from itertools import chain, islice
 
@@ -48,6 +48,7 @@ def validate_plot(
     skills: Iterable[SkillSignature] | None = None,
     components: Components | None = None,
     *,
+    objects: Mapping[str, str] | None = None,
     thorough: bool = False,
 ) -> list[Finding]:
     """Return the findings about a plot, at most `MAX_FINDINGS`; empty for a valid plot.
@@ -59,6 +60,7 @@ def validate_plot(
         skills: the deployed skills; with `None`, triggers are not checked.
         components: names of the deployed components, or their interfaces by name; with `None`, `set`, `send`
             and `switch` are not checked.
+        objects: types of the objects with which a run begins, by name; with `None`, names of objects are not checked.
         thorough: whether a plot with an unsound structure is checked further; a mistake may then have two findings.
 
     Raises:
@@ -67,7 +69,7 @@ def validate_plot(
     require(plot, ActionPlot, "a plot is an ActionPlot, as load_plot and parse_plot give it")
     _require_parts(library, schema)
     signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in _known(skills)}
-    subject = Subject(plot, library, schema, signatures, components)
+    subject = Subject(plot, library, schema, signatures, components, objects)
     for check in (check_structure, check_size):
         findings = list(islice(check(subject), MAX_FINDINGS))
         if findings:  # the other checks would report these mistakes again, or take too long
@@ -93,7 +95,7 @@ def _check_outcomes(subject: Subject) -> Iterator[Finding]:
     plot = subject.plot
     rules = [rule if not rule.leads_away or rule.then in subject.names else _here(rule) for rule in plot.rules]
     copied = plot.model_copy(update={"rules": tuple(rules)})
-    again = Subject(copied, subject.library, subject.schema, subject.skills, subject.components)
+    again = Subject(copied, subject.library, subject.schema, subject.skills, subject.components, subject.objects)
     return (finding for finding in check_wiring(again) if finding.rule == "every outcome is wired")
 
 

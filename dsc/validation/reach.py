@@ -175,9 +175,14 @@ def check_completion(subject: Subject, wired: Mapping[str, AnyState]) -> Iterato
             message = f"state '{name}' has no content, so it is done immediately and would cancel its skill"
             yield subject.finding((*path, "on", DONE), "done at once", message, "wire the outcome of the skill")
         after = wired[name]
-        if isinstance(after, State) and DONE not in after.on and _completes(state, silent):
+        if not isinstance(after, State):
+            continue
+        if DONE not in after.on and _completes(state, silent):
             message = f"state '{name}' does not handle its completion"
             yield subject.finding((*path, "on"), "completion is wired", message, "add `done: STATE` under `on`")
+        elif isinstance(state, State) and DONE in state.on and (endless := _endless(state, subject.library)):
+            message = f"state '{name}' is never done: {endless} has no final state"
+            yield subject.finding((*path, "on", DONE), "done can fire", message, "remove `done`, or add an end")
 
 
 def _completes(state: AnyState, silent: Callable[[str], bool]) -> bool:
@@ -187,9 +192,31 @@ def _completes(state: AnyState, silent: Callable[[str], bool]) -> bool:
         case DynamicState(dynamic=candidates, goal=goal):
             return goal is not None or any(map(silent, candidates))
         case CompositeState(states=inside):
-            return any(isinstance(inner, FinalState) for inner in inside.values())
+            return _has_end(inside)
+        case OrthogonalState(regions=regions):
+            return all(_has_end(region.states) for region in regions.values())
         case _:
-            return isinstance(state, OrthogonalState)
+            return False
+
+
+def _has_end(states: Mapping[str, AnyState]) -> bool:
+    return any(isinstance(state, FinalState) for state in states.values())
+
+
+def _endless(state: State, library: Library) -> str | None:
+    """Return the part of a state without a final state, so that the state is never done; `None` if it may be done."""
+    match state:
+        case CompositeState(states=inside):
+            return None if _has_end(inside) else "it"
+        case OrthogonalState(regions=regions):
+            endless = (f"its region '{name}'" for name, region in regions.items() if not _has_end(region.states))
+            return next(endless, None)
+        case SubmachineState(use=use):
+            return None if use.startswith("?") or _has_end(library.plot(use).states) else f"plot '{use}'"
+        case DynamicState(dynamic=candidates, goal=None):
+            return None if any(_has_end(library.plot(one).states) for one in candidates) else "each candidate"
+        case _:
+            return None
 
 
 def _ends_silently(plot: ActionPlot) -> bool:

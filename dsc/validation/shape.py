@@ -75,7 +75,8 @@ def _shape(subject: Subject) -> Iterator[Finding]:
             for key, region in state.regions.items():
                 yield from _scope(subject, region, (*path, "regions", key))
         yield from _uses(subject, state, path)
-        if subject.strict and isinstance(state, State) and not any(map(subject.leaving, subject.way_to(path))):
+        # A state with content may work without end; otherwise its completion has a transition.
+        if subject.strict and type(state) is State and not any(map(subject.leaving, subject.way_to(path))):
             fix = "wire its outcomes, or make it `final: true`"
             yield subject.finding(path, "no dead end", f"no transition leaves the state '{name}'", fix)
     yield from check_rules(subject)

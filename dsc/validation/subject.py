@@ -38,6 +38,7 @@ class Subject:
         plot: the plot to check.
         library: provider of the plots to which the plot refers.
         schema, skills, components: declared types, deployed skills and components; `None` if unknown.
+        objects: types of the objects with which a run begins, by name; `None` if unknown.
         strict: whether the plot is in dialect `dsc`; dialect `scxml` has fewer rules.
         states: name, state and path of all states, in document order.
         steps: name, state and path of the states that contain another plot.
@@ -56,9 +57,10 @@ class Subject:
         schema: Schema | None = None,
         skills: Skills = None,
         components: Components | None = None,
+        objects: Mapping[str, str] | None = None,
     ) -> None:
         self.plot, self.library = plot, library
-        self.schema, self.skills, self.components = schema, skills, components
+        self.schema, self.skills, self.components, self.objects = schema, skills, components, objects
         self.strict = plot.dialect == "dsc"
         self.states = tuple(plot.walk())
         self.steps = tuple((name, state, path) for name, state, path in self.states if isinstance(state, Step))

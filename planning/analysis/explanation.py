@@ -77,7 +77,7 @@ def _not_together(
     """
     patience.doing = "looking for goal facts that exclude each other"
     problem = ProblemBuilder(domain).build_problem(world, goal, patience=patience)
-    pairs = [] if problem.one_at_a_time else list(goal_mutexes(problem.whole or problem, patience))
+    pairs = mutexes(problem, patience)
     told = [(one, other) for one, other in pairs if _declared(one) and _declared(other)]
     said = [f"{_as_written(one)} and {_as_written(other)} can never hold together" for one, other in told]
     return tuple(said) or (_NUMBERS if numeric else _TOGETHER,)
@@ -307,6 +307,11 @@ class _NumberedAction:
     adds: tuple[int, ...]
     added: int
     kept: int
+
+
+def mutexes(problem: Problem, patience: WorkLimit) -> list[tuple[Fact, Fact]]:
+    """Return the pairs of goal facts that never hold together; with one action at a time, none is known."""
+    return [] if problem.one_at_a_time else list(goal_mutexes(problem.whole or problem, patience))
 
 
 def goal_mutexes(problem: Problem, patience: WorkLimit) -> Iterator[tuple[Fact, Fact]]:

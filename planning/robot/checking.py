@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +12,7 @@ from dsc.components.assembly import require_deployed, require_instances, require
 from dsc.components.component import Component
 from dsc.components.hooks import contained
 from dsc.components.interface import Interface
+from dsc.dynamic.knowledge_situation import ACHIEVE, choose
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, ProgrammingError
 from dsc.model.plot import ActionPlot, initial_of
@@ -22,13 +23,15 @@ from dsc.text.plot_files import load_plot
 from dsc.text.profiles import Profile, load_profile
 from dsc.validation import review_plot, validate_plot
 from knowledge_base.errors import InputError, Place, UnknownNameError, collecting, tolerated
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import holds
-from knowledge_base.language.syntax.expression import Expression, free_variables
+from knowledge_base.language.syntax.expression import Constant, Expression, free_variables
 from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.pddl import read_problem
 from knowledge_base.pddl.domain_text import read_domain
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
-from planning.analysis.explanation import why_unsolvable
+from planning.analysis.explanation import mutexes, why_unsolvable
 from planning.engines.registry import able, installed, refusal
 from planning.execution.planning_component import PlanningComponent
 from planning.execution.shipped_plots import shipped_plots
@@ -52,6 +55,7 @@ _SKIPPED = frozenset({"build", "dist", "node_modules", "site-packages", "__pycac
 _NAMES_PLOT = re.compile(r"^plot:\s*[\"']?([\w.-]+)", re.MULTILINE)
 _IMPLEMENTS = re.compile(r"^implements:\s*[\"']?([\w.-]+)", re.MULTILINE)
 _NAMES_PROFILE = re.compile(r"^profile:", re.MULTILINE)
+_DEFINES_PROBLEM = re.compile(r"\(\s*define\s*\(\s*problem\b", re.IGNORECASE)
 _DEFINES_DOMAIN = re.compile(r"\(\s*define\s*\(\s*domain\b", re.IGNORECASE)
 
 
@@ -68,7 +72,7 @@ def check_project(target: str) -> list[Finding]:
         bundle = _bundle(target) if not path.is_dir() or _has_robot(path) else None
         unread = any(str(one.place.source).endswith(".pddl") for one in errors if one.place is not None)
         whole = bundle is not None and (bundle.domain is not None or not unread)
-        robot = None if bundle is None else _Robot(bundle, whole=whole)
+        robot = None if bundle is None else _Robot(bundle, path if path.is_dir() else None, whole=whole)
         findings = [] if robot is None else robot.findings()
         if robot is not None and not errors and not findings:
             findings += robot.pointless()
@@ -132,11 +136,13 @@ class _Robot:
 
     Args:
         bundle: the bundle.
+        folder: the folder of the project; `None` without a project.
         whole: whether its domain could be read, so that plots and skills can be compared with it.
     """
 
-    def __init__(self, bundle: Bundle, *, whole: bool = True) -> None:
+    def __init__(self, bundle: Bundle, folder: Path | None = None, *, whole: bool = True) -> None:
         self._bundle = bundle
+        self._folder = folder
         self._whole = whole
         self._bundles: tuple[Bundle, ...] = (bundle,)
         with tolerated():
@@ -175,17 +181,19 @@ class _Robot:
 
     def findings(self) -> list[Finding]:
         """Return the findings of the validator; other errors go to the list of `collecting`."""
-        library = Library([*self._plots, *shipped_plots()], conversions_of(self._bundles))
+        library = self._library()
         skills, interfaces, exclusive = self._skills(), self._interfaces(), self._exclusive()
         schema = None if self._domain is None else self._domain.schema
+        world = None if schema is None else self._world(schema)
+        objects = None if world is None else {**self._objects_nearby(world.schema), **_objects_of(world)}
         found: list[Finding] = []
         for plot in self._plots:
-            mistakes = validate_plot(plot, library, schema, skills, interfaces, thorough=True)
+            mistakes = validate_plot(plot, library, schema, skills, interfaces, objects=objects, thorough=True)
             found += mistakes or review_plot(plot, library, exclusive)
         found = without_consequences(found, self._broken_files())
         if self._domain is not None:
             found += without_consequences(check_implementations(library, self._domain), self._broken_files())
-            self._check_task(self._domain.schema)
+            self._check_task(world or KnowledgeBase(self._domain.schema))
             found += self._unplannable(self._domain)
         self._check_components()
         return found
@@ -208,14 +216,25 @@ class _Robot:
     def _interfaces(self) -> dict[str, Interface] | None:
         return None if self._components is None else interfaces(self._components)
 
-    def _check_task(self, schema: Schema) -> None:
-        """Check the initial knowledge, the goal and the main plot."""
-        bundle, world = self._bundle, KnowledgeBase(schema)
+    def _world(self, schema: Schema) -> KnowledgeBase | None:
+        """Return the initial knowledge, or `None` if it has a mistake."""
         with tolerated():
+            world = KnowledgeBase(schema)
             try:
-                begin(world, bundle, self._simulation, "check")
+                begin(world, self._bundle, self._simulation, "check")
             except ProgrammingError as error:
                 raise InputError(f"programming error in {error}") from error
+            return world
+        return None
+
+    def _objects_nearby(self, schema: Schema) -> dict[str, str]:
+        """Return the objects of the problem files in the project's folder."""
+        files = () if self._folder is None else _sources(self._folder)
+        return {name: kind for file in files for name, kind in _objects_in(file, schema).items()}
+
+    def _check_task(self, world: KnowledgeBase) -> None:
+        """Check the goal and the main plot."""
+        bundle = self._bundle
         if bundle.goal is not None:
             with tolerated():
                 check_goal(parse_condition(bundle.goal, f"goal of '{bundle.name}'"), world)
@@ -240,30 +259,48 @@ class _Robot:
 
         The parts of the robot must be without mistakes.
         """
-        domain, (goal, place) = self._domain, self._first_goal()
-        if domain is None or goal is None or free_variables(goal):
+        domain = self._domain
+        if domain is None:
             return
         world = KnowledgeBase(domain.schema)
         begin(world, self._bundle, self._simulation, "check")
+        goal, place = self._first_goal(world)
+        if goal is None or free_variables(goal):
+            return
         patience = WorkLimit(_PATIENT_SECONDS)
         with suppress(InputError, WorkLimitError):  # errors of the goal are findings already
             if holds(derivation(domain).at(world).condition(goal), world):
                 error = InputError("the goal holds in the initial knowledge, so nothing is planned", place=place)
                 yield Finding(error, "goal", level="warning")
-            elif build_problem(domain, world, goal, patience=patience).unreachable:
+                return
+            problem = build_problem(domain, world, goal, patience=patience)
+            if problem.unreachable or mutexes(problem, patience):
                 why = "; ".join(why_unsolvable(domain, world, goal, patience))
                 error = InputError(f"the goal cannot be reached from the initial knowledge: {why}", place=place)
                 yield Finding(error, "goal", level="warning")
 
-    def _first_goal(self) -> tuple[Expression | None, Place | None]:
+    def _first_goal(self, world: KnowledgeBase) -> tuple[Expression | None, Place | None]:
         """Return the goal that a run plans for before anything else, and its place; `None` without such a goal."""
         if self._bundle.main is None:
             return None if self._bundle.goal is None else parse_condition(self._bundle.goal), None
         plot = next((one for one in self._plots if one.name == self._bundle.main), None)
         first = None if plot is None else plot.states.get(initial_of(plot))
-        if plot is None or not isinstance(first, DynamicState) or first.dynamic:
+        if plot is None or not isinstance(first, DynamicState) or first.goal is None:
             return None, None
-        return first.goal, plot.place(("states", initial_of(plot), "goal"))
+        place = plot.place(("states", initial_of(plot), "goal"))
+        if not first.dynamic:
+            return first.goal, place
+        values = {name: one.default for name, one in plot.parameters.items()}
+        values |= {name: one.initial for name, one in plot.variables.items()}
+        known = {name: one.value for name, one in values.items() if isinstance(one, Constant)}
+        with suppress(InputError):  # a value is known only in a run
+            decision = choose(first, plot.name, known, world.overlay(), self._library(), world.version)
+            if decision.chosen == ACHIEVE:
+                return parse_condition(decision.arguments["goal"]), place
+        return None, None
+
+    def _library(self) -> Library:
+        return Library([*self._plots, *shipped_plots()], conversions_of(self._bundles))
 
     def _check_main(self, main: str) -> None:
         plots = {plot.name: plot for plot in self._plots}
@@ -360,8 +397,10 @@ def _validated(files: Iterable[Path]) -> list[Finding]:
             else:
                 plots += [plot] if file in own else []
         schema = _schema(folder)
+        objects = None if schema is None else _declared_near(folder, schema)
         for plot in plots:
-            findings = validate_plot(plot, library, schema, thorough=True) or review_plot(plot, library)
+            findings = validate_plot(plot, library, schema, objects=objects, thorough=True)
+            findings = findings or review_plot(plot, library)
             found += without_consequences(findings, broken)
     return found
 
@@ -375,6 +414,26 @@ def _schema(folder: Path) -> Schema | None:
             except InputError:  # reported as a finding about this file
                 return None
     return None
+
+
+def _objects_of(world: KnowledgeBase) -> dict[str, str]:
+    """Return the objects with their types."""
+    found = {name: world.type_of(name) for name in world.objects(ROOT_TYPE)}
+    return {name: kind for name, kind in found.items() if kind is not None}
+
+
+def _objects_in(file: Path, schema: Schema) -> Mapping[str, str]:
+    """Return the objects of a problem for the schema with their types; empty for another file."""
+    if file.suffix == ".pddl" and _DEFINES_PROBLEM.search(_text(file)):
+        with suppress(InputError):  # it is a problem for another domain, or has an error
+            return read_problem(file, schema).objects
+    return {}
+
+
+def _declared_near(folder: Path, schema: Schema) -> dict[str, str] | None:
+    """Return the objects of the problems in a folder or the folder above; `None` without a problem."""
+    files = [*folder.glob("*.pddl"), *folder.parent.glob("*.pddl")]
+    return {name: kind for file in files for name, kind in _objects_in(file, schema).items()} or None
 
 
 def _text(file: Path) -> str:

@@ -45,6 +45,14 @@ PLANTED = [
     ("plots/take.yaml", "  there: {final: true}", "  there: {final: true}\n  rest: {final: true}", "'rest'"),
 ]  # fmt: skip
 
+ALONE = [
+    ("plots/deliver_all.yaml", "(forall (?p - parcel) (exists (?r - room) (and (goes-to ?p ?r) (in ?p ?r))))", "(robot-in ofice)", "no object 'ofice' of type room; did you mean 'office'"),
+    ("plots/deliver_all.yaml", "done: home", "done: {to: home, when: (in parcel3 hall)}", "no object 'parcel3' of type parcel; did you mean"),
+    ("plots/deliver_all.yaml", "done: home", "done: {to: home, tell: (robot-in parcel1)}", "'parcel1' is of type parcel, not of type room"),
+    ("delivery.py", "-> Arrived | Blocked:", "-> Arrived:", "nothing here fires the event 'blocked'"),
+]  # fmt: skip
+"""Mistakes that others of `PLANTED` would hide."""
+
 
 @pytest.fixture
 def project(tmp_path, monkeypatch):
@@ -66,10 +74,11 @@ def test_a_project_without_mistakes_has_no_findings(project):
     assert check_project(str(project)) == []
 
 
-@pytest.mark.parametrize("number", range(len(PLANTED)))
+@pytest.mark.parametrize("number", range(len(PLANTED) + len(ALONE)))
 def test_each_mistake_is_found_with_its_file(project, number):
-    planted(project, [PLANTED[number]])
-    file, _, _, said = PLANTED[number]
+    mistake = [*PLANTED, *ALONE][number]
+    planted(project, [mistake])
+    file, _, _, said = mistake
     found = [one for one in check_project(str(project)) if said in str(one)]
     assert found
     if file != "delivery.py":
@@ -175,3 +184,32 @@ def test_a_first_goal_that_cannot_be_reached_is_a_warning_with_the_reason(projec
     assert str(found).startswith(f"{project / 'plots' / 'deliver_all.yaml'}:")
     assert "the goal cannot be reached from the initial knowledge" in str(found)
     assert "(full) does not hold, and no planning action makes it true" in str(found)
+
+
+def test_a_goal_whose_parts_exclude_each_other_is_a_warning(project):
+    goal = "(forall (?p - parcel) (exists (?r - room) (and (goes-to ?p ?r) (in ?p ?r))))"
+    planted(project, [("plots/deliver_all.yaml", goal, "(and (robot-in office) (robot-in kitchen))", "")])
+    (found,) = check_project(str(project))
+    assert "(robot-in office) and (robot-in kitchen) can never hold together" in str(found)
+
+
+@pytest.mark.parametrize(("room", "fits"), [("office", False), ("hall", True)])
+def test_the_goal_beside_candidates_is_the_first_one_if_none_fits_at_the_start(project, room, fits):
+    goal = "(forall (?p - parcel) (exists (?r - room) (and (goes-to ?p ?r) (in ?p ?r))))"
+    wrong = [
+        ("plots/deliver_all.yaml", goal, "(and (robot-in office) (robot-in kitchen))", ""),
+        ("plots/deliver_all.yaml", "dynamic: []", f"dynamic: [drive]\n    with: {{to: {room}}}", ""),
+        ("plots/deliver_all.yaml", "gave_up: failed", "gave_up: failed, blocked: failed", ""),
+        ("plots/drive.yaml", "parameters:", "when: (robot-in ?to)\nparameters:", ""),
+    ]
+    planted(project, wrong)
+    found = "\n".join(map(str, check_project(str(project))))
+    assert ("can never hold together" in found) is not fits
+
+
+def test_an_object_of_a_problem_file_is_known(project):
+    planted(project, [("plots/deliver_all.yaml", "done: home", "done: {to: home, when: (robot-in attic)}", "")])
+    assert "no object 'attic'" in str(check_project(str(project))[0])
+    problem = "(define (problem more) (:domain delivery) (:objects attic - room) (:init) (:goal (robot-in attic)))"
+    (project / "more.pddl").write_text(problem)
+    assert check_project(str(project)) == []
