@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -20,7 +20,6 @@ from dsc.components.component import Component
 from dsc.sequencer.run_end import RunEnd
 from dsc.text.profiles import Profile
 from dsc.trace import Listener
-from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Delta
 from knowledge_base.journal.file import Durability
 from knowledge_base.store import KnowledgeBase
@@ -36,7 +35,7 @@ MAIN_PLOT = "clean_up_table"
 
 
 class TableSimulation(Simulation):
-    """The simulated table, and the robot that clears the table.
+    """The simulated table, and the robot on wheels, with an arm and a hand, that clears the table.
 
     Attributes:
         world: the simulated world, with its true state.
@@ -56,8 +55,8 @@ class TableSimulation(Simulation):
             self.world.create(beside(self.setup.store))
 
     def components(self) -> Iterable[Component]:
-        """Return the components of the profile's robot."""
-        return robot(self.setup.profile)(self.world)
+        """Return the components of the robot."""
+        return [Base(self.world), Arm(self.world), Camera(self.world), Voice(self.world)]
 
     def knowledge(self) -> Delta:
         """Return the places, and the place of the robot."""
@@ -101,6 +100,14 @@ class TableSimulation(Simulation):
             self.world.close()
 
 
+class TableOnTracks(TableSimulation):
+    """The simulated table with the robot on tracks, which has a suction arm."""
+
+    def components(self) -> Iterable[Component]:
+        """Return the components of the robot."""
+        return [Tracks(self.world), SuctionArm(self.world), PatientCamera(self.world), Voice(self.world)]
+
+
 def _world(setup: Setup) -> TableWorld:
     if setup.resumes and setup.store is not None:
         return DurableWorld.open(beside(setup.store))
@@ -115,33 +122,6 @@ def _world(setup: Setup) -> TableWorld:
     return DurableWorld.from_state(world.state())
 
 
-def on_wheels(world: TableWorld) -> list[Component]:
-    """Return the components of the robot with a base on wheels and an arm with a hand."""
-    return [Base(world), Arm(world), Camera(world), Voice(world)]
-
-
-def on_tracks(world: TableWorld) -> list[Component]:
-    """Return the components of the robot with a base on tracks and a suction arm."""
-    return [Tracks(world), SuctionArm(world), PatientCamera(world), Voice(world)]
-
-
-ROBOTS = {"on_wheels": on_wheels, "on_tracks": on_tracks}
-"""The robots for this task, by their names in profiles; each is a function that returns components."""
-
-
-def robot(profile: Profile | None) -> Callable[[TableWorld], list[Component]]:
-    """Return the function that returns the components of the profile's robot.
-
-    Raises:
-        UnknownNameError: the profile names an unknown robot.
-    """
-    name = "on_wheels" if profile is None or profile.robot is None else profile.robot
-    if name not in ROBOTS:
-        place = None if profile is None else profile.place(("robot",))
-        raise UnknownNameError(f"there is no robot '{name}'", place=place, found=name, valid=ROBOTS)
-    return ROBOTS[name]
-
-
 @cache
 def bundle() -> Bundle:
     """Return the robot as a bundle; cached, because runs share its plots, domain and derived tables."""
@@ -151,6 +131,7 @@ def bundle() -> Bundle:
         about="clear a table: cups to the sink, cans to the bin",
         main=MAIN_PLOT,
         simulation=TableSimulation,
+        robots={"on_wheels": TableSimulation, "on_tracks": TableOnTracks},
         foresight=Physics(),
         failures=frozenset({NOTHING_FOUND}),
     )
@@ -176,7 +157,7 @@ def deploy(
         listener: called with every record of the run.
         store: a file without a run, which then keeps the run; a sidecar file keeps the world.
         durability: the events that the run survives.
-        profile: the robot, one of `ROBOTS`, and the values of its parameters; by default the robot on wheels.
+        profile: the robot, by its name in the bundle, and the values of its parameters; by default the robot on wheels.
 
     Raises:
         InputError: the scenario or the profile contains an error, or the store already contains a run.

@@ -91,7 +91,11 @@ def outcomes_of(state: AnyState, plots: Plots) -> Outcomes:
         found.update(plots.plot(candidate).emits)
     if state.goal is None:
         return {**found, NO_CANDIDATE: {}}
-    return {**found, NO_PLAN: {"reason": "text", "kind": "symbol"}, GAVE_UP: {"reason": "text"}}
+    return {**found, NO_PLAN: {"reason": "text", "kind": NO_PLAN_KINDS}, GAVE_UP: {"reason": "text"}}
+
+
+NO_PLAN_KINDS = "failed | invalid | timed_out | unsolvable"
+"""The type of the attribute `kind` of the outcome `no_plan`."""
 
 
 def answerable(state: AnyState, plots: Plots) -> Outcomes:

@@ -244,12 +244,16 @@ class SelectState(Connector):
 
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
         """Yield the cases as guarded transitions, then `otherwise`; the paths are `("cases", key)` and `("else",)`."""
+        for path, value, case in self.written_cases():
+            yield path, CHOICE, self._guarded(value, case)
+        yield ("else",), CHOICE, self.otherwise
+
+    def written_cases(self) -> Iterator[tuple[FormPath, Value, Transition]]:
+        """Yield the path, the value and the transition of each case, without the comparison with the value."""
         for key, case in self.cases.items():
             value = case_value(key)
             # In YAML, a key that is a whole number or a truth value has this type.
-            place = value if isinstance(value, int) else key
-            yield ("cases", place), CHOICE, self._guarded(value, case)
-        yield ("else",), CHOICE, self.otherwise
+            yield ("cases", value if isinstance(value, int) else key), value, case
 
     def redirected(self, change: Redirect) -> Self:
         """Return the connector with changed transitions; see `TransitionSource`."""

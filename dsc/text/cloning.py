@@ -16,7 +16,7 @@ from dsc.model.plot import ActionPlot
 from dsc.model.plot import Path as FormPath
 from dsc.model.states import DynamicState
 from dsc.text.plot_files import Neighbours, load_plot, parse_plot, plot_to_yaml
-from dsc.text.profiles import Profile, load_profile, profile_to_yaml
+from dsc.text.profiles import Profile, adapted, load_profile, profile_to_yaml
 from dsc.text.yaml import read_file
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.output_files import Output, write_all
@@ -145,7 +145,10 @@ def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Seq
     kept = [path for path, one in there.items() if one.name in names.values()]
     for profile in profiles:
         target = folder / f"{prefix}{profile.name}"
-        text = profile_to_yaml(cloned_profile(load_profile(profile), prefix, names))
+        read = load_profile(profile)
+        known = {name: values for name, values in read.plots.items() if name in library}
+        adapted(library, read.model_copy(update={"plots": known}))  # a value may not fit, and its plot is cloned
+        text = profile_to_yaml(cloned_profile(read, prefix, names))
         if os.path.lexists(target):
             kept.append(target)
         else:

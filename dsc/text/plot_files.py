@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,9 @@ def parse_plot(text: str, source: str | None = None) -> ActionPlot:
         InputError: the text is not a plot; the message has the place and the nearest valid key.
     """
     document = load_document(text, source)
+    if isinstance(document.data, Mapping) and "profile" in document.data and "plot" not in document.data:
+        message = "this is a profile, not a plot; `dsc check` validates profiles"
+        raise InputError(message, place=document.place(("profile",)))
     return read_model(ActionPlot, document).written_at(document.places)
 
 

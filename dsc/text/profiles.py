@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field
 
 from dsc.model.language import Setting, Written
+from dsc.model.plot import ActionPlot
 from dsc.text.yaml import dump, load_document, read_file, read_model
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, UnknownNameError
 
 Settings = dict[str, dict[str, Setting]]
 
@@ -44,6 +46,8 @@ def parse_profile(text: str, source: str | None = None) -> Profile:
         InputError: the text is not a profile; the message has the place and the nearest valid key.
     """
     document = load_document(text, source)
+    if isinstance(document.data, Mapping) and "plot" in document.data and "profile" not in document.data:
+        raise InputError("this is a plot, not a profile", place=document.place(("plot",)))
     return read_model(Profile, document).written_at(document.places)
 
 
@@ -69,6 +73,40 @@ def find_profile(name: str, folder: Path) -> Profile:
     if Path(name).suffix in {".yaml", ".yml"}:
         return load_profile(name)
     raise InputError(f"there is no profile '{name}', nor a file (*.yaml) of that name", found=name, valid=known)
+
+
+def adapted(plots: Iterable[ActionPlot], profile: Profile | None = None) -> tuple[ActionPlot, ...]:
+    """Return the plots with the profile's values as defaults of their parameters.
+
+    Raises:
+        UnknownNameError: a plot or parameter of the profile does not exist.
+        InputError: a value has another type than the parameter or is out of its range, or a profile may not change it.
+    """
+    plots = tuple(plots)
+    if profile is None or not profile.plots:
+        return plots
+    names = [plot.name for plot in plots]
+    for name in profile.plots:
+        if name not in names:
+            raise unknown_in(profile, "plots", "plot", name, names)
+    return tuple(_adapted(plot, profile) for plot in plots)
+
+
+def _adapted(plot: ActionPlot, profile: Profile) -> ActionPlot:
+    for name, value in profile.plots.get(plot.name, {}).items():
+        try:
+            plot = plot.with_default(name, value, "profile")
+        except InputError as error:
+            error.place = profile.place(("plots", plot.name, name))
+            raise
+    return plot
+
+
+def unknown_in(profile: Profile | None, group: str, kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:
+    """Return the error for a name under `components` or `plots` of a profile that is not among the valid ones."""
+    error = UnknownNameError(f"there is no {kind} '{name}'", found=name, valid=valid)
+    error.place = None if profile is None else profile.place((group, name))
+    return error
 
 
 def profile_schema() -> dict[str, Any]:

@@ -32,7 +32,7 @@ from dsc.model.language import term_text
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
 from dsc.model.states import DynamicState, FinalState, HistoryState, State
-from dsc.model.transitions import SelectState, TimedTransition, Transition, TransitionSource, case_value
+from dsc.model.transitions import CHOICE, SelectState, TimedTransition, Transition, TransitionSource
 from dsc.skills import SkillSignature, check_arguments
 from dsc.validation.language_checks import LanguageChecker
 from dsc.validation.rules import RuleScope, attributes_of, read_as
@@ -135,13 +135,14 @@ class _Data:
         """Yield findings about the selected term, and about cases whose type differs from the term's type."""
         yield from self._term(state.select, None, (*path, "select"))
         selected = self._kind(state.select, self._own)
-        for key in state.cases:
-            value = case_value(key)
-            place = value if isinstance(value, int) else key
-            yield from self._fits(Constant(value), selected, _ANY, (*path, "cases", place), to_text(state.select))
+        for inside, value, _ in state.written_cases():
+            yield from self._fits(Constant(value), selected, _ANY, (*path, *inside), to_text(state.select))
 
     def _leaving(self, state: TransitionSource, path: Path) -> Iterator[Finding]:
-        for here, event, transition in self._subject.leaving(path):
+        ways = self._subject.leaving(path)
+        if isinstance(state, SelectState):  # `_selection` checks the comparisons with the cases
+            ways = tuple(((*path, *inside), CHOICE, case) for inside, _, case in state.written_cases()) + ways[-1:]
+        for here, event, transition in ways:
             if isinstance(transition, TimedTransition):
                 yield from self._term(transition.seconds, None, (*here, "seconds"), "number")
             if transition.guard is not None or transition.passed or transition.effect:

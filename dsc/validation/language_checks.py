@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import TypeVar
 
-from dsc.data_types import data_type
+from dsc.data_types import DataType, data_type
 from dsc.engine.situation import asked_states, settle
 from dsc.errors import Finding
 from dsc.model.data_forms import DataReader, plain_condition, plain_effect, plain_term
 from dsc.model.plot import Path
 from dsc.validation.objects import KnownObjects
 from dsc.validation.subject import Subject, Types
-from dsc.validation.type_checks import TypeChecker, language_type
+from dsc.validation.type_checks import TypeChecker, inside_optional, language_type
 from dsc.validation.type_reader import TypeReader
 from knowledge_base.errors import InputError
 from knowledge_base.language.checking.binding import unbound_error
@@ -20,6 +20,7 @@ from knowledge_base.language.checking.check import check, check_effect, check_te
 from knowledge_base.language.syntax.effect import Effect, Form, mentioned
 from knowledge_base.language.syntax.expression import (
     Comparison,
+    Constant,
     Expression,
     Term,
     Variable,
@@ -143,16 +144,28 @@ class LanguageChecker:
             yield self._subject.caught(mistake, path, "known object", _DECLARE)
 
     def _compared(self, condition: Expression, names: Types, path: Path) -> Iterator[Finding]:
-        """Yield findings about words that are compared as numbers, e.g. choices, whose types conditions do not know."""
-        if isinstance(condition, Comparison) and condition.operator not in {"=", "!="}:
-            for term in (condition.left, condition.right):
+        """Yield findings about comparisons with choices and other words, whose types conditions do not know."""
+        if isinstance(condition, Comparison):
+            for term, other in ((condition.left, condition.right), (condition.right, condition.left)):
                 kind = names.get(term.name) if isinstance(term, Variable) else None
-                if kind is not None and self._types.is_word(data_type(kind)):
+                if kind is None:
+                    continue
+                if condition.operator in {"=", "!="}:
+                    yield from self._impossible_values(term, data_type(kind), other, path)
+                elif self._types.is_word(data_type(kind)):
                     message = f"'{condition.operator}' works on numbers, and {to_text(term)} is of type {kind}"
                     yield self._subject.finding(path, "condition", message)
         for part in parts_of(condition):
             if isinstance(part, Expression):
                 yield from self._compared(part, names, path)
+
+    def _impossible_values(self, term: Term, kind: DataType, other: Term, path: Path) -> Iterator[Finding]:
+        """Yield a finding about a choice that is compared with a value that it never has."""
+        chosen = inside_optional(kind)
+        if chosen.kind == "choice" and isinstance(other, Constant) and other.value not in chosen.values:
+            valid = [str(value) for value in chosen.values]
+            message = f"{to_text(term)} is never {to_text(other)}"
+            yield self._subject.finding(path, "condition", message, found=str(other.value), valid=valid)
 
     @staticmethod
     def _known(names: Types, schema: Schema) -> Mapping[str, str | None]:

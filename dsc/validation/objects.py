@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 
 from dsc.data_types import data_type
 from dsc.validation.subject import Types
+from dsc.validation.type_checks import inside_optional
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.syntax.effect import ForEach, Form, parts_of_form
@@ -54,8 +55,7 @@ class KnownObjects:
 
     def mistake(self, name: str, kind: str, place: Place | None = None) -> InputError | None:
         """Return the error about a name as a value of a type; `None` for a valid name or another type."""
-        wanted = data_type(kind)
-        inner = wanted.inner if wanted.kind == "optional" and wanted.inner is not None else wanted
+        inner = inside_optional(data_type(kind))
         return self._mistake(name, (inner.name,), place) if inner.kind == "name" else None
 
     def _of(self, term: Term, wanted: Collection[str]) -> Iterator[InputError]:

@@ -34,7 +34,7 @@ class TypeChecker:
 
     def difference(self, given: DataType, wanted: DataType) -> str | None:
         """Return why no value of one type has the other, e.g. `of type text`; `None` if a value may have both."""
-        given, wanted = _inside_optional(given), _inside_optional(wanted)
+        given, wanted = inside_optional(given), inside_optional(wanted)
         one, other = self._form(given), self._form(wanted)
         if one is None or other is None:
             return None
@@ -46,13 +46,13 @@ class TypeChecker:
 
     def is_word(self, kind: DataType) -> bool:
         """Return whether the values are words whose type is unknown to conditions: a choice, symbol or condition."""
-        kind = _inside_optional(kind)
+        kind = inside_optional(kind)
         words = kind.kind == "choice" and self._form(kind) == "word"
         return words or kind.name in {"symbol", "condition", "plot"}
 
     def parts_of(self, text: str | None, parts: Collection[str], *, is_list: bool) -> Mapping[str, str | None] | str:
         """Return the types of the parts of a list or record that enters a type; or, as text, why it does not fit."""
-        kind = None if text is None else _inside_optional(data_type(text))
+        kind = None if text is None else inside_optional(data_type(text))
         form = None if kind is None else self._form(kind)
         if kind is None or form is None:
             return {}
@@ -101,7 +101,8 @@ class TypeChecker:
         return schema.is_a(given, wanted) or schema.is_a(wanted, given)
 
 
-def _inside_optional(kind: DataType) -> DataType:
+def inside_optional(kind: DataType) -> DataType:
+    """Return the type of a value of an optional type that is set; any other type unchanged."""
     return kind.inner if kind.kind == "optional" and kind.inner is not None else kind
 
 
@@ -117,7 +118,7 @@ def _bounds_overlap(one: DataType, other: DataType) -> bool:
 
 def language_type(text: str, schema: Schema) -> str | None:
     """Return the type of a value for the checks of conditions; `None` if these know no such type."""
-    kind = _inside_optional(data_type(text))
+    kind = inside_optional(data_type(text))
     if kind.kind in {"number", "integer"}:
         return "number"
     if kind.kind == "boolean":

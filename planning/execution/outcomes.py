@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from dsc.outcomes import Outcome
 
@@ -27,11 +27,14 @@ class GoalOpen(Outcome):
     reason: str
 
 
+NoPlanKind = Literal["failed", "invalid", "timed_out", "unsolvable"]
+
+
 class NoPlan(Outcome):
-    """No plan was found; `kind` is `unsolvable`, `timed_out` or `failed`."""
+    """No plan was found: none exists, the time was over, an engine failed, or the goal is invalid."""
 
     reason: str
-    kind: Symbol
+    kind: NoPlanKind
 
 
 class PlanInvalid(Outcome):

@@ -30,6 +30,7 @@ from planning.execution.outcomes import (
     GoalOpen,
     Monitored,
     NoPlan,
+    NoPlanKind,
     PlotFound,
     Repaired,
     Withdrawn,
@@ -318,6 +319,6 @@ class PlanningComponent(GoalSkills):
             self._runs.conclude(run.task)
         self._runs.over(plan)
 
-    def _none(self, kind: str, reason: str) -> NoPlan:
+    def _none(self, kind: NoPlanKind, reason: str) -> NoPlan:
         self._records.none(kind, reason)
         return NoPlan(reason=reason, kind=kind)

@@ -18,6 +18,7 @@ from knowledge_base.world.overlay import Overlay
 from planning.analysis.explanation import why_unsolvable
 from planning.analysis.validation import Validation, validate
 from planning.engines.registry import timing
+from planning.execution.outcomes import NoPlanKind
 from planning.execution.plan_ends import leads_to
 from planning.execution.plan_progress import PlanProgress, cost_of, local_repair
 from planning.execution.planner_call import Answer, Improvements, PlannerCalls
@@ -137,11 +138,11 @@ class NotFound:
     """Result of a search without a plan.
 
     Attributes:
-        kind: `unsolvable`, `timed_out` or `failed`.
+        kind: the `kind` of the outcome `no_plan`.
         reason: the explanation, as text.
     """
 
-    kind: str
+    kind: NoPlanKind
     reason: str
 
 

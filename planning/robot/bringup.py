@@ -11,10 +11,10 @@ from dsc.components.component import Component
 from dsc.components.hooks import contained
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
-from dsc.profiles import adapted, configure
+from dsc.profiles import configure
 from dsc.runs.archive import RunRow, archive, has_run, unfinished
 from dsc.sequencer.clock import ClockKind
-from dsc.text.profiles import Profile
+from dsc.text.profiles import Profile, adapted
 from dsc.trace import Listener
 from knowledge_base.errors import InputError, Place, StoreError
 from knowledge_base.facts import Delta
@@ -105,13 +105,14 @@ def resume(
             whose = f"of the robot '{run.header['run']}', not of '{bundle.name}'"
         message = f"the run of '{run.plot}' in this store is {whose}"
         raise StoreError(message, place=Place(str(store)))
-    if bundle.simulation is not None and not bundle.simulation.lasts:
+    said = run.header.get("settings")
+    profile = None if said is None else Profile.model_validate(said)
+    kind = bundle.simulation_for(profile)
+    if kind is not None and not kind.lasts:
         raise InputError(
             f"the run cannot be resumed: the simulation of '{bundle.name}' ended with its program; a simulation that"
             " lasts sets `lasts = True` and loads its world if `setup.resumes`"
         )
-    said = run.header.get("settings")
-    profile = None if said is None else Profile.model_validate(said)
     setup = Setup(run.header.get("seed"), run.header.get("faults"), None, profile, store, resumes=True)
     task = Task(plot=run.plot, arguments=run.arguments)
     if run.plot == ACHIEVE:
@@ -210,11 +211,17 @@ def begin(
 
 
 def simulated(bundle: Bundle, setup: Setup) -> Simulation | None:
-    """Return the simulation of a bundle; raise `ProgrammingError` for an exception of its code."""
-    if bundle.simulation is None:
+    """Return the simulation of a bundle for the profile's robot.
+
+    Raises:
+        ProgrammingError: the code of the simulation raises an exception.
+        UnknownNameError: the bundle does not have the profile's robot.
+    """
+    kind = bundle.simulation_for(setup.profile)
+    if kind is None:
         return None
-    with contained(bundle.simulation.__name__, _MAY_RAISE):
-        return bundle.simulation(setup)
+    with contained(kind.__name__, _MAY_RAISE):
+        return kind(setup)
 
 
 def _components(bundle: Bundle, simulation: Simulation | None) -> list[Component]:

@@ -20,6 +20,7 @@ from dsc.conversions import Conversion
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.text.plot_files import load_library
+from dsc.text.profiles import Profile
 from dsc.validation.subject import addressed_by
 from knowledge_base.errors import InputError, Place, UnknownNameError, described, tolerated
 from knowledge_base.facts import Delta
@@ -50,6 +51,7 @@ class BundleParts(TypedDict, total=False):
     goal: str | None
     knowledge: Delta
     simulation: type[Simulation] | None
+    robots: Mapping[str, type[Simulation]]
     foresight: Foresight | None
     failures: Collection[str]
     profiles: Path | None
@@ -73,6 +75,8 @@ class Bundle:
         goal: the goal of a run, which the report checks. A run without `main` plans for the goal.
         knowledge: the initial knowledge of the robot.
         simulation: the class of the simulated world. Its components replace real devices.
+        robots: further simulated robots for the same plots, by the name that a profile gives under `robot`; each class
+            has the components of its robot.
         foresight: simulates each plan before its execution.
         failures: further outcomes of skills that count as failures in reports. By default these are the outcomes that
             plots pass on to their caller, and the failures of all skills, e.g. `timed_out`.
@@ -90,6 +94,7 @@ class Bundle:
     goal: str | None = None
     knowledge: Delta = field(default_factory=Delta)
     simulation: type[Simulation] | None = None
+    robots: Mapping[str, type[Simulation]] = field(default_factory=dict)
     foresight: Foresight | None = None
     failures: Collection[str] = frozenset()
     profiles: Path | None = None
@@ -127,6 +132,21 @@ class Bundle:
             found["profiles"] = profiles
         found.update(parts)
         return cls(name or folder.resolve().name, **found)
+
+    def simulation_for(self, profile: Profile | None) -> type[Simulation] | None:
+        """Return the class of the simulated world with the robot of a profile; `None` without a simulation.
+
+        Raises:
+            UnknownNameError: the profile names a robot that is not among `robots`.
+        """
+        name = None if profile is None else profile.robot
+        if profile is None or name is None:
+            return self.simulation
+        if name not in self.robots:
+            lacks = f"has no robot '{name}'" if self.robots else "has no robots by name (Bundle.robots)"
+            message, place = f"the bundle '{self.name}' {lacks}", profile.place(("robot",))
+            raise UnknownNameError(message, place=place, found=name, valid=self.robots)
+        return self.robots[name]
 
     @cached_property
     def planning_domain(self) -> PlanningDomain:

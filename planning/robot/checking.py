@@ -17,10 +17,10 @@ from dsc.dynamic.library import Library
 from dsc.errors import Finding, ProgrammingError
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import DynamicState
-from dsc.profiles import adapted, configure
+from dsc.profiles import configure
 from dsc.skills import SkillSignature, signatures
 from dsc.text.plot_files import load_plot
-from dsc.text.profiles import Profile, load_profile
+from dsc.text.profiles import Profile, adapted, load_profile
 from dsc.validation import review_plot, validate_plot
 from knowledge_base.errors import InputError, Place, UnknownNameError, collecting, tolerated
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
@@ -67,7 +67,7 @@ def check_project(target: str) -> list[Finding]:
     """
     path = Path(target)
     if path.is_file() and path.suffix != ".py":
-        return _sorted(_files([path]))
+        return _sorted(_profile_findings(path) if _is_profile(path) else _files([path]))
     with collecting() as errors:
         bundle = _bundle(target) if not path.is_dir() or _has_robot(path) else None
         unread = any(str(one.place.source).endswith(".pddl") for one in errors if one.place is not None)
@@ -83,6 +83,21 @@ def check_project(target: str) -> list[Finding]:
             read |= {Path(_source(plot) or "").resolve() for plot in bundle.plots}
         findings += _files(file for file in _sources(path) if file.resolve() not in read)
     return _sorted(findings)
+
+
+def _profile_findings(file: Path) -> list[Finding]:
+    """Return the findings about a profile, for the robot of the project around it."""
+    project = next((folder for folder in file.absolute().parents if _has_robot(folder)), None)
+    with collecting() as errors, tolerated():
+        profile = load_profile(file)
+        bundle = None if project is None else bundle_at(str(project))
+        if bundle is not None:
+            _Robot(bundle).check_profile(profile)
+    return [Finding(error, READABLE) for error in errors]
+
+
+def _is_profile(file: Path) -> bool:
+    return file.suffix in {".yaml", ".yml"} and _NAMES_PROFILE.search(_text(file)) is not None
 
 
 def _bundle(target: str) -> Bundle | None:
@@ -322,12 +337,27 @@ class _Robot:
             require_wired(self._components)
         with tolerated():
             configure(self._components)
-        folder = self._bundle.profiles
-        for file in sorted(folder.glob("*.yaml")) if folder is not None and folder.is_dir() else ():
+        for file in self._profiles():
             with tolerated():
-                profile = load_profile(file)
-                configure(self._made(profile) or (), profile)
-                adapted(self._plots, profile)
+                self.check_profile(load_profile(file))
+
+    def _profiles(self) -> Iterator[Path]:
+        """Yield the files of the bundle's profiles, and of other profiles in the project that no other robot has."""
+        own = self._bundle.profiles
+        if own is not None and own.is_dir():
+            yield from sorted(own.glob("*.yaml"))
+        for file in () if self._folder is None else _sources(self._folder):
+            if file.parent.name != "profiles" and _is_profile(file):
+                yield file
+
+    def check_profile(self, profile: Profile) -> None:
+        """Check the robot, the components' values and the plots' values of a profile."""
+        with tolerated():
+            made = self._made(profile)
+            if made is not None:
+                configure(made, profile)
+        with tolerated():
+            adapted(self._plots, profile)
 
     def _broken_files(self) -> Iterator[Path]:
         """Yield the plot files that were not read, because they contain an error."""
@@ -375,7 +405,7 @@ def _read(file: Path, text: str) -> None:
             raise InputError(str(getattr(error, "msg", error)), place=Place(str(file), line)) from None
     elif file.suffix == ".pddl" and _DEFINES_DOMAIN.search(text):
         PlanningDomain.from_pddl(file)
-    elif file.suffix in {".yaml", ".yml"} and _NAMES_PROFILE.search(text):
+    elif _is_profile(file):
         load_profile(file)
 
 

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from domains.clean_up_table import deploy, world_of
-from domains.clean_up_table.bringup import HOME, ROBOTS, bundle
+from domains.clean_up_table.bringup import HOME, bundle
 from domains.clean_up_table.scenario import Scenario
 from dsc.text.profiles import load_profile, parse_profile
 from knowledge_base import InputError
@@ -24,7 +24,7 @@ def run(planner, name, seed=0, faults=0.0, scenario=None):
 
 
 def test_every_robot_has_a_profile_and_every_profile_a_robot():
-    assert {profile.robot for profile in SHIPPED.values()} == set(ROBOTS)
+    assert {profile.robot for profile in SHIPPED.values()} == set(bundle().robots)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -72,7 +72,7 @@ def test_the_second_arm_tries_again_itself(planner):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("robot: on_trakcs", "there is no robot 'on_trakcs'; did you mean 'on_tracks'?"),
+        ("robot: on_trakcs", "the bundle 'clean-up-table' has no robot 'on_trakcs'; did you mean 'on_tracks'?"),
         ("robot: on_tracks", "'arm.vacuum' has no value"),
         (
             "robot: on_tracks\ncomponents: {arm: {vacuum: 30, lifts: 1}}",

@@ -31,7 +31,7 @@ handlers:
 """
 LOOK = "plot: look\nparameters: {thing: item}\nemits: {lost: }\nstates: {turn: {use: greet, on: {done: e}}, e: {final: true}}\n"
 PUT = "plot: put\nimplements: put-down   # the usual way\nwhen: (near)\nstates: {e: {final: true}}\n"
-DROP = "plot: drop\nstates: {e: {final: true}}\n"
+DROP = "plot: drop\nparameters: {height: {type: number, default: 1, most: 1000}}\nstates: {e: {final: true}}\n"
 GREET = "plot: greet\nstates: {e: {final: true}}\n"
 LIFT = "plot: lift\nimplements: lift\nstates: {e: {final: true}}\n"
 GOAL = "plot: tidy\nstates: {s: {goal: (tidy), on: {done: e, no_plan: e, gave_up: e}}, e: {final: true}}\n"
@@ -99,7 +99,7 @@ def test_what_a_profile_says_of_originals_is_said_of_their_clones():
 def folder(tmp_path):
     for name, text in ALL.items():
         (tmp_path / f"{name}.yaml").write_text(text)
-    (tmp_path / "sim.yaml").write_text("profile: sim\nplots: {look: {height: 900}}\n")
+    (tmp_path / "sim.yaml").write_text("profile: sim\nplots: {drop: {height: 900}}\n")
     return tmp_path
 
 
@@ -113,8 +113,19 @@ def test_files_keep_their_comments_and_layout(folder):
     assert made == PLACE.replace("plot: place", "plot: b_place").replace("use: look", "use: b_look").replace(
         '"put"', '"b_put"'
     ).replace("'drop'", "'b_drop'").replace("use: greet", "use: b_greet")
-    assert load_profile(folder / "b" / "b_sim.yaml").plots == {"b_look": {"height": 900}}
+    assert load_profile(folder / "b" / "b_sim.yaml").plots == {"b_drop": {"height": 900}}
     assert (folder / "b" / "b_put.yaml").read_text() == PUT.replace("plot: put", "plot: b_put")
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [("height: 9000", "'drop.height' is 1000 or less; found 9000"), ("hight: 9", "did you mean 'height'")],
+)
+def test_a_profile_that_does_not_fit_is_not_cloned(folder, value, said):
+    (folder / "sim.yaml").write_text(f"profile: sim\nplots: {{drop: {{{value}}}}}\n")
+    result = dsc("clone", folder / "place.yaml", "--prefix", "b_", "--profile", folder / "sim.yaml")
+    assert said in str(result.exception)
+    assert not list(folder.glob("b_*"))
 
 
 def test_files_beside_the_originals_lose_only_the_planning_action(folder):

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 from dsc import Component, parse_plot
 from dsc.cli.plots import app
-from dsc.profiles import adapted, configure
-from dsc.text.profiles import find_profile, parse_profile, profile_schema
+from dsc.profiles import configure
+from dsc.text.profiles import adapted, find_profile, parse_profile, profile_schema
 from dsc.text.yaml import load_document
 from knowledge_base import InputError
 
@@ -131,3 +131,10 @@ def test_the_schema_says_what_the_reader_says():
     assert list(schema.iter_errors(load_document(GOOD).data)) == []
     for wrong in ("profile: p\ncomponent: {}\n", "profile: p\ncomponents: {base: {speed: [1]}}\n"):
         assert list(schema.iter_errors(load_document(wrong).data))
+
+
+def test_a_plot_and_a_profile_are_told_apart(tmp_path):
+    with pytest.raises(InputError, match=r"p\.yaml:1:1: this is a profile, not a plot"):
+        parse_plot("profile: fast\n", "p.yaml")
+    with pytest.raises(InputError, match=r"p\.yaml:1:1: this is a plot, not a profile"):
+        parse_profile("plot: fast\n", "p.yaml")

@@ -161,6 +161,38 @@ def test_a_candidate_that_is_never_chosen():
     assert "'one' is never chosen: its condition cannot hold" in warning
 
 
+MODES = {"parameters": {"mode": {"type": "slow | fast | still", "default": "slow"}}}
+
+
+def test_candidates_that_do_not_cover_the_values_of_a_choice():
+    few = [candidate("slow", "(= ?mode slow)", **MODES), candidate("fast", "(= ?mode fast)", **MODES)]
+    (warning,) = about_candidates(*few, extra="with: {mode: ?way}, ")
+    assert "no candidate fits if ?mode is still (add a candidate for it)" in warning
+    rest = candidate("still", "(not (or (= ?mode slow) (= ?mode fast)))", **MODES)
+    assert about_candidates(*few, rest, extra="with: {mode: ?way}, ") == []
+    assert about_candidates(*few, extra="with: {mode: ?way}, goal: (p), ") == []  # then the planner is asked
+
+
+def test_candidates_that_do_not_cover_both_truth_values():
+    flag = {"parameters": {"on": {"type": "boolean", "default": True}}}
+    (warning,) = about_candidates(candidate("lit", "(= ?on true)", **flag), extra="with: {on: ?way}, ")
+    assert "no candidate fits if ?on is false" in warning
+
+
+def test_a_handler_that_plans_without_the_rules_of_its_plot():
+    plans = "states: {s: {goal: (q), on: {done: e, no_plan: e, gave_up: e}}, e: {final: true}}\n"
+    step = plot(
+        "plot: act\nimplements: act\nemits: {lost: }\nstates: {s: {on: {done: {to: e, emit: lost}}}, e: {final: true}}"
+    )
+    rule = "rules: [{on: lost, do: {then: retry}}]\n"
+    handler = "receives: {low: }\nhandlers: [{on: low, do: {use: charge}}]\n"
+    charge = parse_plot(f"plot: charge\n{plans}", "charge.yaml")
+    (warning,) = warnings_of(f"plot: p\n{plans}{rule}{handler}", charge, step)
+    assert "the plot 'charge' plans with steps that end with 'lost', and has no rule for it" in warning
+    assert warnings_of(f"plot: p\n{plans}{rule}{handler}", parse_plot(f"plot: charge\n{plans}{rule}"), step) == []
+    assert warnings_of(f"plot: p\n{plans}{handler}", charge, step) == []
+
+
 def test_candidates_that_overlap():
     (warning,) = about_candidates(candidate("few", "(<= (f) 3)"), candidate("many", "(>= (f) 3)"))
     assert "'few' and 'many' overlap: both can fit, and then 'few' is chosen" in warning

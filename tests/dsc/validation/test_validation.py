@@ -542,7 +542,9 @@ RULE_IN = {"Finding": 1, "finding": 1, "caught": 2, "_plain": 3, "_evaluable": 3
 def test_every_rule_of_the_validator_is_tested():
     sources = Path(__file__).parents[3] / "dsc" / "validation"
     trees = [
-        ast.parse(file.read_text()) for file in sources.glob("*.py") if file.name not in {"review.py", "turns.py"}
+        ast.parse(file.read_text())
+        for file in sources.glob("*.py")
+        if file.name not in {"candidates.py", "review.py", "turns.py"}
     ]  # see test_review and test_turns_review
     calls = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)]
     made = [(getattr(call.func, "attr", getattr(call.func, "id", "")), call.args) for call in calls]

@@ -213,3 +213,39 @@ def test_an_object_of_a_problem_file_is_known(project):
     problem = "(define (problem more) (:domain delivery) (:objects attic - room) (:init) (:goal (robot-in attic)))"
     (project / "more.pddl").write_text(problem)
     assert check_project(str(project)) == []
+
+
+PROFILES = [
+    ("profile: bad\nrobot: on_traks\n", 2, "the bundle 'delivery' has no robot 'on_traks'; did you mean 'on_tracks'"),
+    ("profile: bad\ncomponents: {wheels: {speed: 50}}\n", 2, "'wheels.speed' is from 0.1 to 5; found 50"),
+    ("profile: bad\ncomponents: {weels: {speed: 5}}\n", 2, "no component 'weels'; did you mean 'wheels'"),
+    ("profile: bad\nplots: {drve: {to: hall}}\n", 2, "no plot 'drve'; did you mean 'drive'"),
+    ("profile: bad\nplots: {drive: {tu: hall}}\n", 2, "plot 'drive' has no parameter 'tu'"),
+]
+
+
+@pytest.mark.parametrize("place", ["profiles/bad.yaml", "extra/bad.yaml", "bad.yaml"])
+@pytest.mark.parametrize(("text", "line", "said"), PROFILES)
+def test_a_profile_is_checked_with_its_robot_wherever_it_is(project, place, text, line, said):
+    planted(project, [("delivery.py", "simulation=House,", 'simulation=House,\n    robots={"on_tracks": House},', "")])
+    file = project / place
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(text)
+    (found,) = check_project(str(project))
+    assert str(found).startswith(f"{file}:{line}:")
+    assert said in str(found)
+    assert [str(one) for one in check_project(str(file))] == [str(found)]
+
+
+def test_the_robot_of_a_profile_is_one_of_the_bundle(project):
+    (project / "profiles" / "bad.yaml").write_text("profile: bad\nrobot: on_traks\n")
+    (found,) = check_project(str(project))
+    assert "the bundle 'delivery' has no robots by name (Bundle.robots)" in str(found)
+    planted(project, [("delivery.py", "simulation=House,", 'simulation=House,\n    robots={"on_tracks": Tracks},', "")])
+    planted(project, [("delivery.py", "Room = ", "class Tracks(House):\n    def components(self):\n        return [Gripper(self)]\n\n\nRoom = ", "")])  # fmt: skip
+    (project / "profiles" / "bad.yaml").write_text(
+        "profile: tracks\nrobot: on_tracks\ncomponents: {wheels: {speed: 5}}\n"
+    )
+    sys.modules.pop("delivery")
+    (found,) = check_project(str(project))
+    assert "there is no component 'wheels'" in str(found)  # that robot has none
