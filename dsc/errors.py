@@ -11,13 +11,13 @@ from knowledge_base.errors import DscError, InputError, Place
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A mistake of a plot: its place, the violated rule of the profile, and a remedy.
+    """A mistake of a project: its place, its code (one of `dsc.codes`), and a remedy.
 
     A finding of level `warning` concerns a form that is allowed, but rarely intended. A plot with warnings can run.
     """
 
     error: InputError
-    rule: str
+    code: str
     fix: str = ""
     level: Literal["error", "warning"] = "error"
 
@@ -26,9 +26,15 @@ class Finding:
         """Place of the mistake in the text; `None` if unknown."""
         return self.error.place
 
+    @property
+    def text(self) -> str:
+        """The error with its remedy, without its place."""
+        error = str(self.error) if self.place is None else str(self.error).removeprefix(f"{self.place}: ")
+        return error + (f" ({self.fix})" if self.fix else "")
+
     def __str__(self) -> str:
-        """Return one line for people: the error with its remedy and, for a warning, the level."""
-        text = f"{self.error}" + (f" ({self.fix})" if self.fix else "")
+        """Return one line for people: place, error, remedy and, for a warning, the level."""
+        text = f"{self.text}" if self.place is None else f"{self.place}: {self.text}"
         return text if self.level == "error" else f"{text} [{self.level}]"
 
 

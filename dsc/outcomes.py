@@ -84,7 +84,7 @@ class Outcome(_Typed):
         own = {name: one for name, one in get_annotations(cls).items() if not is_class_variable(one)}
         cls.declared, cls._defaults, cls.records = (dict(cls.declared), dict(cls._defaults), dict(cls.records))
         cls.event = event or lower_name(cls.__name__)
-        cls.__init__ = _filled  # type: ignore[method-assign,assignment]
+        cls.__init__ = _filled  # type: ignore[method-assign]
         with class_statement(cls) as names:
             for above in cls.__mro__[1:]:
                 if declared_by := vars(above).get("declared_by"):
@@ -115,9 +115,11 @@ _PLAIN = frozenset({"number", "integer", "boolean", *WORDS})
 _TAKEN = frozenset({"event", "attributes", "observed", "declared", "records", "declared_by"})
 
 
-def _filled(self: Outcome, *, observed: Delta = _UNCHANGED, **values: Any) -> None:
+def _filled(self: Outcome, *given: object, observed: Delta = _UNCHANGED, **values: Any) -> None:
     """Set the attributes of a declared outcome; `__init__` of all subclasses."""
     kind = type(self)
+    if given:
+        raise _values_without_names(kind)
     attributes = {**kind._defaults, **values}  # noqa: SLF001  # a method of the class
     if attributes.keys() != kind.declared.keys():
         _refuse(kind, attributes)
@@ -125,6 +127,12 @@ def _filled(self: Outcome, *, observed: Delta = _UNCHANGED, **values: Any) -> No
     if not _PLAIN.issuperset(kind.declared.values()):
         plain = {name: plain_value(value) for name, value in attributes.items()}
     vars(self).update(attributes, attributes=plain, observed=observed)
+
+
+def _values_without_names(kind: type[Outcome]) -> SchemaError:
+    """Return the error about values without the names of their attributes."""
+    named = ", ".join(f"{name}=…" for name in (*kind.declared, "observed"))
+    return SchemaError(f"the attributes of an outcome have names: {kind.__name__}({named})")
 
 
 def _refuse(kind: type[Outcome], given: Mapping[str, Any]) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import heapq
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -166,12 +167,21 @@ class InputError(DscError):
         text = f"{self.place}: {self.message}" if self.place else self.message
         meant = self.nearest
         if meant is not None:
-            return f"{text}; did you mean '{printable(meant)}'?"
+            return f"{text}; did you mean '{printable(meant)}'{_difference(self.found or '', meant)}?"
         if self.valid:
             names = [printable(shortened(name, MAX_NAME)) for name in self.valid[:8]]
             shown = ", ".join(names) + (", …" if len(self.valid) > 8 else "")
             return f"{text}; valid: {shown}"
         return text
+
+
+def _difference(found: str, meant: str) -> str:
+    """Return how two names differ that look alike, as text; empty for other names."""
+    if found == meant:
+        return ""
+    if unicodedata.normalize("NFKC", found) == unicodedata.normalize("NFKC", meant):
+        return ", which has another Unicode form"
+    return ", with another case" if found.casefold() == meant.casefold() else ""
 
 
 _collected: ContextVar[list[InputError] | None] = ContextVar("collected", default=None)

@@ -5,16 +5,17 @@ from __future__ import annotations
 import os
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, findings_with, form_of, print_findings
 from dsc.errors import Finding
 from knowledge_base.cli.console import print_json
 from knowledge_base.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from dsc.components.component import Component
     from dsc.dynamic.library import Library
@@ -31,8 +32,8 @@ app = typer.Typer(
 
 BAD_INPUT = 2
 """Exit status of `check` with findings, and of every command with invalid input."""
-UNKNOWN_PLOT = "known plot"
-"""The rule of findings that may result from an unreadable neighbouring file."""
+UNKNOWN_PLOT = "known-plot"
+"""The code of findings that may result from an unreadable neighbouring file."""
 MAX_BROKEN = 3
 """Maximum number of unreadable neighbouring files that are reported."""
 PIPE_WIDTH = 160
@@ -72,8 +73,10 @@ def check(
             help="A robot, or components at MODULE:NAME: then skills and parameters are checked, too.",
         ),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print a JSON list of findings.")] = False,
-    strict: Annotated[bool, typer.Option("--strict", help="Warnings count, too.")] = False,
+    json: JSON = False,
+    sarif: SARIF = False,
+    select: SELECT = None,
+    strict: STRICT = False,
 ) -> None:
     """Report the mistakes of plots, one finding per line; warnings report forms that are allowed but rarely intended.
 
@@ -84,23 +87,12 @@ def check(
 
     neighbours = Neighbours()
     components = None if robot is None else _components_of(robot)
-    found = [(file, finding) for file in files for finding in _findings(file, domain, neighbours, components)]
-    print_findings(
-        found, as_json=json, nothing=f"{len(files)} plot{'s' * (len(files) != 1)} checked, no mistakes found"
-    )
+    every = [(file, finding) for file in files for finding in _findings(file, domain, neighbours, components)]
+    found = findings_with(every, select)
+    nothing = f"{len(files)} plot{'s' * (len(files) != 1)} checked, no mistakes found"
+    print_findings(found, form_of(json=json, sarif=sarif), nothing)
     wrong = [finding for _, finding in found if strict or finding.level == "error"]
     raise typer.Exit(BAD_INPUT if wrong else 0)
-
-
-def print_findings(found: Sequence[tuple[Path | str, Finding]], *, as_json: bool, nothing: str) -> None:
-    """Print findings, one per line or as a JSON list; without findings, print the text `nothing`."""
-    if as_json:
-        print_json([_as_data(file, finding) for file, finding in found])
-        return
-    for file, finding in found:
-        typer.echo(f"{finding}" if finding.place else f"{file}: {finding}")
-    if not found:
-        typer.echo(nothing)
 
 
 @app.command()
@@ -273,6 +265,7 @@ def _findings(
 ) -> list[Finding]:
     """Return the findings about one file; an unreadable file is one finding."""
     from dsc.validation import review_plot, validate_plot
+    from dsc.validation.ignored import without_ignored
 
     known = _schema(file, domain)
     try:
@@ -283,7 +276,8 @@ def _findings(
         findings = validate_plot(plot, library, known, skills, declared) or review_plot(plot, library)
     except InputError as error:
         return [Finding(error, "readable")]
-    if any(finding.rule == UNKNOWN_PLOT for finding in findings):
+    findings = without_ignored(findings, [file])
+    if any(finding.code == UNKNOWN_PLOT for finding in findings):
         findings += [Finding(error, "readable") for error in broken[:MAX_BROKEN]]
     return findings
 
@@ -306,21 +300,6 @@ def _schema(file: Path, domain: Path | None) -> Schema | None:
     places = (folder / "domain.pddl", folder.parent / "domain.pddl")
     found = next((place for place in places if place.is_file()), None)
     return None if found is None else Schema.from_pddl(found)
-
-
-def _as_data(file: Path | str, finding: Finding) -> dict[str, Any]:
-    error, place = finding.error, finding.place
-    return {
-        "file": (place.source if place else None) or str(file),
-        "line": place.line if place else None,
-        "column": place.column if place else None,
-        "message": error.message,
-        "found": error.found,
-        "nearest": error.nearest,
-        "rule": finding.rule,
-        "fix": finding.fix or None,
-        "level": finding.level,
-    }
 
 
 def _files(library: Library) -> list[Path]:

@@ -45,12 +45,12 @@ def check_parameters(subject: Subject) -> Iterator[Finding]:
 def _own(subject: Subject, name: str, parameter: PlotParameter) -> Iterator[Finding]:
     here: Path = ("parameters", name)
     for problem in parameter.range.problems():
-        yield subject.finding(here, "parameter roles", f"parameter '{name}': {problem}")
+        yield subject.finding(here, "parameter-roles", f"parameter '{name}': {problem}")
         return
     if parameter.required:
         if parameter.changed_by != "plots":
             message = f"'{name}' needs a default, because not every user of the plot may set it"
-            yield subject.finding(here, "parameter roles", message, "a profile may set another one")
+            yield subject.finding(here, "parameter-roles", message, "a profile may set another one")
     elif isinstance(parameter.default, Constant) and parameter.bounded:
         yield from _fits(subject, f"{subject.plot.name}.{name}", parameter, parameter.default, (*here, "default"))
 
@@ -66,7 +66,7 @@ def _handed(
             try:
                 refuse_change(full, who, parameter.changed_by)
             except SchemaError as refused:
-                yield subject.caught(refused, here, "parameter roles", ALLOW)
+                yield subject.caught(refused, here, "parameter-roles", ALLOW)
                 continue
             if isinstance(term, Constant) and parameter.bounded:
                 yield from _fits(subject, full, parameter, term, here)
@@ -76,7 +76,7 @@ def _fits(subject: Subject, name: str, parameter: PlotParameter, term: Constant,
     try:
         parameter.range.check(name, term.value)
     except InputError as error:
-        yield subject.caught(error, path, "parameter roles")
+        yield subject.caught(error, path, "parameter-roles")
 
 
 def check_outputs(subject: Subject) -> Iterator[Finding]:
@@ -90,7 +90,7 @@ def check_outputs(subject: Subject) -> Iterator[Finding]:
         if name not in assigned:
             fix = "`assign` it on the way to the end, or add `initial`"
             message = f"the output '{name}' never gets a value"
-            yield subject.finding(("outputs", name), "outputs are given", message, fix)
+            yield subject.finding(("outputs", name), "outputs-are-given", message, fix)
 
 
 def _actions(state: AnyState) -> Iterator[ExternalAction | Internal]:
@@ -141,7 +141,7 @@ def _passed_by_rule(subject: Subject, rule: Rule, path: Path) -> Iterator[Findin
     if not to_state:  # steps of plans
         used += [one for one in library if one.implements and (not rule.steps or one.implements in rule.steps)]
     message = "no plot that is entered then has a parameter '{}'"
-    yield from _untaken(subject, used, rule.do.passed, path, "known parameter", message)
+    yield from _untaken(subject, used, rule.do.passed, path, "known-parameter", message)
 
 
 def _passed(subject: Subject, transition: Transition, path: Path) -> Iterator[Finding]:
@@ -154,7 +154,7 @@ def _passed(subject: Subject, transition: Transition, path: Path) -> Iterator[Fi
         f"arguments are passed by a transition that leads {where}",
         "pass them to a state with `use` or `dynamic`",
     )
-    yield subject.finding(path, "arguments are taken", message, fix)
+    yield subject.finding(path, "arguments-are-taken", message, fix)
 
 
 def _known(subject: Subject, state: Step, given: Iterable[str], path: Path) -> Iterator[Finding]:
@@ -164,12 +164,12 @@ def _known(subject: Subject, state: Step, given: Iterable[str], path: Path) -> I
             yield from _unknown(subject, used, given, path)
     else:
         message = "no candidate has a parameter '{}'"
-        yield from _untaken(subject, contents, given, path, "candidates conform", message)
+        yield from _untaken(subject, contents, given, path, "candidates-conform", message)
 
 
 def _unknown(subject: Subject, used: ActionPlot, given: Iterable[str], path: Path) -> Iterator[Finding]:
     message = f"plot '{used.name}' has no parameter '{{}}'"
-    yield from _untaken(subject, [used], given, path, "known parameter", message)
+    yield from _untaken(subject, [used], given, path, "known-parameter", message)
 
 
 def _untaken(
@@ -241,14 +241,14 @@ def _given(subject: Subject, name: str, path: Path, need: _Need, entrances: _Ent
         return
     if entrances.by_default(name, path):
         message = f"state '{name}' can be entered without a transition, but plot '{need.plot}' needs '{key}'"
-        yield subject.finding(path, "parameters are given", message, f"add `{key}: …` under its `with`")
+        yield subject.finding(path, "parameters-are-given", message, f"add `{key}: …` under its `with`")
     for way, written in silent:
         by = "a transition" if written else f"the rule '{way.rule}'" if way.rule else "a rule's recovery"
         message = f"{by} leads to '{name}' and does not pass '{key}', which plot '{need.plot}' needs"
         fix = f"add `{key}: …` under {'its `pass`' if written else '`with`'}"
-        yield subject.finding(written or path, "parameters are given", message, fix)
+        yield subject.finding(written or path, "parameters-are-given", message, fix)
 
 
 def _missing(subject: Subject, need: _Need, path: Path) -> Finding:
     message = f"plot '{need.plot}' needs its parameter '{need.parameter}'"
-    return subject.finding(path, "parameters are given", message, f"add `{need.parameter}: …` under `with`")
+    return subject.finding(path, "parameters-are-given", message, f"add `{need.parameter}: …` under `with`")

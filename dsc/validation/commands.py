@@ -22,7 +22,7 @@ def check_commands(subject: Subject) -> Iterator[Finding]:
         name = None if isinstance(action, Trigger) else component_of(action)  # the check of skills covers triggers
         if name is not None and name not in (components or ()):
             message = f"there is no component '{name}'"
-            yield subject.finding(path, "known component", message, found=name, valid=components)
+            yield subject.finding(path, "known-component", message, found=name, valid=components)
         elif name is not None and name in subject.interfaces:
             yield from _command(subject, action, path, who, subject.interfaces[name])
 
@@ -37,12 +37,12 @@ def _command(
             try:
                 interface.require_mode(component, mode)
             except UnknownNameError as error:
-                yield subject.caught(error, (*path, "to"), "component mode")
+                yield subject.caught(error, (*path, "to"), "component-mode")
         case Send(send=port):
             try:
                 interface.message(*port.split("."))
             except UnknownNameError as error:
-                yield subject.caught(error, (*path, "send"), "component message")
+                yield subject.caught(error, (*path, "send"), "component-message")
         case _:
             pass
 
@@ -55,9 +55,9 @@ def _setting(subject: Subject, action: Configure, path: Path, who: Who, interfac
             declared.range.check(action.set, action.to.value)
     except InputError as error:
         key = "set" if isinstance(error, UnknownNameError) else "to"
-        yield subject.caught(error, (*path, key), "component parameter")
+        yield subject.caught(error, (*path, key), "component-parameter")
         return
     try:
         refuse_change(action.set, who, declared.changed_by)
     except SchemaError as refused:
-        yield subject.caught(refused, (*path, "set"), "component parameter", ALLOW)
+        yield subject.caught(refused, (*path, "set"), "component-parameter", ALLOW)

@@ -119,7 +119,7 @@ class _Data:
             if not self._checker.knows(name):
                 valid = {*FREE_TYPES, *self._schema.types, *self._subject.records}
                 message = f"there is no type '{name}'"
-                yield self._subject.finding(path, "known type", message, found=name, valid=valid)
+                yield self._subject.finding(path, "known-type", message, found=name, valid=valid)
 
     def _state(self, state: State, path: Path) -> Iterator[Finding]:
         for key, block in state.blocks():
@@ -221,12 +221,15 @@ class _Data:
             check_arguments(signature, values)
         except InputError as error:
             here = (*path, "with", error.found) if error.found else (*path, key)
-            yield self._subject.caught(error, here, "skill arguments")
+            yield self._subject.caught(error, here, "skill-arguments")
 
     def _variable(self, name: str, path: Path) -> Iterator[Finding]:
-        if name not in self._assigned:
+        if name in self._plot.parameters:
+            message = f"'{name}' is a parameter, which the plot only reads; assign a variable"
+            yield self._subject.finding(path, "declared-variable", message, found=name)
+        elif name not in self._assigned:
             message = f"there is no variable '{name}'"
-            yield self._subject.finding(path, "declared variable", message, found=name, valid=self._assigned)
+            yield self._subject.finding(path, "declared-variable", message, found=name, valid=self._assigned)
 
     # -- rules and handlers ------------------------------------------------------------------------------
 
@@ -340,7 +343,7 @@ class _Data:
             types = self._checker.parts_of(text, parts, is_list=isinstance(literal_value(term, str), list))
             if isinstance(types, str):
                 message = f"'{path[-1]}' is of type {text}, and {term_text(term)} {types}"
-                yield self._subject.finding(path, "value fits", message, found=term_text(term))
+                yield self._subject.finding(path, "value-fits", message, found=term_text(term))
                 continue
             for name, part in parts.items():
                 yield from self._term(part, scope, (*path, int(name) if name.isdecimal() else name), types.get(name))
@@ -393,16 +396,16 @@ class _Data:
         if named and isinstance(term, Constant) and isinstance(term.value, str) and term.value != term.value.lower():
             message = f"'{name}' is of type {wanted}, and the name of an object is in lower case"
             lower = term.value.lower()
-            yield self._subject.finding(path, "value fits", message, f"write {lower}", found=term.value)
+            yield self._subject.finding(path, "value-fits", message, f"write {lower}", found=term.value)
         different = self._checker.difference(data_type(given), kind)
         if different is not None:
             message = f"'{name}' is of type {wanted}, and {to_text(term)} is {different}"
-            yield self._subject.finding(path, "value fits", message, found=to_text(term))
+            yield self._subject.finding(path, "value-fits", message, found=to_text(term))
         elif isinstance(term, Constant) and all(map(self._checker.knows, names_in(kind))):
             try:
                 kind.check(f"'{name}'", term.value, self._subject.records)
             except InputError as error:
-                yield self._subject.caught(error, path, "value fits")
+                yield self._subject.caught(error, path, "value-fits")
                 return
             if isinstance(term.value, str):
                 yield from self._language.unknown_object(term.value, wanted, path)

@@ -57,7 +57,7 @@ def check_wiring(subject: Subject) -> Iterator[Finding]:
 
 def _reserved(subject: Subject, event: str, path: Path) -> Finding:
     message = f"the event '{event}' is fired by the executive itself"
-    return subject.finding(path, "reserved event", message, "give yours another name", found=event)
+    return subject.finding(path, "reserved-event", message, "give yours another name", found=event)
 
 
 def _rule_targets(subject: Subject) -> Iterator[Finding]:
@@ -74,7 +74,7 @@ def _rule_targets(subject: Subject) -> Iterator[Finding]:
                 if here or (is_planned(state) and answers_in_plans(rule, library)):
                     where = f"{'' if here else 'a plan at '}'{name}'"
                     yield subject.finding(
-                        ("rules", number, "do", "then"), "no border crossing",
+                        ("rules", number, "do", "then"), "no-border-crossing",
                         f"the rule's way from {where} to '{rule.then}' crosses a border",
                         "name the states of the rule with `of`", found=rule.then, valid=scope.states,
                     )  # fmt: skip
@@ -92,14 +92,14 @@ def _outcomes_of_reactions(subject: Subject) -> Iterator[Finding]:
         valid = {*outcomes, *SKILL_FAILURES}
         for event in do.on.keys() - valid:
             message = f"plot '{do.use}' has no outcome '{event}'"
-            yield subject.finding((*path, "on", event), "known outcome", message, found=event, valid=valid)
+            yield subject.finding((*path, "on", event), "known-outcome", message, found=event, valid=valid)
         if path[0] == "rules" and not _answers_here(subject, subject.plot.rules[int(path[1])]):
             continue
         for event in outcomes.keys() - do.on.keys():
             message = f"nothing handles the outcome '{event}' of plot '{do.use}'"
             then = RESUME if path[0] == "handlers" else GIVE_UP
             fix = f"add `on: {{{event}: {then}}}` here, or the name of a state instead of `{then}`"
-            yield subject.finding((*path, "use"), "every outcome is wired", message, fix)
+            yield subject.finding((*path, "use"), "every-outcome-is-wired", message, fix)
 
 
 def _answers_here(subject: Subject, rule: Rule) -> bool:
@@ -118,7 +118,7 @@ def _cyclic_omissions(subject: Subject, expanded: ActionPlot) -> Iterator[Findin
     if circle_of({name: [way.target or "" for _, way in state.transitions()] for name, state in connectors}):
         message = "these rules may skip all steps of a cycle without end"
         fix = "let `then` lead to a state where a run can rest"
-        yield subject.finding(("rules",), "connectors lead on", message, fix)
+        yield subject.finding(("rules",), "connectors-lead-on", message, fix)
 
 
 def _handled(states: Iterable[AnyState]) -> dict[str, bool]:
@@ -143,7 +143,7 @@ def _outcomes(
         else:
             message = f"state '{name}' does not handle its outcome '{event}'"
             fix = f"add `{event}: STATE` under `on`, or a rule"
-        yield subject.finding((*path, "on", event), "every outcome is wired", message, fix)
+        yield subject.finding((*path, "on", event), "every-outcome-is-wired", message, fix)
 
 
 def _not_always(plot: ActionPlot, event: str) -> tuple[str, str]:
@@ -169,7 +169,7 @@ def _skills(
         for renamed in action.names:
             if renamed not in outcomes:
                 message = f"skill '{action.trigger}' has no outcome '{renamed}'"
-                yield subject.finding((*here, "as", renamed), "known outcome", message, found=renamed, valid=outcomes)
+                yield subject.finding((*here, "as", renamed), "known-outcome", message, found=renamed, valid=outcomes)
         events = [action.names.get(event, event) for event in outcomes]
         yield from (_reserved(subject, event, (*here, "trigger")) for event in events if event in EXECUTIVES)
         if (subject.skills or {})[action.trigger].pattern == "event":
@@ -256,7 +256,7 @@ def _known_events(subject: Subject, state: State, path: Path, traffic: _Traffic)
             valid = (traffic.anywhere | inside) - RESERVED | {DONE}
             fix = "events from outside are declared under `receives`"
             message = f"nothing here fires the event '{event}'"
-            yield subject.finding((*path, "on", event), "known event", message, fix, found=event, valid=valid)
+            yield subject.finding((*path, "on", event), "known-event", message, fix, found=event, valid=valid)
 
 
 def _emissions(subject: Subject, path: Path, traffic: _Traffic) -> Iterator[Finding]:
@@ -270,7 +270,7 @@ def _emissions(subject: Subject, path: Path, traffic: _Traffic) -> Iterator[Find
                 message = f"the plot does not declare the outcome '{fired}', and no state listens to it"
                 valid = set(emits) | traffic.heard - {DONE, NO_CANDIDATE}
                 fix = "declare it under `emits`"
-                yield subject.finding(here, "declared outcome", message, fix, found=fired, valid=valid)
+                yield subject.finding(here, "declared-outcome", message, fix, found=fired, valid=valid)
             elif fired in emits and fired == transition.emit:
                 yield from _attributes(subject, fired, set(transition.arguments), here)
 
@@ -279,7 +279,7 @@ def _final(subject: Subject, state: FinalState, path: Path) -> Iterator[Finding]
     fired, emits, here = state.emit, subject.plot.emits, (*path, "emit")
     if fired is not None and fired not in emits:
         message, fix = f"the plot does not declare the outcome '{fired}'", "declare it under `emits`"
-        yield subject.finding(here, "declared outcome", message, fix, found=fired, valid=emits)
+        yield subject.finding(here, "declared-outcome", message, fix, found=fired, valid=emits)
     elif fired is not None:
         yield from _attributes(subject, fired, set(state.arguments), here)
 
@@ -289,6 +289,6 @@ def _attributes(subject: Subject, event: str, given: set[str], path: Path) -> It
     for name in sorted(given ^ declared):
         message = f"attribute '{name}' of the outcome '{event}' "
         if name in declared:
-            yield subject.finding(path, "outcome attributes", message + "is missing", found=name)
+            yield subject.finding(path, "outcome-attributes", message + "is missing", found=name)
         else:
-            yield subject.finding(path, "outcome attributes", message + "is not declared", found=name, valid=declared)
+            yield subject.finding(path, "outcome-attributes", message + "is not declared", found=name, valid=declared)

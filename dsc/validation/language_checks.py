@@ -90,7 +90,7 @@ class LanguageChecker:
         unknown = sorted(free_variables(plain) - names.keys())
         for name in unknown:
             message = f"there is no variable '?{name}' here"
-            yield self._subject.finding(path, "declared variable", message, found=name, valid=names)
+            yield self._subject.finding(path, "declared-variable", message, found=name, valid=names)
         if not unknown and self._subject.strict:
             yield from self._evaluable(
                 plain, names, path, "term", lambda schema, known: check_term(plain, schema, known)
@@ -101,7 +101,7 @@ class LanguageChecker:
         """Yield a finding about a name that no known object of a type has."""
         mistake = None if self._objects is None else self._objects.mistake(name, kind)
         if mistake is not None:
-            yield self._subject.caught(mistake, path, "known object", _DECLARE)
+            yield self._subject.caught(mistake, path, "known-object", _DECLARE)
 
     def _plain(
         self, form: _F, names: Types, path: Path, rule: str, convert: Callable[[_F, DataReader], _F]
@@ -141,7 +141,7 @@ class LanguageChecker:
             yield self._subject.caught(error, path, rule)
             return
         for mistake in () if self._objects is None else self._objects.mistakes(form, names):
-            yield self._subject.caught(mistake, path, "known object", _DECLARE)
+            yield self._subject.caught(mistake, path, "known-object", _DECLARE)
 
     def _compared(self, condition: Expression, names: Types, path: Path) -> Iterator[Finding]:
         """Yield findings about comparisons with choices and other words, whose types conditions do not know."""

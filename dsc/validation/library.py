@@ -96,7 +96,7 @@ def _check_outcomes(subject: Subject) -> Iterator[Finding]:
     rules = [rule if not rule.leads_away or rule.then in subject.names else _here(rule) for rule in plot.rules]
     copied = plot.model_copy(update={"rules": tuple(rules)})
     again = Subject(copied, subject.library, subject.schema, subject.skills, subject.components, subject.objects)
-    return (finding for finding in check_wiring(again) if finding.rule == "every outcome is wired")
+    return (finding for finding in check_wiring(again) if finding.code == "every-outcome-is-wired")
 
 
 def _here(rule: Rule) -> Rule:

@@ -40,7 +40,7 @@ def check_connectors(subject: Subject) -> Iterator[Finding]:
         if name in circle:
             message = f"connectors lead from '{name}' back to it"
             fix = "let one of them lead to a state, where a run can rest"
-            yield subject.finding(path, "connectors lead on", message, fix, found=name)
+            yield subject.finding(path, "connectors-lead-on", message, fix, found=name)
 
 
 def _branches(subject: Subject, name: str, path: Path) -> Iterator[Finding]:
@@ -80,7 +80,7 @@ def check_reach(subject: Subject) -> Iterator[Finding]:
         if isinstance(state, DynamicState) and not state.dynamic and state.goal is None:
             message = f"the dynamic state '{name}' has nothing to choose from"
             fix = "name candidates, or a `goal`"
-            yield subject.finding((*path, "dynamic"), "something to choose", message, fix)
+            yield subject.finding((*path, "dynamic"), "something-to-choose", message, fix)
     if subject.strict and not subject.plot.generated:
         yield from _unreached(subject)
 
@@ -139,7 +139,7 @@ def _circle(subject: Subject) -> Iterator[Finding]:
             start = circle.index(own) if own in circle else 0
             way = " -> ".join([*circle[start:-1], *circle[: start + 1]])
             message, fix = f"plots use each other in a cycle: {way}", "choose one of them in a dynamic state"
-            yield subject.finding((*path, "use"), "no circle", message, fix, found=name)
+            yield subject.finding((*path, "use"), "no-circle", message, fix, found=name)
             return
 
 
@@ -173,16 +173,16 @@ def check_completion(subject: Subject, wired: Mapping[str, AnyState]) -> Iterato
     for name, state, path in subject.states:
         if type(state) is State and DONE in state.on and any(isinstance(a, Trigger) for a in state.entry):
             message = f"state '{name}' has no content, so it is done immediately and would cancel its skill"
-            yield subject.finding((*path, "on", DONE), "done at once", message, "wire the outcome of the skill")
+            yield subject.finding((*path, "on", DONE), "done-at-once", message, "wire the outcome of the skill")
         after = wired[name]
         if not isinstance(after, State):
             continue
         if DONE not in after.on and _completes(state, silent):
             message = f"state '{name}' does not handle its completion"
-            yield subject.finding((*path, "on"), "completion is wired", message, "add `done: STATE` under `on`")
+            yield subject.finding((*path, "on"), "completion-is-wired", message, "add `done: STATE` under `on`")
         elif isinstance(state, State) and DONE in state.on and (endless := _endless(state, subject.library)):
             message = f"state '{name}' is never done: {endless} has no final state"
-            yield subject.finding((*path, "on", DONE), "done can fire", message, "remove `done`, or add an end")
+            yield subject.finding((*path, "on", DONE), "done-can-fire", message, "remove `done`, or add an end")
 
 
 def _completes(state: AnyState, silent: Callable[[str], bool]) -> bool:

@@ -16,6 +16,7 @@ from dsc.model.rules import CONTINUE, ENTER, Handler, Rule
 from dsc.model.states import CompositeState, State
 from dsc.validation.candidates import MOST, review_candidates
 from dsc.validation.library import MAX_FINDINGS
+from dsc.validation.names import review_names
 from dsc.validation.subject import Subject
 from dsc.validation.turns import waiting_parts
 from knowledge_base.language.checking.contradiction import contradictory
@@ -41,8 +42,10 @@ def review_plot(plot: ActionPlot, library: Library, exclusive: Collection[str] =
     if plot.dialect != "dsc":
         return []
     subject = Subject(plot, library)
-    checks = (_rules(subject), _handlers(subject), _transitions(subject), review_candidates(subject),
-              waiting_parts(subject, exclusive))  # fmt: skip
+    checks = (
+        _rules(subject), _handlers(subject), _transitions(subject), review_candidates(subject), review_names(subject),
+        waiting_parts(subject, exclusive),
+    )  # fmt: skip
     return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
 
 

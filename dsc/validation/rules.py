@@ -55,12 +55,12 @@ def _rule(subject: Subject, rule: Rule, path: Path, steps: set[str]) -> Iterator
 def _handler(subject: Subject, handler: Handler, path: Path) -> Iterator[Finding]:
     if handler.interrupt and not handler.do.acts:
         message = "a handler that only tells something interrupts nothing"
-        yield subject.finding(path, "handler", message, "remove `interrupt`, or name a plot to `use`")
+        yield subject.finding(path, "handlers", message, "remove `interrupt`, or name a plot to `use`")
     valid = {RESUME, *subject.plot.states}
     for outcome, then in handler.do.on.items():
         if then not in valid:
             message = f"a handler cannot '{then}' after its plot"
-            yield subject.finding((*path, "do", "on", outcome), "rule response", message, found=then, valid=valid)
+            yield subject.finding((*path, "do", "on", outcome), "rule-response", message, found=then, valid=valid)
 
 
 def _no_step(subject: Subject, name: str, path: Path, steps: set[str]) -> Finding:
@@ -83,11 +83,11 @@ def _response(subject: Subject, rule: Rule, path: Path, key: Path) -> Iterator[F
     if rule.then not in valid:
         where = "" if rule.on is not None else f" {rule.place} a step"
         message = f"a rule cannot '{rule.then}'{where}"
-        yield subject.finding((*path, *key), "rule response", message, found=rule.then, valid=valid)
+        yield subject.finding((*path, *key), "rule-response", message, found=rule.then, valid=valid)
     elif rule.do.passed and rule.then not in subject.names.keys() | {RETRY, ENTER}:
         message = f"arguments are passed by a rule whose response is '{rule.then}'"
         fix = "pass them with `retry`, or to a state"
-        yield subject.finding((*path, "pass"), "arguments are taken", message, fix)
+        yield subject.finding((*path, "pass"), "arguments-are-taken", message, fix)
 
 
 # -- names that transitions, rules and handlers can read -----------------------------------------------------
@@ -143,14 +143,14 @@ class RuleScope:
         for name in sorted(self._subject.types.keys() & set(read) if self._in_plans(rule) else ()):
             message = f"'?{name}' is a variable of this plot; a rule that answers for steps of plans cannot read it"
             fix = "read a fact instead; or name with `of` steps that are states of this plot"
-            yield self._subject.finding(path, "declared variable", message, fix, found=f"?{name}")
+            yield self._subject.finding(path, "declared-variable", message, fix, found=f"?{name}")
 
     def never(self, rule: Rule, path: Path) -> Finding:
         """Return the finding about a rule whose event never occurs at its states."""
         what = " or ".join(f"'{name}'" for name in rule.of) or "no state of this plot"
         message = f"{what} {'cannot' if rule.of else 'can'} end with '{rule.on}'"
         valid = set(chain.from_iterable(self._sources(rule)))
-        return self._subject.finding((*path, "on"), "rule event", message, found=rule.on, valid=valid)
+        return self._subject.finding((*path, "on"), "rule-event", message, found=rule.on, valid=valid)
 
     def attributes(self, handler: Handler) -> Types | None:
         """Return the types of the attributes of a handler's event; `None` if the attributes are unknown."""
@@ -169,7 +169,7 @@ class RuleScope:
             if handler.on not in known and handler.on not in COMPONENT_EVENTS:
                 message = f"nothing here fires the event '{handler.on}'"
                 fix = "events from outside are declared under `receives`, those of components come by `listen`"
-                yield self._subject.finding((*path, "on"), "known event", message, fix, found=handler.on, valid=known)
+                yield self._subject.finding((*path, "on"), "known-event", message, fix, found=handler.on, valid=known)
         elif skills and listen.trigger not in skills:
             yield unknown_skill(self._subject, (*path, "listen", "trigger"), listen)
         elif skills:
@@ -177,7 +177,7 @@ class RuleScope:
             if handler.on not in brought:
                 message = f"'{listen.trigger}' does not bring the event '{handler.on}'"
                 here = (*path, "listen", "trigger")
-                yield self._subject.finding(here, "known event", message, found=handler.on, valid=brought)
+                yield self._subject.finding(here, "known-event", message, found=handler.on, valid=brought)
 
     def _in_plans(self, rule: Rule) -> bool:
         """Return whether a rule may apply to steps of plans for this plot's goals."""
@@ -209,7 +209,7 @@ class RuleScope:
 def unknown_skill(subject: Subject, path: Path, trigger: Trigger) -> Finding:
     """Return the finding about a trigger whose component or skill is missing."""
     message, found = f"no component offers the skill or event '{trigger.trigger}'", trigger.trigger
-    return subject.finding(path, "known skill", message, found=found, valid=subject.skills or ())
+    return subject.finding(path, "known-skill", message, found=found, valid=subject.skills or ())
 
 
 def _common(name: str, sources: Iterable[Types]) -> str | None:

@@ -78,7 +78,7 @@ def _shape(subject: Subject) -> Iterator[Finding]:
         # A state with content may work without end; otherwise its completion has a transition.
         if subject.strict and type(state) is State and not any(map(subject.leaving, subject.way_to(path))):
             fix = "wire its outcomes, or make it `final: true`"
-            yield subject.finding(path, "no dead end", f"no transition leaves the state '{name}'", fix)
+            yield subject.finding(path, "no-dead-end", f"no transition leaves the state '{name}'", fix)
     yield from check_rules(subject)
 
 
@@ -115,7 +115,7 @@ def _elsewhere(subject: Subject, target: str, siblings: Mapping[str, AnyState], 
     elif subject.strict:
         message = f"the transition to '{target}' crosses a border"
         fix = "transitions stay in the state, region or plot around"
-        yield subject.finding(path, "no border crossing", message, fix, found=target)
+        yield subject.finding(path, "no-border-crossing", message, fix, found=target)
 
 
 def _uses(subject: Subject, state: AnyState, path: Path) -> Iterator[Finding]:
@@ -124,7 +124,7 @@ def _uses(subject: Subject, state: AnyState, path: Path) -> Iterator[Finding]:
         held = {f"?{name}" for name in (*plot.variables, *plot.parameters)}
         if state.use not in held:
             message = f"there is no variable '{state.use}'"
-            yield subject.finding((*path, "use"), "known plot", message, found=state.use, valid=held)
+            yield subject.finding((*path, "use"), "known-plot", message, found=state.use, valid=held)
     elif isinstance(state, SubmachineState) and state.use not in library:
         yield subject.unknown_plot((*path, "use"), state.use)
     elif isinstance(state, DynamicState):
@@ -175,7 +175,7 @@ def _timing(subject: Subject) -> Iterator[Finding]:
             if least is not None and after is not None and after < least:
                 message = f"state '{name}' lasts at least {least:g} s, so its timeout cannot be taken after {after:g} s"
                 here = (*path, "after", number, "seconds")
-                yield subject.finding(here, "at least", message, f"let it be {least:g} s or more")
+                yield subject.finding(here, "at-least", message, f"let it be {least:g} s or more")
 
 
 def _seconds(term: Term | None) -> float | None:
@@ -197,7 +197,7 @@ def check_size(subject: Subject) -> Iterator[Finding]:
         what = "rules and handlers" if plot.rules and plot.handlers else "rules" if plot.rules else "handlers"
         message = f"the {what} would make {made} transitions; at most {MAX_ANSWERS} are made"
         here = ("rules",) if plot.rules else ("handlers",)
-        yield subject.finding(here, "bounded rules", message, "name the states of a rule with `of`")
+        yield subject.finding(here, "bounded-rules", message, "name the states of a rule with `of`")
 
 
 def _answers(rule: Rule, answered: Mapping[str, int], subject: Subject) -> int:

@@ -6,13 +6,17 @@ from typing import Annotated
 
 import typer
 
+from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, findings_with, form_of, print_findings
+
 
 def check_command(
     target: Annotated[
         str, typer.Argument(metavar="TARGET", help="A project folder, a plot, a Python file, or any robot.")
     ] = ".",
-    json: Annotated[bool, typer.Option("--json", help="Print a JSON list of findings.")] = False,
-    strict: Annotated[bool, typer.Option("--strict", help="Warnings count, too.")] = False,
+    json: JSON = False,
+    sarif: SARIF = False,
+    select: SELECT = None,
+    strict: STRICT = False,
 ) -> None:
     """Check a whole project: PDDL, plots, profiles, components, goal and knowledge, and their agreement.
 
@@ -21,7 +25,7 @@ def check_command(
     """
     import logging
 
-    from dsc.cli.plots import BAD_INPUT, print_findings
+    from dsc.cli.plots import BAD_INPUT
     from planning.robot.checking import check_project
 
     logging.disable()  # each programming error is a finding
@@ -29,6 +33,7 @@ def check_command(
         findings = check_project(target)
     finally:
         logging.disable(logging.NOTSET)
-    print_findings([(target, finding) for finding in findings], as_json=json, nothing=f"{target}: no mistakes found")
-    wrong = [finding for finding in findings if strict or finding.level == "error"]
+    found = findings_with([(target, finding) for finding in findings], select)
+    print_findings(found, form_of(json=json, sarif=sarif), f"{target}: no mistakes found")
+    wrong = [finding for _, finding in found if strict or finding.level == "error"]
     raise typer.Exit(BAD_INPUT if wrong else 0)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -167,7 +168,7 @@ def _deployed(
         raise
     try:
         if simulation is not None and setup.store is not None and not setup.resumes:
-            with contained(f"{type(simulation).__name__}.begin", _MAY_RAISE):
+            with _usable(f"{type(simulation).__name__}.begin"):
                 simulation.begin()
         begin(robot.knowledge, bundle, simulation, "deployment", key="deployment")
         if task.goal is not None:
@@ -189,7 +190,7 @@ def initial_knowledge(bundle: Bundle, simulation: Simulation | None) -> Delta:
     """Return the initial knowledge of a bundle and its simulation; errors as for `deploy`."""
     if simulation is None:
         return bundle.knowledge
-    with contained(f"{type(simulation).__name__}.knowledge", _MAY_RAISE):
+    with _usable(f"{type(simulation).__name__}.knowledge"):
         try:
             return bundle.knowledge.then(simulation.knowledge())
         except InputError as error:
@@ -220,14 +221,25 @@ def simulated(bundle: Bundle, setup: Setup) -> Simulation | None:
     kind = bundle.simulation_for(setup.profile)
     if kind is None:
         return None
-    with contained(kind.__name__, _MAY_RAISE):
+    with _usable(kind.__name__):
         return kind(setup)
 
 
 def _components(bundle: Bundle, simulation: Simulation | None) -> list[Component]:
-    with contained(f"the components of '{bundle.name}'", _MAY_RAISE):
+    with _usable(f"the components of '{bundle.name}'"):
         found = [*components_of(gathered([bundle])), *(() if simulation is None else simulation.components())]
     return [*require_instances(found)]
+
+
+@contextmanager
+def _usable(name: str) -> Iterator[None]:
+    """Raise `ProgrammingError` for an exception of the user's code, except errors of input, paths and storage."""
+    try:
+        with contained(name, _MAY_RAISE):
+            yield
+    except FileNotFoundError as error:  # the code opens a file without a check
+        with contained(name):
+            raise error from None
 
 
 _MAY_RAISE = (InputError, OSError)

@@ -22,6 +22,7 @@ from dsc.skills import SkillSignature, signatures
 from dsc.text.plot_files import load_plot
 from dsc.text.profiles import Profile, adapted, load_profile
 from dsc.validation import review_plot, validate_plot
+from dsc.validation.ignored import without_ignored
 from knowledge_base.errors import InputError, Place, UnknownNameError, collecting, tolerated
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import holds
@@ -48,7 +49,7 @@ from planning.robot.targets import bundle_at
 
 READABLE = "readable"
 """The rule of findings about files and parts that cannot be read."""
-_KNOWN_PLOT = "known plot"
+_KNOWN_PLOT = "known-plot"
 _PATIENT_SECONDS = 5.0
 """Time limit, in seconds, of the check whether the first goal can be reached."""
 _SKIPPED = frozenset({"build", "dist", "node_modules", "site-packages", "__pycache__"})
@@ -66,8 +67,12 @@ def check_project(target: str) -> list[Finding]:
     folder, the files that no bundle uses are checked too.
     """
     path = Path(target)
+    if path.is_dir() and not _has_robot(path) and (projects := _projects(path)):
+        names = ", ".join(f"`dsc check {project}`" for project in projects)
+        error = InputError("the folder is not a project, but contains projects", place=Place(str(path)))
+        return [Finding(error, READABLE, names)]
     if path.is_file() and path.suffix != ".py":
-        return _sorted(_profile_findings(path) if _is_profile(path) else _files([path]))
+        return _sorted(without_ignored(_profile_findings(path) if _is_profile(path) else _files([path]), [path]))
     with collecting() as errors:
         bundle = _bundle(target) if not path.is_dir() or _has_robot(path) else None
         unread = any(str(one.place.source).endswith(".pddl") for one in errors if one.place is not None)
@@ -82,7 +87,7 @@ def check_project(target: str) -> list[Finding]:
         if bundle is not None:
             read |= {Path(_source(plot) or "").resolve() for plot in bundle.plots}
         findings += _files(file for file in _sources(path) if file.resolve() not in read)
-    return _sorted(findings)
+    return _sorted(without_ignored(findings, _sources(path) if path.is_dir() else ()))
 
 
 def _profile_findings(file: Path) -> list[Finding]:
@@ -108,6 +113,11 @@ def _bundle(target: str) -> Bundle | None:
 
 def _has_robot(folder: Path) -> bool:
     return (folder / "pyproject.toml").is_file() or (folder / "robot.py").is_file()
+
+
+def _projects(folder: Path) -> list[Path]:
+    """Return the projects directly in a folder."""
+    return [one for one in sorted(folder.iterdir()) if one.is_dir() and (one / "pyproject.toml").is_file()]
 
 
 def _sources(folder: Path) -> Iterator[Path]:
@@ -375,7 +385,7 @@ def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) ->
     plots = {name for text in texts for name in _NAMES_PLOT.findall(text)}
     actions = {name for text in texts for name in _IMPLEMENTS.findall(text)}
     missing = {(_KNOWN_PLOT, name) for name in plots} | {(IMPLEMENTED, name) for name in actions}
-    return [one for one in findings if (one.rule, one.error.found) not in missing]
+    return [one for one in findings if (one.code, one.error.found) not in missing]
 
 
 # -- files ---------------------------------------------------------------------------------------------------

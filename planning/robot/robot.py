@@ -33,7 +33,7 @@ from planning.robot.program import RobotProgram
 from planning.robot.progress import Tally
 from planning.robot.report import Report
 from planning.robot.run import Run, require_loop, require_no_loop
-from planning.robot.simulation import SceneWriter
+from planning.robot.simulation import SceneWriter, scene_of
 from planning.robot.task import Task
 
 Prepare = Callable[[Sequencer], object]
@@ -372,7 +372,7 @@ class Robot(RobotProgram):
 
         def ready(sequencer: Sequencer) -> None:
             sequencer.on_signal = on_signal
-            if self.simulation is not None and self.simulation.scene() is not None:
+            if self.simulation is not None and scene_of(self.simulation) is not None:
                 sequencer.trace.listen(SceneWriter(self.simulation, sequencer.trace))
             if prepare is not None:
                 prepare(sequencer)

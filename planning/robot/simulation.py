@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from dsc.chance import choose, uniform
 from dsc.components.component import Component
+from dsc.components.hooks import contained
 from dsc.text.profiles import Profile
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
@@ -151,6 +152,12 @@ class Simulation(ABC):
         """Close files and devices of the world; called once, after the run."""
 
 
+def scene_of(world: Simulation) -> list[dict[str, Any]] | None:
+    """Return the scene; raise `ProgrammingError` if the user's method raises an exception."""
+    with contained(f"{type(world).__name__}.scene"):
+        return world.scene()
+
+
 class SceneWriter:
     """A trace listener that writes a record `scene` after each event that changed the scene."""
 
@@ -163,7 +170,7 @@ class SceneWriter:
         """Write the scene after a record that may have changed it."""
         if record.type not in {"plot", "event"}:
             return
-        scene = self._world.scene()
+        scene = scene_of(self._world)
         if scene is not None and scene != self._drawn:
             self._drawn = scene
             self._trace.record("scene", things=scene)

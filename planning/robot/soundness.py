@@ -20,7 +20,7 @@ from knowledge_base.world.schema import Schema
 from planning.execution.planning_component import PlanningComponent
 from planning.model.domain import PlanningDomain
 
-IMPLEMENTED = "every action has a plot"
+IMPLEMENTED = "every-action-has-a-plot"
 """The rule of a finding about a planning action without a plot."""
 
 
@@ -45,7 +45,7 @@ def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[
                 f"the domain '{domain.name}' has no planning action '{plot.implements}'",
                 place=plot.place(("implements",)), found=plot.implements, valid=domain.actions,
             )  # fmt: skip
-            yield Finding(unknown, "known planning action")
+            yield Finding(unknown, "known-planning-action")
             continue
         names = [parameter.name for parameter in action.parameters]
         for name, parameter in plot.parameters.items():
@@ -54,7 +54,7 @@ def check_implementations(library: Library, domain: PlanningDomain) -> Iterator[
                     f"planning action '{action.name}' has no parameter '?{name}' to give to the plot",
                     place=plot.place(("parameters", name)), found=name, valid=names,
                 )  # fmt: skip
-                yield Finding(missing, "parameters of the action")
+                yield Finding(missing, "parameters-of-the-action")
     for name, action in domain.actions.items():
         yield from _mixed_effects(name, library)
         if implemented and name not in implemented:
@@ -70,7 +70,7 @@ def _mixed_effects(action: str, library: Library) -> Iterator[Finding]:
                 " `effects: assumed`",
                 place=plot.place(("effects",)) or plot.place(("implements",)),
             )
-            yield Finding(error, "effects of the action", "say the same in all plots of an action")
+            yield Finding(error, "effects-of-the-action", "say the same in all plots of an action")
 
 
 _sound: dict[tuple[int, ...], tuple[object, ...]] = {}

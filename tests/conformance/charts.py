@@ -181,7 +181,7 @@ def run(file: Path) -> Result:
         player = _player(parse_scxml(file.read_text(encoding="utf-8"), str(file)), file)
         plot = next(iter(player.library))
         crosses = _crosses(plot)
-        refused = any(one.rule == "no border crossing" for one in validate_plot(_strict(plot), player.library))
+        refused = any(one.code == "no-border-crossing" for one in validate_plot(_strict(plot), player.library))
         if crosses != refused:
             return Result(name, "failed", "", f"crosses borders: {crosses}; refused by dialect dsc: {refused}")
         problem = play(player, plot.name, _script(file, standard=name not in SCRIPT_AGAINST_THE_STANDARD))

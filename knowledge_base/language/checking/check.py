@@ -245,7 +245,11 @@ class _Checker:
         types = self.types_of(term)
         word = isinstance(term, Constant) and isinstance(term.value, str | bool)
         if word or (types is not None and "number" not in types):
-            raise SchemaError(f"'{operator}' works on numbers, and this is none", place=term.place)
+            said, functions = f"'{operator}' works on numbers, and {_written(term)} is none", self.schema.functions
+            name = str(term.value) if isinstance(term, Constant) else ""
+            if name in functions:
+                said += f"; the value of the function is {functions[name]}"
+            raise SchemaError(said, place=term.place)
 
     def arguments(self, signature: Signature, used: Atom | Call) -> None:
         check_arity(signature, len(used.args), used.place)

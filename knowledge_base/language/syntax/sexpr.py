@@ -89,8 +89,37 @@ def read(text: str, source: str | None = None) -> list[Node]:
         else:
             stack[-1][1].append(_word(kind, word, place))
     if len(stack) > 1:
-        raise ParseError("'(' is never closed", place=stack[-1][0])
+        raise _partner_error(stack)
     return top
+
+
+def _partner_error(stack: list[tuple[Place, list[Node]]]) -> ParseError:
+    """Return the error about a '(' without its partner: one inside which a section such as `(:action` begins."""
+    innermost = stack[-1][0]
+    while len(stack) > 1:
+        begun, items = stack.pop()
+        stack[-1][1].append(Group(tuple(items), begun))
+    for definition in stack[0][1]:
+        for section in definition.items if isinstance(definition, Group) else ():
+            found = _section_inside(section)
+            if found is not None:
+                outer, inner = found
+                inside = f"'{inner.head()}' begins inside it, in line {inner.place.line}"
+                return ParseError(f"'(' of '{outer.head()}' is never closed: {inside}", place=outer.place)
+    return ParseError("'(' is never closed", place=innermost)
+
+
+def _section_inside(node: Node) -> tuple[Group, Group] | None:
+    """Return the first group that directly contains a section, and the section."""
+    if not isinstance(node, Group):
+        return None
+    for child in node.items:
+        if isinstance(child, Group) and (child.head() or "").startswith(":"):
+            return node, child
+        found = _section_inside(child)
+        if found is not None:
+            return found
+    return None
 
 
 def _tokens(text: str, source: str | None) -> Iterator[tuple[str, str, Place]]:

@@ -66,7 +66,7 @@ def test_a_typo_is_one_line_with_place_and_remedy(tmp_path: Path) -> None:
     file = written(tmp_path, good=GOOD.replace("done: over", "done: ovre"), helper=HELPER)
     result = run("check", file)
     assert result.exit_code == 2
-    assert result.output == f"{file}:4:28: there is no state 'ovre'; did you mean 'over'?\n"
+    assert result.output == f"{file}:4:28: there is no state 'ovre'; did you mean 'over'? [target]\n"
 
 
 def test_findings_as_data(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_findings_as_data(tmp_path: Path) -> None:
     assert findings(file) == [
         {
             "file": str(file), "line": 4, "column": 28, "message": "there is no state 'ovre'",
-            "found": "ovre", "nearest": "over", "rule": "target", "fix": None, "level": "error",
+            "found": "ovre", "nearest": "over", "code": "target", "fix": None, "level": "error",
         }
     ]  # fmt: skip
 
@@ -112,7 +112,7 @@ def test_conditions_are_checked_against_the_domain_beside_or_above(tmp_path: Pat
     assert findings(file) == []
     ((folder if beside else tmp_path) / "domain.pddl").write_text(DOMAIN)
     (finding,) = findings(file)
-    assert (finding["found"], finding["nearest"], finding["rule"]) == ("onn", "on", "condition")
+    assert (finding["found"], finding["nearest"], finding["code"]) == ("onn", "on", "condition")
 
 
 def test_the_domain_can_be_named_and_must_be_readable(tmp_path: Path) -> None:

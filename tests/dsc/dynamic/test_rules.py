@@ -668,6 +668,6 @@ def test_what_a_rule_hands_over_fits_by_type(rule, said):
     count = plot("plot: count\nparameters: {n: number}\nstates: {e: {final: true}}")
     made = [plot(KINDS.replace("RULE", rule)), plot(STEP), count]
     schema = Schema.parse("(define (domain d) (:types item) (:constants cup1 - item))")
-    found = [str(one) for one in validate_plot(made[0], Library(made), schema) if one.rule != "every outcome is wired"]
+    found = [str(one) for one in validate_plot(made[0], Library(made), schema) if one.code != "every-outcome-is-wired"]
     assert len(found) == bool(said)
     assert said in "".join(found)

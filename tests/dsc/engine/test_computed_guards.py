@@ -79,7 +79,7 @@ def test_guards_are_computed_from_the_world_as_it_is(kb):
 
 def findings(text):
     library = Library([plot(one) for one in (text, REACH, APPROACH)])
-    return [str(f) for f in validate_library(library, SCHEMA, (), ()) if f.rule in ("condition", "effect")]
+    return [str(f) for f in validate_library(library, SCHEMA, (), ()) if f.code in ("condition", "effect")]
 
 
 def test_the_validator_knows_it():

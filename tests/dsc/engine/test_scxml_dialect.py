@@ -316,7 +316,7 @@ def test_the_dsc_dialect_refuses_what_only_scxml_has(state):
     text = f"plot: p\nPROFILEstates:\n  {state}\n  b: {{final: true}}\nreceives: {{e: {{}}}}\n"
     refused = plot(text.replace("PROFILE", ""), "p.yaml")
     found = validate_plot(refused, Library([refused]))
-    assert found[0].rule == "dialect"
+    assert found[0].code == "dialect"
     assert "p.yaml:3" in str(found[0])
     admitted = plot(text.replace("PROFILE", "dialect: scxml\n"))
     assert validate_plot(admitted, Library([admitted])) == []

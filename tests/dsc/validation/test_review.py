@@ -193,6 +193,39 @@ def test_a_handler_that_plans_without_the_rules_of_its_plot():
     assert warnings_of(f"plot: p\n{plans}{handler}", charge, step) == []
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "states: {wait: {on: {done: Wait}}, Wait: {on: {done: e}}, e: {final: true}}",
+            "the states 'wait' and 'Wait' differ only in their case",
+        ),
+        (
+            "states: {caf\u00e9: {on: {done: cafe\u0301}}, cafe\u0301: {on: {done: e}}, e: {final: true}}",
+            "differ only in their Unicode form",
+        ),
+        (
+            "variables: {caf\u00e9: number, cafe\u0301: number}\nstates: {s: {on: {done: e}}, e: {final: true}}",
+            "differ only in their Unicode form",
+        ),
+        (
+            "receives: {low: , LOW: }\nstates: {s: {on: {low: e, LOW: e}}, e: {final: true}}",
+            "the events 'low' and 'LOW' differ only in their case",
+        ),
+        ("states: {s: {use: step, on: {done: e}}, e: {final: true}}", None),
+    ],
+)
+def test_names_that_look_alike(text, said):
+    found = warnings_of(f"plot: p\n{text}")
+    assert [one for one in found if said is None or said not in one] == []
+    assert len(found) == (said is not None)
+
+
+def test_plots_that_look_alike():
+    (warning,) = warnings_of("plot: Step\nstates: {s: {on: {done: e}}, e: {final: true}}")
+    assert "the plots 'step' and 'Step' differ only in their case" in warning
+
+
 def test_candidates_that_overlap():
     (warning,) = about_candidates(candidate("few", "(<= (f) 3)"), candidate("many", "(>= (f) 3)"))
     assert "'few' and 'many' overlap: both can fit, and then 'few' is chosen" in warning
@@ -292,7 +325,7 @@ def test_nothing_is_said_about_plots_in_the_docs():
     assert len(made) > 5
     for each in made:
         library = Library([each])
-        if not [finding for finding in validate_plot(each, library) if finding.rule == "known plot"]:
+        if not [finding for finding in validate_plot(each, library) if finding.code == "known-plot"]:
             assert review_plot(each, library) == []
 
 
@@ -307,7 +340,7 @@ def test_the_command_gives_warnings_which_count_only_if_asked_to(tmp_path):
     shown = runner.invoke(app, ["check", str(tmp_path / "p.yaml")])
     assert shown.exit_code == 0
     assert "never taken" in shown.output
-    assert "[warning]" in shown.output
+    assert "[transitions, warning]" in shown.output
     assert runner.invoke(app, ["check", "--strict", str(tmp_path / "p.yaml")]).exit_code == 2
     data = json.loads(runner.invoke(app, ["check", "--json", str(tmp_path / "p.yaml")]).output)
     assert {one["level"] for one in data} == {"warning"}

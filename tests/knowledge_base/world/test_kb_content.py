@@ -155,7 +155,7 @@ def test_what_a_function_cannot_be_worth_is_refused(kb, fluent, content, kind, m
 
 ILL_TYPED = [
     # question, place, message
-    ("(< (label cup1) 3)", "1:4", "'<' works on numbers, and this is none"),
+    ("(< (label cup1) 3)", "1:4", "'<' works on numbers, and the argument is none"),
     ("(< 3 (pose cup1 map))", "1:6", "works on numbers"),
     ("(> (+ 1 (powered lamp)) 0)", "1:9", "works on numbers"),
     ("(= (geometry 1 (label cup1)) (pose cup1 map))", "1:16", "'geometry' works on numbers"),

@@ -249,3 +249,44 @@ def test_the_robot_of_a_profile_is_one_of_the_bundle(project):
     sys.modules.pop("delivery")
     (found,) = check_project(str(project))
     assert "there is no component 'wheels'" in str(found)  # that robot has none
+
+
+def test_a_folder_of_projects_names_its_projects(project):
+    shutil.copytree(project, project.parent / "other")
+    (found,) = check_project(str(project.parent))
+    assert f"`dsc check {project.parent / 'house'}`, `dsc check {project.parent / 'other'}`" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "line", "said"),
+    [
+        (
+            "(robot-in ?to)))\n",
+            "(robot-in ?to))\n",
+            None,
+            "'(' of ':action' is never closed: ':action' begins inside it",
+        ),
+        ("(robot-in ?r - room)", "(robot-in ?r - room", None, "'(' of ':predicates' is never closed: ':action' begins"),
+    ],
+)
+def test_a_parenthesis_without_its_partner_names_the_section(project, right, wrong, line, said):
+    planted(project, [("domain.pddl", right, wrong, "")])
+    assert said in "\n".join(map(str, check_project(str(project))))
+
+
+def test_a_file_that_the_simulation_does_not_find_is_a_programming_error_with_its_line(project):
+    planted(project, [("delivery.py", "self.robot_at = ", 'open("world.json")\n        self.robot_at = ', "")])
+    (found,) = check_project(str(project))
+    assert "programming error in House: FileNotFoundError" in str(found)
+    assert "delivery.py:" in str(found)
+    run = subprocess.run([DSC, "run", str(project)], capture_output=True, text=True, cwd=project, check=False)
+    assert run.returncode == 3
+    assert "programming error in House: FileNotFoundError" in run.stderr
+
+
+def test_a_scene_that_raises_an_exception_is_a_programming_error_with_its_line(project):
+    scene = "    def scene(self):\n        raise KeyError('x')\n\n    def left(self)"
+    planted(project, [("delivery.py", "    def left(self)", scene, "")])
+    run = subprocess.run([DSC, "run", str(project)], capture_output=True, text=True, cwd=project, check=False)
+    assert run.returncode == 3
+    assert "programming error in House.scene: KeyError: 'x' (" in run.stderr
