@@ -35,7 +35,7 @@ test: $(VENV)/.test check   ## static checks, then all tests, on all cores
 	$(BIN)/python -m pytest -n auto
 
 $(VENV)/.engines: $(VENV)/.test   # planning engines that no one is forced to have; ENHSP needs Java besides
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,check,fast,numeric,durations]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,check,fast,numeric,durations,numbers]'
 	@command -v java >/dev/null || $(if $(filter 0,$(shell id -u)),,sudo) apt-get install --yes --quiet default-jre-headless
 	@touch $@
 

@@ -47,6 +47,7 @@ WHY = {
     "up-fast-downward": ("the engine `fast-downward`", APART),
     "up-enhsp": ("the engine `enhsp`, which is a Java program", APART),
     "up-aries": ("the engine `aries`", APART),
+    "kairos-planner": ("the engine `kairos`", APART),
     "py-trees": ("behaviour trees as skills", "imported by `dsc.components.behaviour_trees`"),
     "starlette": ("the page's requests", "imported where a page is served"),
     "uvicorn": ("the page's server", "imported where a page is served"),
@@ -80,6 +81,7 @@ WHY = {
 """What each is for, and how it is met."""
 LICENCES = {
     "up-fast-downward": "GPL-3.0 (the engine)", "up-enhsp": "Apache-2.0; the engine GPL-3.0", "up-aries": "MIT",
+    "kairos-planner": "Apache-2.0",
     "pyoxigraph": "MIT OR Apache-2.0", "python-statemachine": "MIT", "rdflib": "BSD-3-Clause", "sismic": "LGPL-3.0",
     "scipy": "BSD-3-Clause", "transitions": "MIT", "xstate-statemachine": "MIT", "hatchling": "MIT",
     "mutmut": "BSD-3-Clause", "nbclient": "BSD-3-Clause", "mkdocs": "BSD-2-Clause", "mkdocs-material": "MIT", "mkdocstrings-python": "ISC",
@@ -89,7 +91,7 @@ SPELT = {"GPL3+": "GPL-3.0-or-later", "APACHE": "Apache-2.0", "BSD 2-Clause Lice
 """Licences as packages say them, and as SPDX does."""
 TITLES = {
     "core": "Core", "viewer": "Extra `viewer`", "bt": "Extra `bt`", "fast": "Extra `fast`", "numeric": "Extra `numeric`",
-    "durations": "Extra `durations`", "test": "Extra `test`", "check": "Extra `check`", "docs": "Extra `docs`", "bench": "Extra `bench`",
+    "durations": "Extra `durations`", "numbers": "Extra `numbers`", "test": "Extra `test`", "check": "Extra `check`", "docs": "Extra `docs`", "bench": "Extra `bench`",
     "mutation": "Extra `mutation`",
     "build": "To build the package",
 }  # fmt: skip
@@ -99,7 +101,7 @@ HEAD = """# Dependencies
 The project itself is Apache-2.0.
 
 `make lower-bounds` installs the core and the packages of its tests exactly at the lower bounds, in a separate
-environment, and runs tests of every room. There are no upper bounds.
+environment, and runs tests of every room. Only the engine `kairos` has an upper bound.
 
 Planning engines never run in the program's process: `planning/engines/process.py` starts `planning.engines.worker` for
 each and exchanges lines of JSON with it. `pyperplan` is GPL-3.0-or-later, and only that worker imports it. A program

@@ -23,6 +23,7 @@ EXTRAS = {
     "fast": "plans for large problems in less time, improved during the run",
     "numeric": "planning with numbers that actions change",
     "durations": "planning with durations and concurrent actions",
+    "numbers": "planning with numbers or durations, without Java",
 }
 """The extras for users, with their effect; the other extras are for the development of this project."""
 PIPE_WIDTH = 120

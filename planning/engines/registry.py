@@ -41,7 +41,9 @@ class Engine:
         proves: whether the search ends if the problem has no plan.
         deterministic: whether equal problems have equal plans in every run.
         races: whether a race may choose the engine; otherwise only the user selects the engine by name.
-        most_actions: the largest number of ground actions with which a race chooses the engine; `None` without a limit.
+        extra: the extra of this package that installs the engine; empty if `package` alone installs it.
+        made_for: a race chooses the engine only for a problem with one of these features; empty for any problem.
+        most_actions: the largest number of ground actions for which a race chooses the engine; `None` for no limit.
     """
 
     name: str
@@ -57,6 +59,8 @@ class Engine:
     proves: bool = True
     deterministic: bool = True
     races: bool = True
+    extra: str = ""
+    made_for: frozenset[str] = frozenset()
     most_actions: int | None = None
 
     @property
@@ -68,7 +72,8 @@ class Engine:
         """Return the steps that make the engine usable; empty if the engine is usable."""
         steps = []
         if self.version is None:
-            steps.append(f"pip install '{self.package}>={self.at_least}'")
+            needed = f"dynamic-state-charts[{self.extra}]" if self.extra else f"{self.package}>={self.at_least}"
+            steps.append(f"pip install '{needed}'")
         if self.program and shutil.which(self.program) is None:
             steps.append(f"put '{self.program}' on the path")
         return ", ".join(steps)
@@ -87,6 +92,8 @@ def package_version(package: str) -> str | None:
         return None
 
 
+_NUMBERS_AND_TIME = frozenset({"numeric", "durations"})
+
 # The order is the order of preference. Fast Downward runs without its translator (see the driver), so it is faster than
 # pyperplan even on the smallest problem. Greedy pyperplan takes seconds from about 1,000 ground actions upwards.
 ENGINES = (
@@ -96,6 +103,10 @@ ENGINES = (
     ),
     Engine(
         "pyperplan", "pyperplan", "greedy, h_FF", "pyperplan", "2.1", "GPL-3.0", most_actions=1500,
+    ),
+    Engine(
+        "kairos", "kairos", "", "kairos-planner", "1.0.6", "Apache-2.0",
+        features=_NUMBERS_AND_TIME, extra="numbers", made_for=_NUMBERS_AND_TIME, most_actions=3000,
     ),
     Engine(
         "enhsp", "up", "up_enhsp.enhsp_planner:ENHSPEngine", "up-enhsp", "0.1.1", "GPL-3.0",
@@ -178,10 +189,17 @@ def chosen(problem: Problem, *, usable: Callable[[Engine], bool] = installed) ->
     The result is also empty for a temporal problem that is too large for every engine. The problem with one action at
     a time is then solved faster.
     """
-    racing = [one for one in able(problem.features) if one.races and usable(one)]
+    racing = [one for one in _racing(problem) if usable(one)]
     size = len(problem.actions)
     fitting = [one for one in racing if one.most_actions is None or size <= one.most_actions]
     return (fitting or ([] if "durations" in problem.features else racing))[:PARALLEL_ENGINES]
+
+
+def _racing(problem: Problem) -> list[Engine]:
+    """Return the engines that a race may choose for the problem, in the order of preference."""
+    features = problem.features
+    suited = [one for one in able(features) if one.races and (not one.made_for or one.made_for & features)]
+    return sorted(suited, key=lambda one: not one.made_for)  # stable
 
 
 def repeatable(problem: Problem, *, usable: Callable[[Engine], bool] = installed) -> list[Engine]:
@@ -189,7 +207,7 @@ def repeatable(problem: Problem, *, usable: Callable[[Engine], bool] = installed
 
     The engine is pyperplan, which every installation has, or else the first deterministic engine.
     """
-    suited = [one for one in able(problem.features) if one.races and one.deterministic and usable(one)]
+    suited = [one for one in _racing(problem) if one.deterministic and usable(one)]
     return sorted(suited, key=lambda one: one.name != "pyperplan")[:1]
 
 

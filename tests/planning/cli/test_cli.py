@@ -90,7 +90,7 @@ TO_THREE = "(define (problem three) (:domain count) (:init (= (n) 0)) (:goal (>=
 def test_an_engine_that_cannot_do_the_problem_names_those_that_can(run, tmp_path):
     domain = tmp_path / "count.pddl"
     domain.write_text(COUNTED)
-    with pytest.raises(InputError, match="'pyperplan' cannot do numeric; for this problem there are enhsp"):
+    with pytest.raises(InputError, match="'pyperplan' cannot do numeric; for this problem there are kairos, enhsp"):
         run("--engine", "pyperplan", problem=TO_THREE, domains=[domain])
 
 
@@ -328,7 +328,10 @@ def test_where_no_engine_can_be_asked_the_condition_and_who_could_are_named(run,
     result = run(problem=SEAL, domains=[tmp_path / "jars.pddl"])
     assert result.exit_code == 4
     assert "jars.pddl:4:" in result.stderr
-    assert "(> (litres ?j) 1); no installed engine can do that, enhsp could (pip install x)" in result.stderr
+    assert (
+        "(> (litres ?j) 1); no installed engine can do that, kairos could (pip install x), enhsp could (pip install x)"
+        in result.stderr
+    )
 
 
 def test_notes_about_files_and_the_problem_are_printed(run, tmp_path, monkeypatch):

@@ -294,5 +294,5 @@ def test_what_is_said_before_the_end_is_heard_in_order(scripted):
 
 
 def test_a_missing_engine_is_installed_by_what_this_project_itself_asks_for():
-    asked = {one.split(";")[0].strip() for one in requires(DISTRIBUTION)}
+    asked = {one.split(";")[0].strip().replace("<2,", "") for one in requires(DISTRIBUTION)}
     assert {f"{one.package}>={one.at_least}" for one in ENGINES} <= asked

@@ -193,14 +193,14 @@ def test_in_simulated_time_one_repeatable_engine_starts():
     everything = [
         [one.name for one in repeatable(problem, usable=lambda _: True)] for problem in (PROBLEM, numeric, timed)
     ]
-    assert everything == [["pyperplan"], ["enhsp"], []]
+    assert everything == [["pyperplan"], ["kairos"], ["kairos"]]
     assert repeatable(numeric, usable=lambda one: one.name == "pyperplan") == []
 
 
 def test_features_are_needs_and_costs_a_wish():
-    assert [one.name for one in able({"numeric"}) if one.races] == ["enhsp"]
+    assert [one.name for one in able({"numeric"}) if one.races] == ["kairos", "enhsp"]
     assert [one.name for one in able({"costs"}) if one.races][:3] == ["fast-downward", "enhsp", "pyperplan"]
-    assert able({"numeric", "durations"}) == []
+    assert [one.name for one in able({"numeric", "durations"})] == ["kairos"]
 
 
 BEHAVIOURS = {

@@ -1,0 +1,177 @@
+"""Kairos on random problems with numbers, with durations, and without a plan: valid plans, equal ones in each run."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import random
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from unified_planning.engines import SequentialPlanValidator
+from unified_planning.plans import ActionInstance, SequentialPlan
+
+from dsc import Component, Outcome, SkillCall, primitive_plot, skill
+from knowledge_base import Delta, KnowledgeBase, fact
+from knowledge_base.language.syntax.text import parse_condition
+from planning.engines.process import Deadline, EngineProcess, worker
+from planning.engines.registry import engine
+from planning.engines.request import written
+from planning.model.domain import PlanningDomain
+from planning.model.plan import Plan
+from planning.problem.construction import build_problem
+from planning.robot.robot import Robot
+
+pytestmark = pytest.mark.skipif(bool(engine("kairos").lacks()), reason=f"kairos: {engine('kairos').lacks()}")
+
+NUMBERS = PlanningDomain.parse("""
+    (define (domain rover) (:requirements :typing :numeric-fluents) (:types place)
+      (:predicates (at ?p - place) (link ?a ?b - place) (done ?p - place) (socket ?p - place))
+      (:functions (battery) (toll ?a ?b - place))
+      (:action go :parameters (?a ?b - place)
+        :precondition (and (at ?a) (link ?a ?b) (>= (battery) (+ 1 (toll ?a ?b))))
+        :effect (and (not (at ?a)) (at ?b) (decrease (battery) (toll ?a ?b))))
+      (:action charge :parameters (?a - place) :precondition (and (at ?a) (socket ?a) (< (battery) 12))
+        :effect (assign (battery) (+ (battery) 7.5)))
+      (:action work :parameters (?a - place) :precondition (at ?a) :effect (done ?a)))""")
+TIME = PlanningDomain.parse("""
+    (define (domain kitchen) (:requirements :typing :durative-actions) (:types pot)
+      (:predicates (free) (hot ?p - pot) (boiled ?p - pot) (served ?p - pot) (raw ?p - pot))
+      (:durative-action heat :parameters (?p - pot) :duration (and (>= ?duration 4) (<= ?duration 6))
+        :condition (and (at start (free)) (at start (raw ?p)))
+        :effect (and (at start (not (free))) (at start (hot ?p)) (at end (not (hot ?p))) (at end (free))))
+      (:durative-action boil :parameters (?p - pot) :duration (= ?duration 3)
+        :condition (and (over all (hot ?p))) :effect (at end (boiled ?p)))
+      (:durative-action serve :parameters (?p - pot) :duration (= ?duration 1)
+        :condition (and (at start (boiled ?p)) (at start (free))) :effect (at end (served ?p))))""")
+
+
+@pytest.fixture(scope="module")
+def kairos():
+    process = EngineProcess(worker("kairos"))
+    process.start(60)
+    yield process
+    process.kill()
+
+
+def answer(process, problem):
+    heard: list[Any] = []
+    process.ask(written(problem), Deadline(60), heard.append)
+    return heard[-1]
+
+
+def numeric(seed, *, reachable=True):
+    draw = random.Random(seed)  # noqa: S311  no secret depends on it
+    places = [f"p{n}" for n in range(draw.randint(3, 6))]
+    links = list(pairwise(places)) + [tuple(draw.sample(places, 2)) for _ in range(3)]
+    world = KnowledgeBase(NUMBERS.schema)
+    facts = [
+        fact("at", places[0]),
+        *(fact("link", *one) for one in links),
+        *(fact("socket", one) for one in places[::2]),
+    ]
+    world.apply(
+        Delta(nodes=dict.fromkeys(places, "place"), added=tuple(dict.fromkeys(facts if reachable else facts[:1]))),
+        "test",
+    )
+    with world.transaction(author="test") as change:
+        change.set("battery", draw.choice([-3.5, 0, 2, 8]))
+        for one in set(links):
+            change.set("toll", *one, draw.choice([1, 2.25, 6]))
+    goal = f"(and (done {places[-1]}) (done {places[0]}) (>= (battery) {draw.choice([0, 3])}))"
+    return build_problem(NUMBERS, world, parse_condition(goal))
+
+
+def timed(seed):
+    draw = random.Random(seed)  # noqa: S311  no secret depends on it
+    pots = [f"pot{n}" for n in range(draw.randint(1, 4))]
+    world = KnowledgeBase(TIME.schema)
+    world.apply(
+        Delta(nodes=dict.fromkeys(pots, "pot"), added=(fact("free"), *(fact("raw", one) for one in pots))), "test"
+    )
+    goal = parse_condition(f"(and {' '.join(f'(served {one})' for one in pots)})")
+    problem = build_problem(TIME, world, goal, durations=True)
+    assert problem.timed is not None
+    return problem.timed
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_plan_with_numbers_is_valid_here_and_in_unified_planning(kairos, seed):
+    from planning.engines.up import translated
+
+    problem = numeric(seed)
+    found = answer(kairos, problem)
+    if found["actions"] is None:
+        pytest.skip("no plan exists")
+    assert isinstance(problem.plan(found["actions"]), Plan)
+    theirs = translated(problem)
+    steps = [ActionInstance(theirs.action(f"a{number}")) for number in found["actions"]]
+    with SequentialPlanValidator(environment=theirs.environment) as validator:
+        assert validator.validate(theirs, SequentialPlan(steps, theirs.environment)).status.name == "VALID"
+    assert answer(kairos, problem)["actions"] == found["actions"]
+
+
+@pytest.mark.parametrize("seed", range(15))
+def test_a_plan_with_durations_is_valid_and_the_same_again(kairos, seed):
+    problem = timed(seed)
+    found = answer(kairos, problem)["timed"]
+    assert isinstance(problem.scheduled([tuple(one) for one in found]), Plan)
+    assert answer(kairos, problem)["timed"] == found
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_without_a_way_there_is_no_plan(kairos, seed):
+    problem = numeric(seed, reachable=False)
+    assert problem.unreachable or answer(kairos, problem)["actions"] is None
+
+
+class Went(Outcome): ...
+
+
+class Rover(Component):
+    """A rover whose program is killed during its action number `last`."""
+
+    def __init__(self, last: int | None = None) -> None:
+        super().__init__()
+        self.last, self.begun = last, 0
+
+    @skill(after_crash="repeat")
+    async def act(self, call: SkillCall) -> Went:
+        self.begun += 1
+        if self.begun == self.last:
+            os._exit(9)
+        await call.clock.sleep(1.0)
+        return Went()
+
+
+def rover_robot(store, last=None):
+    rover = Rover(last)
+    plots = [
+        primitive_plot(rover.skills()["act"], name=name, done="went", implements=name, effects="assumed")
+        for name in ("go", "charge", "work")
+    ]
+    return Robot(NUMBERS, plots, [rover], clock="simulated", store=store)
+
+
+def run_until_killed(store, last):
+    with rover_robot(store, last) as robot:
+        nodes = dict.fromkeys("ab", "place")
+        facts = (fact("at", "a"), fact("link", "a", "b"), fact("link", "b", "a"), fact("socket", "a"))
+        robot.knowledge.apply(Delta(nodes=nodes, added=facts), "test")
+        with robot.knowledge.transaction(author="test") as change:
+            change.set("battery", 1)
+            change.set("toll", "a", "b", 4)
+        robot.achieve("(done b)")
+
+
+@pytest.mark.parametrize("last", [1, 2, 3])
+def test_a_run_with_numbers_is_killed_and_resumed(tmp_path, last):
+    killed = multiprocessing.get_context("fork").Process(target=run_until_killed, args=(tmp_path / "run.kb", last))
+    killed.start()
+    killed.join(60)
+    assert killed.exitcode == 9
+    with rover_robot(tmp_path / "run.kb") as robot:
+        assert robot.resume().finished
+        assert robot.knowledge.ask("(done b)")
+        assert robot.knowledge.value("battery", ()) == 4.5
