@@ -17,6 +17,7 @@ from domains.clean_up_table import Scenario
 from dsc import load_library, load_plot, parse_plot
 from dsc.drawing import draw
 from dsc.text.profiles import parse_profile
+from planning.engines.registry import engine
 
 ROOT = Path(__file__).parent.parent
 GUIDE = ROOT / "CONTRIBUTING.md"
@@ -203,17 +204,34 @@ def test_the_first_robot_is_made_as_its_page_says(tmp_path):
     subprocess.run([dsc, "new", "coffee"], cwd=tmp_path, check=True, capture_output=True)
     for old in [*home.glob("coffee/plots/*"), *home.glob("coffee/profiles/*")]:
         old.unlink()
-    files = re.findall(r"^`((?:coffee|tests)/\S+)`[^\n]*:\n\n```\w+\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)
-    for name, text in files:
-        (home / name).write_text(text)
-    assert len(files) == 14
-    for block in blocks(ROOT / "docs" / "first-robot.md", "console")[1:]:
-        for shown in block.split("$ dsc ")[1:]:
+    tested = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    first, numbers = page.split("## A number, and a picture")
+    assert _follow(first, home, dsc) == 17
+    assert subprocess.run(tested, cwd=home, check=False, capture_output=True).returncode == 0
+    if not engine("kairos").lacks():  # the last part needs the extra `numbers`
+        (home / "coffee" / "profiles" / "on_tracks.yaml").unlink()
+        assert _follow(numbers, home, dsc) == 4
+        assert subprocess.run(tested, cwd=home, check=False, capture_output=True).returncode == 0
+
+
+_FILE_OR_SESSION = re.compile(
+    r"^`((?:coffee|tests)/\S+)`[^\n]*:\n\n```\w+\n(.*?)^```|^```console\n(.*?)^```", re.MULTILINE | re.DOTALL
+)
+
+
+def _follow(text: str, home: Path, dsc: Path) -> int:
+    """Write the files and run the sessions of a page in their order; return the number of files."""
+    files = 0
+    for name, content, session in _FILE_OR_SESSION.findall(text):
+        if name:
+            (home / name).parent.mkdir(exist_ok=True)
+            (home / name).write_text(content)
+            files += 1
+        for shown in session.split("$ dsc ")[1:] if "$ dsc new" not in session else ():
             command, _, expected = shown.partition("\n")
             done = subprocess.run([dsc, *shlex.split(command)], cwd=home, check=False, capture_output=True, text=True)
-            assert done.stdout == expected
-    tested = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-    assert subprocess.run(tested, cwd=home, check=False, capture_output=True).returncode == 0
+            assert done.stdout == expected, command
+    return files
 
 
 @pytest.mark.parametrize("package", ["knowledge_base", "dsc", "planning", "domains"])
