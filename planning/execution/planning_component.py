@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 from dsc.calls import Ended, SkillCall, Status
 from dsc.engine.steps import Cancel, Start
 from dsc.events import LED_AWAY
+from dsc.model.states import DynamicState
 from dsc.outcomes import Outcome
 from dsc.sequencer.reactor import CHART
 from dsc.skills import skill
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, Place
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.syntax.text import parse_condition, to_text
@@ -109,6 +110,7 @@ class PlanningComponent(GoalSkills):
         self._search = Search(domain, knowledge, planner, clock, self._records, foresight)
         self._runs = PlanRuns()
         self._outages = Outages(components, self._records)
+        self._library = library
         plotting = Plotting(self._derivation, library, knowledge, parallel, {self.name, *shared})
         self._choices = Choices(self._derivation.domain, library)
         self._escalation = Escalation(plotting, self._runs, self._choices, self._search, self._records)
@@ -254,11 +256,12 @@ class PlanningComponent(GoalSkills):
     ) -> PlotFound | GoalHolds | NoPlan | GaveUp:
         now = self._derivation.at(self._knowledge)
         try:
-            wanted = parse_condition(goal)
+            wanted = parse_condition(goal, f"goal of '{holder}'" if holder else "goal")
             if before is None:  # later, an object of the goal may be missing
                 check_goal(wanted, self._knowledge)
             reached = holds(now.condition(wanted), self._knowledge)
         except InputError as error:
+            error.place = _place_of(goal, holder, self._library) or error.place
             return self._none("invalid", str(error))
         task = task_of(wanted, holder)
         if reached:
@@ -322,3 +325,14 @@ class PlanningComponent(GoalSkills):
     def _none(self, kind: NoPlanKind, reason: str) -> NoPlan:
         self._records.none(kind, reason)
         return NoPlan(reason=reason, kind=kind)
+
+
+def _place_of(goal: str, holder: str, library: Library) -> Place | None:
+    """Return the place of a goal in the file of the plot that has it; `None` for a goal from elsewhere."""
+    plot = library.plot(holder) if holder in library else None
+    states = () if plot is None else plot.walk()
+    goals = (
+        (path, state.goal) for _, state, path in states if isinstance(state, DynamicState) and state.goal is not None
+    )
+    path = next((path for path, own in goals if to_text(own) == goal), None)
+    return None if plot is None or path is None else plot.place((*path, "goal"))

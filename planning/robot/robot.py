@@ -399,7 +399,7 @@ class Robot(RobotProgram):
 
     def _goal(self, goal: str, seconds: float, replans: int) -> dict[str, Any]:
         """Return the arguments of the plot `achieve` for a goal."""
-        check_goal(parse_condition(goal), self.knowledge)
+        check_goal(parse_condition(goal, "goal"), self.knowledge)
         budget = _budget(seconds, replans)
         return {"goal": goal, "holder": "", "replans": budget.replans, "seconds": budget.seconds}
 

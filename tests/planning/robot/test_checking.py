@@ -154,7 +154,7 @@ def test_a_programming_error_is_one_line_of_the_list(project):
 @pytest.mark.parametrize("has_engine", [True, False])
 def test_numbers_that_no_installed_engine_can_plan_with_are_a_warning_with_the_remedy(project, monkeypatch, has_engine):
     lacks = "" if has_engine else "pip install 'up-enhsp>=0.1.1'"
-    monkeypatch.setattr(Engine, "lacks", lambda one: lacks if one.name == "enhsp" else "")
+    monkeypatch.setattr(Engine, "lacks", lambda one: lacks if one.name in {"enhsp", "kairos"} else "")
     planted(project, [
         ("domain.pddl", "(full))\n", "(full)) (:functions (charge))\n", ""),
         ("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (>= (charge) 0))", ""),

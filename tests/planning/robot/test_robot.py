@@ -744,3 +744,19 @@ def test_a_state_with_a_goal_reads_the_kind_of_no_plan():
         robot.knowledge.apply(Delta(nodes={"a": "lamp"}), author="me")
         end = robot.run("top")
     assert end.emitted[0].attributes == {"kind": "unsolvable"}
+
+
+def test_an_invalid_goal_of_a_state_is_answered_with_its_file_and_line():
+    text = """
+        plot: top
+        emits: {why: {reason: text}}
+        states:
+          s:
+            goal: (on dock)
+            on: {done: e, no_plan: {to: e, emit: why, with: {reason: ?event.reason}}, gave_up: e}
+          e: {final: true}
+    """
+    with Robot(DOMAIN, [parse_plot(text, "top.yaml")], [], clock="simulated") as robot:
+        robot.knowledge.apply(Delta(nodes={"a": "lamp"}), author="me")
+        end = robot.run("top")
+    assert end.emitted[0].attributes["reason"].startswith("top.yaml:6:13: there is no object 'dock'")
