@@ -14,7 +14,7 @@ from dsc.validation.objects import KnownObjects
 from dsc.validation.subject import Subject, Types
 from dsc.validation.type_checks import TypeChecker, inside_optional, language_type
 from dsc.validation.type_reader import TypeReader
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.checking.binding import unbound_error
 from knowledge_base.language.checking.check import check, check_effect, check_term
 from knowledge_base.language.syntax.effect import Effect, Form, mentioned
@@ -101,7 +101,11 @@ class LanguageChecker:
         """Yield a finding about a name that no known object of a type has."""
         mistake = None if self._objects is None else self._objects.mistake(name, kind)
         if mistake is not None:
-            yield self._subject.caught(mistake, path, "known-object", _DECLARE)
+            yield self._known_object(mistake, path)
+
+    def _known_object(self, mistake: InputError, path: Path) -> Finding:
+        fix = _DECLARE if isinstance(mistake, UnknownNameError) else ""
+        return self._subject.caught(mistake, path, "known-object", fix)
 
     def _plain(
         self, form: _F, names: Types, path: Path, rule: str, convert: Callable[[_F, DataReader], _F]
@@ -141,7 +145,7 @@ class LanguageChecker:
             yield self._subject.caught(error, path, rule)
             return
         for mistake in () if self._objects is None else self._objects.mistakes(form, names):
-            yield self._subject.caught(mistake, path, "known-object", _DECLARE)
+            yield self._known_object(mistake, path)
 
     def _compared(self, condition: Expression, names: Types, path: Path) -> Iterator[Finding]:
         """Yield findings about comparisons with choices and other words, whose types conditions do not know."""

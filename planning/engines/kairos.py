@@ -14,8 +14,11 @@ from planning.engines.worker import Answers, Request, Search
 from planning.model.problem import ActionSpan, GroundAction, Problem
 from planning.model.quantities import Assignment, NumericBound, Quantity, fluents
 
-_ONE_RESULT = {"anytime": False, "threads": 1, "seed": 0}
-"""Options for the first plan; one thread and a fixed seed make the plans of equal problems equal."""
+_ONE_RESULT = {"anytime": False, "threads": 1, "seed": 0, "timeout": 1e6}
+"""Options for the first plan; one thread and a fixed seed make the plans of equal problems equal.
+
+The caller ends a search that takes too long; without `timeout`, Kairos ends after 30 s.
+"""
 
 
 def searching(engine: Engine) -> Search:  # noqa: ARG001  Kairos has one configuration
@@ -35,10 +38,10 @@ def _answers(problem: Problem) -> Answers:
         yield _answer(result.plan.steps, timed="durations" in problem.features)
     elif result.status == kairos.Status.UNSOLVABLE:
         yield None
-    elif result.status == kairos.Status.OUT_OF_MEMORY:
-        raise MemoryError
     else:
         why = " ".join(str(one.message) for one in result.diagnostics)
+        if result.status == kairos.Status.OUT_OF_MEMORY or "bad_alloc" in why:  # the limit of the worker is the first
+            raise MemoryError
         raise RuntimeError(f"it ended with status {result.status.name} {' '.join(why.split())[-200:]}".rstrip())
 
 

@@ -14,12 +14,15 @@ from unified_planning.plans import ActionInstance, SequentialPlan
 
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from knowledge_base import Delta, KnowledgeBase, fact
+from knowledge_base.facts import Fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning.engines.process import Deadline, EngineProcess, worker
 from planning.engines.registry import engine
 from planning.engines.request import written
 from planning.model.domain import PlanningDomain
-from planning.model.plan import Plan
+from planning.model.plan import Plan, PlanStep
+from planning.model.problem import GroundAction, Problem
+from planning.model.quantities import Assignment, NumericBound
 from planning.problem.construction import build_problem
 from planning.robot.robot import Robot
 
@@ -124,6 +127,24 @@ def test_a_plan_with_durations_is_valid_and_the_same_again(kairos, seed):
 def test_without_a_way_there_is_no_plan(kairos, seed):
     problem = numeric(seed, reachable=False)
     assert problem.unreachable or answer(kairos, problem)["actions"] is None
+
+
+def test_a_search_without_enough_memory_fails_and_the_worker_goes_on():
+    weights = [2.0 * (k + 1) ** 2 + 2 * k for k in range(24)]
+    free, total = [Fact("free", (f"i{k}",)) for k in range(24)], Fact("total")
+    actions = tuple(
+        GroundAction(
+            PlanStep("take", (str(one.args[0]),)), (one,), (), (one,), assignments=(Assignment(total, weight, True),)
+        )
+        for one, weight in zip(free, weights, strict=True)
+    )
+    odd = NumericBound("=", total, float(int(sum(weights)) // 2 | 1))  # all weights are even: no plan, found by search
+    problem = Problem("knapsack", {}, tuple(free), (), actions, numbers={total: 0.0}, bounds=(odd,))
+    process = EngineProcess(worker("kairos", megabytes=150))
+    process.start(60)
+    assert answer(process, problem)["failed"] == "it ran out of memory"
+    assert answer(process, numeric(0))["actions"]
+    process.kill()
 
 
 class Went(Outcome): ...
