@@ -32,6 +32,7 @@ CODES: Mapping[str, str] = {
     "goal": "The first goal does not hold initially, and can be reached.",
     "handlers": "A handler can react, and its reaction has an answer to every outcome.",
     "ignore": "A comment `dsc: ignore[CODE] REASON` has known codes, a reason, and a finding to ignore.",
+    "initial-value": "A number that planning actions read has an initial value; without it, the number counts as 0.",
     "initial": "`initial` names a state of the same scope.",
     "known-component": "A deployed component has the name that a command contains.",
     "known-event": "Something fires the event of a transition; events from outside are declared under `receives`.",

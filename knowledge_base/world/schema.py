@@ -259,7 +259,7 @@ class Schema:
             return found
         if name not in self.computed:
             if name in self.functions:
-                hint = f"compare its value: (= ({name} ...) VALUE)"
+                hint = f"compare its value: (= ({name} ...) VALUE); a Delta has it among its `values`"
                 raise SchemaError(f"'{name}' is a function; {hint}", place=place)
             if name in self.types:
                 said = f"'{name}' is a type, which a condition tests of one thing: ({name} THING)"

@@ -26,7 +26,8 @@ from dsc.validation.ignored import without_ignored
 from knowledge_base.errors import InputError, Place, UnknownNameError, collecting, tolerated
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import holds
-from knowledge_base.language.syntax.expression import Constant, Expression, free_variables
+from knowledge_base.language.syntax.effect import Form, parts_of_form
+from knowledge_base.language.syntax.expression import Call, Constant, Expression, free_variables
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.pddl import read_problem
 from knowledge_base.pddl.domain_text import read_domain
@@ -220,6 +221,7 @@ class _Robot:
             found += without_consequences(check_implementations(library, self._domain), self._broken_files())
             self._check_task(world or KnowledgeBase(self._domain.schema))
             found += self._unplannable(self._domain)
+            found += () if world is None else _without_values(self._domain, world)
         self._check_components()
         return found
 
@@ -377,6 +379,34 @@ class _Robot:
 
 
 _EMPTY = "(define (domain bundles))"
+_MOST_LISTED = 3
+
+
+def _without_values(domain: PlanningDomain, world: KnowledgeBase) -> Iterator[Finding]:
+    """Yield a warning for each function that actions read and that has no initial value for some object.
+
+    Of a function with several parameters, e.g. distances, only the lack of all values is a warning.
+    """
+    forms = [form for action in domain.actions.values() for form in (action.precondition, action.effect)]
+    for name in sorted({call.function for form in forms for call in _calls(form)}):
+        declared, known = domain.schema.functions[name], {one.args for one in world.values() if one.predicate == name}
+        if declared.result not in {None, "number"}:
+            continue
+        missing = [] if known else [f"({' '.join([name, *['…'] * declared.arity])})"]
+        if declared.arity == 1 and known:
+            things = (one for kind in declared.parameters[0].types or (ROOT_TYPE,) for one in world.objects(kind))
+            missing = [f"({name} {one})" for one in things if (one,) not in known]
+        if missing:
+            listed = ", ".join(missing[:_MOST_LISTED]) + (", …" if len(missing) > _MOST_LISTED else "")
+            error = InputError(f"no initial value of {listed}, which counts as 0", place=declared.place)
+            yield Finding(error, "initial-value", "set it in `values` of the initial knowledge", "warning")
+
+
+def _calls(form: Form) -> Iterator[Call]:
+    if isinstance(form, Call):
+        yield form
+    for part in parts_of_form(form):
+        yield from _calls(part)
 
 
 def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) -> list[Finding]:

@@ -123,7 +123,8 @@ def require_delta(delta: object) -> None:
             raise InputError(f"a Delta's '{name}' is a tuple of {said}, not {shown(part)}")
     for fluent in delta.values:
         if not isinstance(fluent, Fact):
-            raise InputError(f"a Delta's 'values' are of functions with arguments, as Facts, not of {shown(fluent)}")
+            example = f"fact({fluent!r})" if isinstance(fluent, str) else "fact('distance', 'a', 'b')"
+            raise InputError(f"the keys of a Delta's 'values' are facts such as {example}, not {shown(fluent)}")
     for fact in (*delta.removed, *delta.added, *delta.replaced, *delta.values):
         if not (isinstance(fact.predicate, str) and isinstance(fact.args, tuple)):
             raise InputError(f"a fact is a name with a tuple of arguments, not {shown(fact)}")

@@ -160,7 +160,7 @@ def test_numbers_that_no_installed_engine_can_plan_with_are_a_warning_with_the_r
         ("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (>= (charge) 0))", ""),
         ("domain.pddl", "(robot-in ?to))", "(robot-in ?to) (decrease (charge) 1))", ""),
     ])  # fmt: skip
-    found = [str(one) for one in check_project(str(project))]
+    found = [str(one) for one in check_project(str(project)) if one.code == "engine"]
     assert len(found) == (not has_engine)
     if found:
         assert found[0].startswith(f"{project / 'domain.pddl'}:7:")
@@ -290,3 +290,32 @@ def test_a_scene_that_raises_an_exception_is_a_programming_error_with_its_line(p
     run = subprocess.run([DSC, "run", str(project)], capture_output=True, text=True, cwd=project, check=False)
     assert run.returncode == 3
     assert "programming error in House.scene: KeyError: 'x' (" in run.stderr
+
+
+@pytest.mark.parametrize(
+    ("functions", "read", "said"),
+    [
+        ("(charge)", "(>= (charge) 0)", "no initial value of (charge), which counts as 0"),
+        ("(size ?r - room)", "(>= (size ?to) 0)", "no initial value of (size …), which counts as 0"),
+        ("(far ?a ?b - room)", "(>= (far ?from ?to) 0)", "no initial value of (far … …), which counts as 0"),
+    ],
+)
+def test_a_number_without_an_initial_value_is_a_warning(project, functions, read, said):
+    planted(project, [
+        ("domain.pddl", "(full))\n", f"(full)) (:functions {functions})\n", ""),
+        ("domain.pddl", ":precondition (robot-in ?from)", f":precondition (and (robot-in ?from) {read})", ""),
+    ])  # fmt: skip
+    (found,) = check_project(str(project))
+    assert str(found).startswith(f"{project / 'domain.pddl'}:5:")
+    assert said in str(found)
+    assert found.level == "warning"
+
+
+def test_an_object_without_the_value_that_others_have_is_named(project):
+    planted(project, [
+        ("domain.pddl", "(full))\n", "(full)) (:functions (size ?r - room))\n", ""),
+        ("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (>= (size ?to) 0))", ""),
+        ("delivery.py", "        return Delta(\n            nodes", '        return Delta(\n            values={fact("size", "hall"): 3, fact("size", "office"): 2},\n            nodes', ""),
+    ])  # fmt: skip
+    (found,) = check_project(str(project))
+    assert "no initial value of (size kitchen), which counts as 0" in str(found)
