@@ -29,6 +29,7 @@ CODES: Mapping[str, str] = {
     "engine": "An installed planning engine can plan with the domain.",
     "every-action-has-a-plot": "Each planning action has a plot that `implements` it.",
     "every-outcome-is-wired": "Each outcome of a state has a transition or a rule in every case.",
+    "fact": "A `fact(...)` in Python has the name of a predicate or function, and its number of arguments.",
     "goal": "The first goal does not hold initially, and can be reached.",
     "handlers": "A handler can react, and its reaction has an answer to every outcome.",
     "ignore": "A comment `dsc: ignore[CODE] REASON` has known codes, a reason, and a finding to ignore.",

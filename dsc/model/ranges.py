@@ -75,6 +75,11 @@ class Range:
         if isinstance(value, str | int | float | bool) and self._fits(value):
             return int(value) if self.whole else value
         message = f"'{name}' is {self}; found {written(value)}"
+        if self.type == "number" and not self.among and isinstance(value, str | bool):
+            kind = "the text" if isinstance(value, str) else "the truth value"
+            message = (
+                f"'{name}' is a number{'' if str(self) == 'a number' else f', {self}'}; found {kind} {written(value)}"
+            )
         raise InputError(message, found=str(value), valid=map(str, self.among))
 
     def read(self, name: str, text: str) -> Value:

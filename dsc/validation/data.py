@@ -408,7 +408,7 @@ class _Data:
                 yield self._subject.caught(error, path, "value-fits")
                 return
             if isinstance(term.value, str):
-                yield from self._language.unknown_object(term.value, wanted, path)
+                yield from self._language.unknown_object(term.value, wanted, {**self._own, **scope}, path)
 
     def _kind(self, term: Term, scope: Types) -> str | None:
         """Return the type of a term's value, or `None` if it is unknown."""

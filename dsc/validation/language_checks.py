@@ -97,9 +97,9 @@ class LanguageChecker:
             )
         return names
 
-    def unknown_object(self, name: str, kind: str, path: Path) -> Iterator[Finding]:
+    def unknown_object(self, name: str, kind: str, names: Types, path: Path) -> Iterator[Finding]:
         """Yield a finding about a name that no known object of a type has."""
-        mistake = None if self._objects is None else self._objects.mistake(name, kind)
+        mistake = None if self._objects is None else self._objects.mistake(name, kind, scope=names)
         if mistake is not None:
             yield self._known_object(mistake, path)
 

@@ -23,6 +23,7 @@ from dsc.text.plot_files import load_plot
 from dsc.text.profiles import Profile, adapted, load_profile
 from dsc.validation import review_plot, validate_plot
 from dsc.validation.ignored import without_ignored
+from dsc.validation.objects import KnownObjects
 from knowledge_base.errors import InputError, Place, UnknownNameError, collecting, tolerated
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import holds
@@ -44,6 +45,7 @@ from planning.problem.derived import derivation
 from planning.problem.relevance import numeric_constructs
 from planning.robot.bringup import begin, simulated
 from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of, shipped_by
+from planning.robot.fact_names import sources_of, wrong_facts
 from planning.robot.simulation import Setup, Simulation
 from planning.robot.soundness import IMPLEMENTED, check_implementations, interfaces
 from planning.robot.targets import bundle_at
@@ -55,6 +57,7 @@ _PATIENT_SECONDS = 5.0
 """Time limit, in seconds, of the check whether the first goal can be reached."""
 _SKIPPED = frozenset({"build", "dist", "node_modules", "site-packages", "__pycache__"})
 _NAMES_PLOT = re.compile(r"^plot:\s*[\"']?([\w.-]+)", re.MULTILINE)
+_WORD = re.compile(r"[\w-]+")
 _IMPLEMENTS = re.compile(r"^implements:\s*[\"']?([\w.-]+)", re.MULTILINE)
 _NAMES_PROFILE = re.compile(r"^profile:", re.MULTILINE)
 _DEFINES_PROBLEM = re.compile(r"\(\s*define\s*\(\s*problem\b", re.IGNORECASE)
@@ -177,6 +180,7 @@ class _Robot:
         with tolerated():
             self._plots = plots_of(self._bundles)
         self._simulation: Simulation | None = None
+        self._objects: Mapping[str, str] | None = None
         self._components = self._made()
         self._domain = self._merged()
 
@@ -211,7 +215,9 @@ class _Robot:
         skills, interfaces, exclusive = self._skills(), self._interfaces(), self._exclusive()
         schema = None if self._domain is None else self._domain.schema
         world = None if schema is None else self._world(schema)
-        objects = None if world is None else {**self._objects_nearby(world.schema), **_objects_of(world)}
+        self._objects = objects = (
+            None if world is None else {**self._objects_nearby(world.schema), **_objects_of(world)}
+        )
         found: list[Finding] = []
         for plot in self._plots:
             mistakes = validate_plot(plot, library, schema, skills, interfaces, objects=objects, thorough=True)
@@ -222,6 +228,9 @@ class _Robot:
             self._check_task(world or KnowledgeBase(self._domain.schema))
             found += self._unplannable(self._domain)
             found += () if world is None else _without_values(self._domain, world)
+            found += wrong_facts(
+                sources_of([*(self._components or ()), *filter(None, [self._simulation])]), self._domain.schema
+            )
         self._check_components()
         return found
 
@@ -332,6 +341,8 @@ class _Robot:
     def _check_main(self, main: str) -> None:
         plots = {plot.name: plot for plot in self._plots}
         if main not in plots:
+            if main in {name for file in self._broken_files() for name in _NAMES_PLOT.findall(_text(file))}:
+                return  # its file has the mistake
             raise UnknownNameError(f"the bundle '{self._bundle.name}' has no plot '{main}'", found=main, valid=plots)
         for name, parameter in plots[main].parameters.items():
             if parameter.required:
@@ -358,6 +369,9 @@ class _Robot:
         own = self._bundle.profiles
         if own is not None and own.is_dir():
             yield from sorted(own.glob("*.yaml"))
+            for file in own.glob("*.yml"):
+                with tolerated():
+                    raise InputError("the name of a profile's file ends in `.yaml`", place=Place(str(file)))
         for file in () if self._folder is None else _sources(self._folder):
             if file.parent.name != "profiles" and _is_profile(file):
                 yield file
@@ -370,6 +384,18 @@ class _Robot:
                 configure(made, profile)
         with tolerated():
             adapted(self._plots, profile)
+            self._check_objects(profile)
+
+    def _check_objects(self, profile: Profile) -> None:
+        """Raise `InputError` for a value of a plot's parameter that is an unknown object, or one of another type."""
+        if self._domain is None or self._objects is None:
+            return
+        known, plots = KnownObjects(self._domain.schema, self._objects), {plot.name: plot for plot in self._plots}
+        for plot, values in profile.plots.items():
+            for name, value in values.items():
+                place, kind = profile.place(("plots", plot, name)), plots[plot].parameters[name].type
+                if isinstance(value, str) and (mistake := known.mistake(value, kind, place)) is not None:
+                    raise mistake
 
     def _broken_files(self) -> Iterator[Path]:
         """Yield the plot files that were not read, because they contain an error."""
@@ -410,12 +436,14 @@ def _calls(form: Form) -> Iterator[Call]:
 
 
 def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) -> list[Finding]:
-    """Return the findings without those about missing plots, or their actions, that are in files with errors."""
+    """Return the findings without those about plots, actions and outcomes that are in files with errors."""
     texts = [_text(file) for file in broken]
     plots = {name for text in texts for name in _NAMES_PLOT.findall(text)}
     actions = {name for text in texts for name in _IMPLEMENTS.findall(text)}
     missing = {(_KNOWN_PLOT, name) for name in plots} | {(IMPLEMENTED, name) for name in actions}
-    return [one for one in findings if (one.code, one.error.found) not in missing]
+    words = {word for text in texts for word in _WORD.findall(text)}
+    events = {("rule-event", word) for word in words} | {("known-event", word) for word in words}
+    return [one for one in findings if (one.code, one.error.found) not in missing | events]
 
 
 # -- files ---------------------------------------------------------------------------------------------------

@@ -130,7 +130,7 @@ def table(mistakes: list[dict[str, Any]]) -> str:
         f"with this table. `dsc check` finds {count['check']} of them, the start of the command finds {count['start']}, and the run finds",
         f"{count['run']}. The run names {count['named'] + count['endless']} others and continues. The last {count['never']} are not found, and {count['works']} have no effect.",
         "",
-        f"A programmer who did not know the checks planted {len(outside)} of the mistakes, and rated the first answers strictly:",
+        f"Programmers who did not know the checks planted {len(outside)} of the mistakes, and rated the first answers strictly:",
         f"{first} were good. The other answers were then improved.",
     ]
     for kind, title in KINDS.items():

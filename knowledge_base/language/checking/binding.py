@@ -95,9 +95,7 @@ def check_bound(e: Expression | Term, bindings: Mapping[str, Value]) -> None:
 
 def unbound_error(name: str, place: Place | None, bound: Iterable[str]) -> UnknownNameError:
     """Return the error for a free variable in a condition that must be true or false."""
-    return UnknownNameError(
-        f"the variable '?{name}' is not bound; to ask whether there is one, use (exists (?{name}) ...)",
-        place=place,
-        found=f"?{name}",
-        valid=[f"?{known}" for known in bound],
-    )
+    said, valid = f"the variable '?{name}' is not bound", [f"?{known}" for known in bound]
+    if "." not in name:  # `?event.item` is a part of a value, which no quantifier binds
+        said += f"; to ask whether there is one, use (exists (?{name}) ...)"
+    return UnknownNameError(said, place=place, found=f"?{name}", valid=valid)

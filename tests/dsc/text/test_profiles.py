@@ -85,7 +85,7 @@ def test_what_has_to_be_bound_is_missed_without_a_profile_too():
     [
         ("wiat: {seconds: 1}", "there is no plot 'wiat'; did you mean 'wait'?"),
         ("wait: {second: 1}", "plot 'wait' has no parameter 'second'; did you mean 'seconds'?"),
-        ("wait: {seconds: long}", "'wait.seconds' is from 1 to 60; found long"),
+        ("wait: {seconds: long}", "'wait.seconds' is a number, from 1 to 60; found the text long"),
         ("wait: {seconds: 0.5}", "'wait.seconds' is from 1 to 60; found 0.5"),
         ("wait: {times: 3}", "'wait.times' is not changed by profile, but by nobody"),
         ("wait: {why: 3}", "'wait.why' is a text; found 3"),

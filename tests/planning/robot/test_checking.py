@@ -319,3 +319,37 @@ def test_an_object_without_the_value_that_others_have_is_named(project):
     ])  # fmt: skip
     (found,) = check_project(str(project))
     assert "no initial value of (size kitchen), which counts as 0" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "said"),
+    [
+        ('removed=(fact("robot-in", before),)', 'removed=(fact("robot_in", before),)', "no predicate or function 'robot_in'; did you mean 'robot-in'?"),
+        ('removed=(fact("robot-in", before),)', 'removed=(fact("robot-in"),)', "'robot-in' takes 1 arguments, as in (robot-in ?r - room); found 0"),
+        ('removed=(fact("robot-in", before),)', 'removed=(fact("robot-in", *[before]),)', None),
+    ],
+)  # fmt: skip
+def test_facts_in_python_are_checked_with_their_line(project, right, wrong, said):
+    planted(project, [("delivery.py", right, wrong, "")])
+    found = [one for one in check_project(str(project)) if one.code == "fact"]
+    assert len(found) == (said is not None)
+    if said is not None:
+        line = (project / "delivery.py").read_text().split(wrong)[0].count("\n") + 1
+        assert str(found[0]).startswith(f"{project / 'delivery.py'}:{line}:")
+        assert said in str(found[0])
+
+
+def test_a_mistake_in_one_plot_file_is_the_only_finding(project):
+    planted(project, [("plots/drive.yaml", "parameters:", "parameterss:", "")])
+    (found,) = check_project(str(project))
+    assert "unknown key 'parameterss'" in str(found)
+
+
+def test_an_object_in_a_profile_is_checked(project):
+    (project / "profiles" / "other.yaml").write_text("profile: other\nplots: {drive: {to: ofice}}\n")
+    (found,) = check_project(str(project))
+    assert "profiles/other.yaml:2:" in str(found)
+    assert "there is no object 'ofice' of type room; did you mean 'office'?" in str(found)
+    (project / "profiles" / "other.yaml").rename(project / "profiles" / "other.yml")
+    (found,) = check_project(str(project))
+    assert "the name of a profile's file ends in `.yaml`" in str(found)

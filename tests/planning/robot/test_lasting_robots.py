@@ -127,9 +127,9 @@ def test_a_plot_that_ends_with_a_failure_claims_no_success(dsc):
     ("words", "said"),
     [
         (["times=4"], "'beep.times' is from 1 to 3; found 4"),
-        (["times=two"], "found two"),
-        (["times=nan"], "'beep.times' is from 1 to 3; found"),
-        (["times="], "'beep.times' is from 1 to 3; found"),
+        (["times=two"], "found the text two"),
+        (["times=nan"], "'beep.times' is from 1 to 3; found nan"),
+        (["times="], "'beep.times' is a number, from 1 to 3; found the text"),
         (["times=2", "loud=yes"], "'beep.loud' is a boolean; found yes"),
     ],
 )
