@@ -30,8 +30,8 @@ def test_each_instance_begins_with_what_its_builder_says_and_has_values_of_its_o
     ("parameter", "value", "said"),
     [
         ("speed", 2.0, "'base.speed' is from 0.1 to 1.5; found 2"),
-        ("speed", "fast", "'base.speed' is from 0.1 to 1.5; found fast"),
-        ("speed", True, "found true"),
+        ("speed", "fast", "'base.speed' is a number, from 0.1 to 1.5; found the text fast"),
+        ("speed", True, "found the truth value true"),
         ("speed", float("nan"), "'base.speed' is from 0.1 to 1.5; found nan"),
         ("mode", "brisc", "'base.mode' is one of calm, brisk; found brisc; did you mean 'brisk'?"),
         ("cycle", -1, "'base.cycle' is 0 or more"),

@@ -170,7 +170,10 @@ def test_a_parameter_is_set_within_what_is_left_to_operators() -> None:
             {"do": "set", "owner": "base", "name": "sped", "value": 1},
             "component 'base' has no parameter 'sped'; did you mean 'speed'",
         ),
-        ({"do": "set", "owner": "wait", "name": "seconds", "value": "long"}, "'wait.seconds' is a number; found long"),
+        (
+            {"do": "set", "owner": "wait", "name": "seconds", "value": "long"},
+            "'wait.seconds' is a number; found the text long",
+        ),
         ({"do": "stepp"}, "there is nothing to do called 'stepp'; did you mean 'step'"),
         ({"do": "break", "on": {"stat": "clear"}}, "a breakpoint is on one of"),
         ({"do": "break", "on": {"condition": "(holdin cup1)"}}, "did you mean 'holding'"),

@@ -184,7 +184,7 @@ def test_one_action_at_a_time_proves_nothing_and_says_who_could():
     found = solved(PlannerProcess(), posed())
     assert isinstance(found, NoneFound)
     assert "no plan with one action at a time (unreachable: (mended f0), (mended f1))" in found.reason
-    assert "engines that could do several: aries" in found.reason
+    assert "engines that could do several: kairos" in found.reason
 
 
 def test_in_a_race_without_an_engine_for_durations_it_is_the_same():

@@ -70,4 +70,4 @@ def test_a_robot_says_which_condition_no_installed_engine_can_do(jars, world_of,
         [outcome] = robot.achieve("(sealed a)").emitted
     reason = outcome.attributes["reason"]
     assert (outcome.name, "jars.pddl:6:" in reason, "(> (litres ?j) 2)" in reason) == ("no_plan", True, True)
-    assert "no installed engine can do that, enhsp could (install enhsp)" in reason
+    assert "no installed engine can do that, kairos could (install kairos), enhsp could (install enhsp)" in reason
