@@ -174,7 +174,13 @@ def is_there(path: Path) -> bool:
     found = regular(path)
     if found is None and not path.parent.is_dir():
         raise StoreError(f"there is no folder '{path.parent}' for a store to be in", place=Place(str(path)))
-    require_no_strangers(path, there=bool(found and found.st_size))
+    try:
+        require_no_strangers(path, there=bool(found and found.st_size))
+    except StoreError:
+        made = regular(path)
+        if (found and found.st_size) or made is None or not made.st_size:
+            raise
+        require_no_strangers(path, there=True)  # another process has made the store since `found`
     if found is not None and not found.st_size:
         said = f"'{path.name}' is empty, and no store; a new store replaces no file"
         raise StoreError(said, place=Place(str(path)))
