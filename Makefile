@@ -44,7 +44,7 @@ mistakes: $(VENV)/.test   ## planted mistakes of users, and the answers of the c
 
 test-engines: $(VENV)/.engines   ## every planning engine for real
 	$(BIN)/dsc doctor
-	$(BIN)/python -m pytest -rs tests/planning/engines/test_real_engines.py
+	$(BIN)/python -m pytest -rs tests/planning/engines/test_real_engines.py tests/planning/engines/test_kairos.py
 
 test-all: $(VENV)/.engines check   ## as test, with every planning engine and the page in a browser
 	$(BIN)/dsc doctor
