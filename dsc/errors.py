@@ -29,12 +29,11 @@ class Finding:
     @property
     def text(self) -> str:
         """The error with its remedy, without its place."""
-        error = str(self.error) if self.place is None else str(self.error).removeprefix(f"{self.place}: ")
-        return error + (f" ({self.fix})" if self.fix else "")
+        return self.error.text + (f" ({self.fix})" if self.fix else "")
 
     def __str__(self) -> str:
         """Return one line for people: place, error, remedy and, for a warning, the level."""
-        text = f"{self.text}" if self.place is None else f"{self.place}: {self.text}"
+        text = self.text if self.place is None else f"{self.place}: {self.text}"
         return text if self.level == "error" else f"{text} [{self.level}]"
 
 
@@ -45,6 +44,12 @@ class PlotError(InputError):
         first = findings[0].error
         super().__init__(first.message, place=first.place, found=first.found, valid=first.valid)
         self.findings = tuple(findings)
+
+    @property
+    def text(self) -> str:
+        """All findings, one per line, the first one without its place."""
+        first, *others = self.findings
+        return "\n".join([first.text, *map(str, others)])
 
     def __str__(self) -> str:
         """Return all findings, one per line."""

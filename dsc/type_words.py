@@ -7,7 +7,7 @@ import re
 from knowledge_base.errors import InputError
 from knowledge_base.facts import GEOMETRY, MOST_NUMBERS
 from knowledge_base.language.checking.inputs import shown
-from knowledge_base.spelling import TRUTH_VALUES, is_plain_name, value_text
+from knowledge_base.spelling import TRUTH_VALUES, is_plain_name, text_inside, value_text
 
 _LIKE_PYTHON = re.compile(r"(list|map|dict|optional)[\[(<](.*)[\])>]", re.IGNORECASE)
 
@@ -39,8 +39,6 @@ _LONGEST_SHOWN = 80
 _QUOTED = r'"(?:[^"\\]|\\.)*"'
 _BLANKS = re.compile(rf"({_QUOTED})|\s+", re.DOTALL)
 _CHOICE = re.compile(rf'(?:{_QUOTED}|[^"|])+', re.DOTALL)
-_ESCAPE = re.compile(r"\\(.)", re.DOTALL)
-_ENDS = {"n": "\n", "r": "\r"}
 
 
 def collapse_blanks(text: str) -> str:
@@ -70,7 +68,7 @@ def _choice_value(word: str) -> str | float:
             return read(word)
         except ValueError:
             continue
-    return _ESCAPE.sub(lambda found: _ENDS.get(found[1], found[1]), word[1:-1]) if word[:1] == '"' else word
+    return text_inside(word) if word[:1] == '"' else word
 
 
 def bound_text(bound: float) -> str:

@@ -162,17 +162,21 @@ class InputError(DscError):
             self.place = place
         return self
 
-    def __str__(self) -> str:
-        """Return one line: place, message, and the nearest valid name or a short list of the valid names."""
-        text = f"{self.place}: {self.message}" if self.place else self.message
+    @property
+    def text(self) -> str:
+        """The message, with the nearest valid name or a short list of the valid names, without the place."""
         meant = self.nearest
         if meant is not None:
-            return f"{text}; did you mean '{printable(meant)}'{_difference(self.found or '', meant)}?"
+            return f"{self.message}; did you mean '{printable(meant)}'{_difference(self.found or '', meant)}?"
         if self.valid:
             names = [printable(shortened(name, MAX_NAME)) for name in self.valid[:8]]
             shown = ", ".join(names) + (", …" if len(self.valid) > 8 else "")
-            return f"{text}; valid: {shown}"
-        return text
+            return f"{self.message}; valid: {shown}"
+        return self.message
+
+    def __str__(self) -> str:
+        """Return one line: the place and the text."""
+        return f"{self.place}: {self.text}" if self.place else self.text
 
 
 def _difference(found: str, meant: str) -> str:

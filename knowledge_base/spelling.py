@@ -19,6 +19,8 @@ A_NAME_IS = (
     f"a name has 1 to {LONGEST_NAME} printable characters in lower case without blanks, parentheses, quotes, ';' and"
     " '?'; it begins with neither '-' nor ':' and is not a number, true, false or #t"
 )
+_ESCAPE = re.compile(r"\\(.)", re.DOTALL)
+_ENDS = {"n": "\n", "r": "\r"}  # a reader of files may replace one line ending by another
 _TIME_PASSED = "#t"
 """The elapsed time in PDDL+."""
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?")
@@ -66,6 +68,11 @@ def value_text(value: str | float | tuple[float, ...], *, quoted: bool = False) 
         return value
     escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r")
     return f'"{escaped}"'
+
+
+def text_inside(quoted: str) -> str:
+    """Return the text that `value_text` writes as this text in quotes."""
+    return _ESCAPE.sub(lambda found: _ENDS.get(found[1], found[1]), quoted[1:-1])
 
 
 def brief_repr(value: DataclassInstance) -> str:

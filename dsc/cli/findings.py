@@ -22,17 +22,19 @@ SELECT = Annotated[str | None, typer.Option("--select", metavar="CODE,...", help
 STRICT = Annotated[bool, typer.Option("--strict", help="Warnings count, too.")]
 
 
-def form_of(*, json: bool, sarif: bool) -> Form:
-    """Return the form that the options of a command state."""
-    return "sarif" if sarif else "json" if json else "text"
-
-
-def findings_with(found: Found, selection: str | None) -> Found:
-    """Return the findings with one of the codes in a selection, e.g. `known-object,goal`; without it, all.
+def report(every: Found, nothing: str, *, json: bool, sarif: bool, selection: str | None, strict: bool) -> bool:
+    """Print the selected findings as the options of a command state; return whether one of them counts as a mistake.
 
     Raises:
-        UnknownNameError: there is no such code.
+        UnknownNameError: there is no code of the selection.
     """
+    found = _with_codes(every, selection)
+    _print(found, "sarif" if sarif else "json" if json else "text", nothing)
+    return any(strict or finding.level == "error" for _, finding in found)
+
+
+def _with_codes(found: Found, selection: str | None) -> Found:
+    """Return the findings with one of the codes in a selection, e.g. `known-object,goal`; without it, all."""
     codes = [] if selection is None else [code.strip() for code in selection.split(",")]
     for code in codes:
         if code not in CODES:
@@ -40,7 +42,7 @@ def findings_with(found: Found, selection: str | None) -> Found:
     return [(file, one) for file, one in found if not codes or one.code in codes]
 
 
-def print_findings(found: Found, form: Form, nothing: str) -> None:
+def _print(found: Found, form: Form, nothing: str) -> None:
     """Print findings; without findings, text for people is `nothing`."""
     if form == "json":
         print_json([_as_data(file, finding) for file, finding in found])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, findings_with, form_of, print_findings
+from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, report
 from dsc.errors import Finding
 from knowledge_base.cli.console import print_json
 from knowledge_base.errors import InputError, UnknownNameError
@@ -88,10 +88,8 @@ def check(
     neighbours = Neighbours()
     components = None if robot is None else _components_of(robot)
     every = [(file, finding) for file in files for finding in _findings(file, domain, neighbours, components)]
-    found = findings_with(every, select)
     nothing = f"{len(files)} plot{'s' * (len(files) != 1)} checked, no mistakes found"
-    print_findings(found, form_of(json=json, sarif=sarif), nothing)
-    wrong = [finding for _, finding in found if strict or finding.level == "error"]
+    wrong = report(every, nothing, json=json, sarif=sarif, selection=select, strict=strict)
     raise typer.Exit(BAD_INPUT if wrong else 0)
 
 

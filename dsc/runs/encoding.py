@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, replace
+from dataclasses import fields
 from typing import Any
 
 from dsc.engine.machine_state import NOTHING, FrameState
@@ -81,7 +81,11 @@ SKILLS = "skills"
 
 def signature_forms(skills: Iterable[SkillSignature]) -> Form:
     """Return the signatures of skills as plain data; of a default, only its presence remains."""
-    return {f"{one.component}.{one.name}": asdict(replace(one, defaults=dict.fromkeys(one.defaults))) for one in skills}
+    return {f"{one.component}.{one.name}": _signature_form(one) for one in skills}
+
+
+def _signature_form(skill: SkillSignature) -> Form:
+    return {one.name: getattr(skill, one.name) for one in fields(skill)} | {"defaults": dict.fromkeys(skill.defaults)}
 
 
 def signatures_in(header: Mapping[str, Any], form: Callable[[str], Any]) -> list[SkillSignature] | None:

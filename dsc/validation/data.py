@@ -27,7 +27,7 @@ from dsc.dynamic.steps import (
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model import actions
-from dsc.model.data_forms import is_literal, literal_parts, literal_value
+from dsc.model.data_forms import is_literal, literal_parts
 from dsc.model.language import term_text
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
@@ -340,7 +340,7 @@ class _Data:
             yield self._subject.caught(error, path, "term")
             return
         for text in wanted or (None,):
-            types = self._checker.parts_of(text, parts, is_list=isinstance(literal_value(term, str), list))
+            types = self._checker.parts_of(text, parts, is_list=isinstance(term, Call) and term.function == "list")
             if isinstance(types, str):
                 message = f"'{path[-1]}' is of type {text}, and {term_text(term)} {types}"
                 yield self._subject.finding(path, "value-fits", message, found=term_text(term))

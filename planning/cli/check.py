@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, findings_with, form_of, print_findings
+from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, report
 
 
 def check_command(
@@ -33,7 +33,6 @@ def check_command(
         findings = check_project(target)
     finally:
         logging.disable(logging.NOTSET)
-    found = findings_with([(target, finding) for finding in findings], select)
-    print_findings(found, form_of(json=json, sarif=sarif), f"{target}: no mistakes found")
-    wrong = [finding for _, finding in found if strict or finding.level == "error"]
+    every, nothing = [(target, finding) for finding in findings], f"{target}: no mistakes found"
+    wrong = report(every, nothing, json=json, sarif=sarif, selection=select, strict=strict)
     raise typer.Exit(BAD_INPUT if wrong else 0)

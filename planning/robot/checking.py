@@ -81,7 +81,8 @@ def check_project(target: str) -> list[Finding]:
         bundle = _bundle(target) if not path.is_dir() or _has_robot(path) else None
         unread = any(str(one.place.source).endswith(".pddl") for one in errors if one.place is not None)
         whole = bundle is not None and (bundle.domain is not None or not unread)
-        robot = None if bundle is None else _Robot(bundle, path if path.is_dir() else None, whole=whole)
+        files = list(_sources(path)) if path.is_dir() else []
+        robot = None if bundle is None else _Robot(bundle, files, whole=whole)
         findings = [] if robot is None else robot.findings()
         if robot is not None and not errors and not findings:
             findings += robot.pointless()
@@ -90,8 +91,8 @@ def check_project(target: str) -> list[Finding]:
         read = {Path(one.place.source or "").resolve() for one in findings if one.place is not None}
         if bundle is not None:
             read |= {Path(_source(plot) or "").resolve() for plot in bundle.plots}
-        findings += _files(file for file in _sources(path) if file.resolve() not in read)
-    return _sorted(without_ignored(findings, _sources(path) if path.is_dir() else ()))
+        findings += _files(file for file in files if file.resolve() not in read)
+    return _sorted(without_ignored(findings, files))
 
 
 def _profile_findings(file: Path) -> list[Finding]:
@@ -165,13 +166,13 @@ class _Robot:
 
     Args:
         bundle: the bundle.
-        folder: the folder of the project; `None` without a project.
+        files: the sources of the project; empty without a project.
         whole: whether its domain could be read, so that plots and skills can be compared with it.
     """
 
-    def __init__(self, bundle: Bundle, folder: Path | None = None, *, whole: bool = True) -> None:
+    def __init__(self, bundle: Bundle, files: Sequence[Path] = (), *, whole: bool = True) -> None:
         self._bundle = bundle
-        self._folder = folder
+        self._files = files
         self._whole = whole
         self._bundles: tuple[Bundle, ...] = (bundle,)
         with tolerated():
@@ -180,6 +181,7 @@ class _Robot:
         with tolerated():
             self._plots = plots_of(self._bundles)
         self._simulation: Simulation | None = None
+        self._initial: KnowledgeBase | None = None
         self._objects: Mapping[str, str] | None = None
         self._components = self._made()
         self._domain = self._merged()
@@ -214,7 +216,7 @@ class _Robot:
         library = self._library()
         skills, interfaces, exclusive = self._skills(), self._interfaces(), self._exclusive()
         schema = None if self._domain is None else self._domain.schema
-        world = None if schema is None else self._world(schema)
+        self._initial = world = None if schema is None else self._world(schema)
         self._objects = objects = (
             None if world is None else {**self._objects_nearby(world.schema), **_objects_of(world)}
         )
@@ -264,9 +266,8 @@ class _Robot:
         return None
 
     def _objects_nearby(self, schema: Schema) -> dict[str, str]:
-        """Return the objects of the problem files in the project's folder."""
-        files = () if self._folder is None else _sources(self._folder)
-        return {name: kind for file in files for name, kind in _objects_in(file, schema).items()}
+        """Return the objects of the project's problem files."""
+        return {name: kind for file in self._files for name, kind in _objects_in(file, schema).items()}
 
     def _check_task(self, world: KnowledgeBase) -> None:
         """Check the goal and the main plot."""
@@ -295,11 +296,9 @@ class _Robot:
 
         The parts of the robot must be without mistakes.
         """
-        domain = self._domain
-        if domain is None:
+        domain, world = self._domain, self._initial
+        if domain is None or world is None:
             return
-        world = KnowledgeBase(domain.schema)
-        begin(world, self._bundle, self._simulation, "check")
         goal, place = self._first_goal(world)
         if goal is None or free_variables(goal):
             return
@@ -372,7 +371,7 @@ class _Robot:
             for file in own.glob("*.yml"):
                 with tolerated():
                     raise InputError("the name of a profile's file ends in `.yaml`", place=Place(str(file)))
-        for file in () if self._folder is None else _sources(self._folder):
+        for file in self._files:
             if file.parent.name != "profiles" and _is_profile(file):
                 yield file
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from dsc.errors import Finding
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
+from knowledge_base.language.checking.check import check_arity
 from knowledge_base.world.schema import Schema
 
 _OTHERS = frozenset({"dsc", "planning", "knowledge_base", "builtins", "abc", "typing"})
@@ -53,6 +54,10 @@ def _mistake(call: ast.Call, schema: Schema, place: Place) -> InputError | None:
     if declared is None:
         valid = (*schema.predicates, *schema.functions)
         return UnknownNameError(f"there is no predicate or function '{name}'", place=place, found=name, valid=valid)
-    if given == declared.arity or any(isinstance(arg, ast.Starred) for arg in call.args):
+    if any(isinstance(arg, ast.Starred) for arg in call.args):
         return None
-    return SchemaError(f"'{name}' takes {declared.arity} arguments, as in {declared}; found {given}", place=place)
+    try:
+        check_arity(declared, given, place)
+    except SchemaError as error:
+        return error
+    return None

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from knowledge_base.errors import ParseError, Place
 from knowledge_base.language.syntax.expression import TypedVariable
-from knowledge_base.spelling import TRUTH_VALUES, is_number
+from knowledge_base.spelling import TRUTH_VALUES, is_number, text_inside
 
 MAX_DEPTH = 100
 
@@ -27,8 +27,6 @@ _TOKEN = re.compile(
 )
 _HALF = re.compile("[\udc80-\udcff]")  # bytes of a file that are not UTF-8
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
-_ESCAPE = re.compile(r"\\(.)", re.DOTALL)
-_ENDS = {"n": "\n", "r": "\r"}  # a reader of files may replace one line ending by another
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,8 +142,7 @@ def _word(kind: str, token: str, place: Place) -> Word:
         raise ParseError(f"'{token}' has a control character", place=place)
     if kind == "word":
         return Word(token, place)
-    plain = _ESCAPE.sub(lambda m: _ENDS.get(m[1], m[1]), token[1:-1])
-    return Word(plain, place, quoted=True)
+    return Word(text_inside(token), place, quoted=True)
 
 
 class TypedName(NamedTuple):
