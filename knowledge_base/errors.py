@@ -169,9 +169,8 @@ class InputError(DscError):
         if meant is not None:
             return f"{self.message}; did you mean '{printable(meant)}'{_difference(self.found or '', meant)}?"
         if self.valid:
-            names = [printable(shortened(name, MAX_NAME)) for name in self.valid[:8]]
-            shown = ", ".join(names) + (", …" if len(self.valid) > 8 else "")
-            return f"{self.message}; valid: {shown}"
+            names = [printable(shortened(name, MAX_NAME)) for name in self.valid[:8]] + ["…"] * (len(self.valid) > 8)
+            return f"{self.message}; valid: {', '.join(names)}"
         return self.message
 
     def __str__(self) -> str:
