@@ -26,6 +26,7 @@ CODES: Mapping[str, str] = {
     "done-can-fire": "The content of a state with a transition on `done` has a final state.",
     "effect": "An effect can be applied: its predicates, functions, types and arguments are declared.",
     "effects-of-the-action": "All plots for one planning action have equal `effects`.",
+    "emitted-outcome": "A plot emits each outcome that it declares under `emits`.",
     "engine": "An installed planning engine can plan with the domain.",
     "every-action-has-a-plot": "Each planning action has a plot that `implements` it.",
     "every-outcome-is-wired": "Each outcome of a state has a transition or a rule in every case.",

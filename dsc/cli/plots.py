@@ -271,7 +271,7 @@ def _findings(
         library, broken = neighbours.of(file, plot)
         skills = None if components is None else [one for c in components for one in c.skills().values()]
         declared = None if components is None else {c.name: c.interface() for c in components}
-        findings = validate_plot(plot, library, known, skills, declared) or review_plot(plot, library)
+        findings = validate_plot(plot, library, known, skills, declared) or review_plot(plot, library, skills)
     except InputError as error:
         return [Finding(error, "readable")]
     findings = without_ignored(findings, [file])

@@ -15,7 +15,7 @@ from dsc.calls import Ended, SkillCall, Status
 from dsc.components.interface import Interface
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
 from dsc.components.parameters import Configuration, Parameters
-from dsc.components.ports import TAKES, EventActivations, messages
+from dsc.components.ports import TAKES, EventActivations, messages, plain_methods
 from dsc.components.streams import Push, Stream
 from dsc.components.turns import Turns
 from dsc.data_types import check_all, data_type
@@ -300,7 +300,8 @@ class Component(ComponentHooks, RestartHooks):
     def interface(self) -> Interface:
         """Return the parameters, modes and messages for the checks of charts before a run."""
         own = type(self).receive is Component.receive
-        return Interface(self.parameters.declared, self.modes, self._taken() if own else None)
+        methods = plain_methods(type(self)) - plain_methods(Component)
+        return Interface(self.parameters.declared, self.modes, self._taken() if own else None, methods)
 
     def update(self, event: str, *values: Any) -> None:
         """Pass new values to the test of each activation of the event; later activations begin with these values.

@@ -19,17 +19,25 @@ class Interface:
         parameters: the declared parameters by name; empty permits any name.
         modes: the declared modes; empty permits any mode.
         messages: the parts of each message by the message's name; `None` permits any message.
+        methods: the public methods that charts cannot use, as they have no decorator.
     """
 
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     modes: Collection[str] = ()
     messages: Mapping[str, SkillSignature] | None = None
+    methods: Collection[str] = ()
 
     def require_mode(self, component: str, mode: str) -> None:
         """Raise `UnknownNameError` for a mode, or state of the life cycle, that charts cannot switch to."""
         if self.modes and mode not in (NEUTRAL, *self.modes, Life.INIT, Life.SHUTDOWN):
             valid = (NEUTRAL, *self.modes)
             raise UnknownNameError(f"component '{component}' has no mode '{mode}'", found=mode, valid=valid)
+
+    def remedy(self, decorator: str, component: str, method: str) -> str:
+        """Return the advice to decorate a method that charts cannot use; empty if there is no such method."""
+        return (
+            f"put `@{decorator}` above method '{method}' of component '{component}'" if method in self.methods else ""
+        )
 
     def message(self, component: str, port: str) -> SkillSignature | None:
         """Return the parts of a message, or `None` if they are unknown.

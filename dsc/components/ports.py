@@ -41,6 +41,7 @@ from dsc.components.hooks import contained
 from dsc.loop_calls import LoopCalls
 from dsc.outcomes import Outcome
 from dsc.skills import (
+    DECLARED,
     SkillBody,
     SkillSignature,
     declaration,
@@ -192,3 +193,10 @@ async def _activate(component: Any, body: SkillBody, call: SkillCall[Any], argum
     activations: EventActivations = component.activations
     with activations.tested(body.__name__, test):
         return await failed
+
+
+def plain_methods(kind: type[object]) -> frozenset[str]:
+    """Return the public methods of a component class that have no decorator of this package."""
+    bodies = inspect.getmembers(kind, inspect.isfunction)
+    decorated = {DECLARED, TAKES}
+    return frozenset(name for name, body in bodies if name[0] != "_" and decorated.isdisjoint(vars(body)))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Annotated, TypeVar
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from dsc.events import LED_AWAY
 from dsc.model.actions import Configure, Send, Switch, Trigger
@@ -188,6 +188,13 @@ class Handler(Frozen):
     do: Reaction
     priority: float | None = Field(default=None, strict=True)
     preempt: bool = Field(default=False, strict=True)
+
+    @field_validator("do", mode="before")
+    @classmethod
+    def _refuse_then(cls, do: object) -> object:
+        if isinstance(do, Mapping) and "then" in do:
+            raise ValueError("`then` belongs to a rule: after a handler the plot continues; see `rules` and `interrupt`")
+        return do
 
     @property
     def label(self) -> str:

@@ -42,7 +42,8 @@ def _command(
             try:
                 interface.message(*port.split("."))
             except UnknownNameError as error:
-                yield subject.caught(error, (*path, "send"), "component-message")
+                fix = interface.remedy("takes", *port.split("."))
+                yield subject.caught(error, (*path, "send"), "component-message", fix)
         case _:
             pass
 

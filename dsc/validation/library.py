@@ -17,7 +17,7 @@ from dsc.validation.data import check_data
 from dsc.validation.flow import check_wiring
 from dsc.validation.reach import check_reach
 from dsc.validation.shape import check_size, check_structure
-from dsc.validation.subject import Components, Subject
+from dsc.validation.subject import Components, Subject, by_trigger
 from knowledge_base.errors import InputError
 from knowledge_base.language.checking.inputs import require, require_several
 from knowledge_base.world.schema import Schema
@@ -68,7 +68,7 @@ def validate_plot(
     """
     require(plot, ActionPlot, "a plot is an ActionPlot, as load_plot and parse_plot give it")
     _require_parts(library, schema)
-    signatures = None if skills is None else {f"{s.component}.{s.name}": s for s in _known(skills)}
+    signatures = None if skills is None else by_trigger(_known(skills))
     subject = Subject(plot, library, schema, signatures, components, objects)
     for check in (check_structure, check_size):
         findings = list(islice(check(subject), MAX_FINDINGS))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import chain, groupby, islice
 
 from dsc.dynamic.library import Library
@@ -14,10 +14,12 @@ from dsc.model.actions import Trigger, flat
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import CONTINUE, ENTER, Handler, Rule
 from dsc.model.states import CompositeState, State
+from dsc.skills import SkillSignature
 from dsc.validation.candidates import MOST, review_candidates
+from dsc.validation.emissions import review_outcomes
 from dsc.validation.library import MAX_FINDINGS
 from dsc.validation.names import review_names
-from dsc.validation.subject import Subject
+from dsc.validation.subject import Subject, by_trigger
 from dsc.validation.turns import waiting_parts
 from knowledge_base.language.checking.contradiction import contradictory
 from knowledge_base.language.syntax.expression import (
@@ -31,20 +33,26 @@ _ONWARD = {"before": frozenset({ENTER}), "after": frozenset({CONTINUE})}
 """Continuations that lead to the next rule of the step, by the place of the rule."""
 
 
-def review_plot(plot: ActionPlot, library: Library, exclusive: Collection[str] = ()) -> list[Finding]:
+def review_plot(
+    plot: ActionPlot,
+    library: Library,
+    skills: Iterable[SkillSignature] | None = None,
+    exclusive: Collection[str] = (),
+) -> list[Finding]:
     """Return at most `MAX_FINDINGS` warnings about a plot for which `validate_plot` returns no finding.
 
     Args:
         plot: the plot.
         library: the plots that it may use.
+        skills: the deployed skills; with `None`, outcomes of plots that trigger skills are not checked.
         exclusive: the skills, as `component.skill`, of the components that execute one skill at a time.
     """
     if plot.dialect != "dsc":
         return []
-    subject = Subject(plot, library)
+    subject = Subject(plot, library, skills=None if skills is None else by_trigger(skills))
     checks = (
         _rules(subject), _handlers(subject), _transitions(subject), review_candidates(subject), review_names(subject),
-        waiting_parts(subject, exclusive),
+        review_outcomes(subject), waiting_parts(subject, exclusive),
     )  # fmt: skip
     return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
 

@@ -19,7 +19,7 @@ from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model.actions import Trigger
 from dsc.model.plot import Path
-from dsc.model.rules import ENTER, RESPONSES, RESUME, RETRY, STEP, Handler, Rule
+from dsc.model.rules import ENTER, RESPONSES, RESUME, RETRY, STEP, Handler, Response, Rule
 from dsc.model.states import State
 from dsc.validation.subject import Subject, Types
 
@@ -167,6 +167,12 @@ class RuleScope:
         known, skills, listen = {*self._subject.plot.receives, *self._fired}, self._subject.skills, handler.listen
         if listen is None:
             if handler.on not in known and handler.on not in COMPONENT_EVENTS:
+                asked = Rule(on=handler.on, do=Response())
+                if any(handler.on in outcomes for outcomes in self._sources(asked)):
+                    message = f"a handler answers no outcome of a step, as '{handler.on}' is"
+                    fix = "answer it by a rule, under `rules`"
+                    yield self._subject.finding((*path, "on"), "known-event", message, fix, found=handler.on)
+                    return
                 message = f"nothing here fires the event '{handler.on}'"
                 fix = "events from outside are declared under `receives`, those of components come by `listen`"
                 yield self._subject.finding((*path, "on"), "known-event", message, fix, found=handler.on, valid=known)
@@ -209,6 +215,10 @@ class RuleScope:
 def unknown_skill(subject: Subject, path: Path, trigger: Trigger) -> Finding:
     """Return the finding about a trigger whose component or skill is missing."""
     message, found = f"no component offers the skill or event '{trigger.trigger}'", trigger.trigger
+    component, _, method = found.partition(".")
+    interface = subject.interfaces.get(component)
+    if interface is not None and (fix := interface.remedy("skill", component, method)):
+        return subject.finding(path, "known-skill", message, fix, found=found)
     return subject.finding(path, "known-skill", message, found=found, valid=subject.skills or ())
 
 

@@ -31,6 +31,11 @@ Way = tuple[Path, str, Transition]
 """Path, label of the trigger, and transition."""
 
 
+def by_trigger(skills: Iterable[SkillSignature]) -> dict[str, SkillSignature]:
+    """Return signatures of skills by the name that triggers use, `component.skill`."""
+    return {f"{one.component}.{one.name}": one for one in skills}
+
+
 class Subject:
     """A plot to check, the names to which it may refer, and its states and transitions by name and by path.
 

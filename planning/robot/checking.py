@@ -24,6 +24,7 @@ from dsc.text.profiles import Profile, adapted, load_profile
 from dsc.validation import review_plot, validate_plot
 from dsc.validation.ignored import without_ignored
 from dsc.validation.objects import KnownObjects
+from dsc.validation.skill_types import review_types
 from knowledge_base.errors import InputError, Place, UnknownNameError, collecting, tolerated
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import holds
@@ -223,13 +224,14 @@ class _Robot:
         found: list[Finding] = []
         for plot in self._plots:
             mistakes = validate_plot(plot, library, schema, skills, interfaces, objects=objects, thorough=True)
-            found += mistakes or review_plot(plot, library, exclusive)
+            found += mistakes or review_plot(plot, library, skills, exclusive)
         found = without_consequences(found, self._broken_files())
         if self._domain is not None:
             found += without_consequences(check_implementations(library, self._domain), self._broken_files())
             self._check_task(world or KnowledgeBase(self._domain.schema))
             found += self._unplannable(self._domain)
             found += () if world is None else _without_values(self._domain, world)
+            found += review_types(skills or (), self._domain.schema)
             found += wrong_facts(
                 sources_of([*(self._components or ()), *filter(None, [self._simulation])]), self._domain.schema
             )

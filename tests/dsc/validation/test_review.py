@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from dsc.cli.plots import app
 from dsc.dynamic.library import Library
+from dsc.skills import SkillSignature
 from dsc.text.plot_files import Neighbours, load_plot, parse_plot
 from dsc.validation import review_plot, validate_plot
 
@@ -414,3 +415,31 @@ def test_a_handler_that_interrupts_is_never_asked_where_every_state_answers_itse
     assert about_handlers("{on: low, do: {use: step}}", text=text) == []
     guarded = text.replace("b: {on: {low: e}", "b: {on: {low: {to: e, when: (p)}}")
     assert about_handlers("{on: low, interrupt: true, do: {use: step}}", text=guarded) == []
+
+
+# -- outcomes ----------------------------------------------------------------------------------------------
+
+GRIP = SkillSignature("arm", "grip", {}, {}, {"slipped": {}})
+INNER = parse_plot("plot: inner\nemits: {lost: }\nstates: {e: {final: true, emit: lost}}\n")
+
+
+@pytest.mark.parametrize(
+    ("states", "never"),
+    [
+        ("{e: {final: true, emit: lost}}", []),
+        ("{a: {after: {seconds: 1, to: e, emit: lost}}, e: {final: true}}", []),
+        ("{a: {use: inner, on: {done: e}}, e: {final: true}}", []),
+        ("{a: {dynamic: [inner], on: {done: e, no_candidate: e}}, e: {final: true}}", []),
+        ("{a: {entry: {trigger: arm.grip, as: {slipped: lost}}, on: {done: e}}, e: {final: true}}", []),
+        ("{a: {use: ?which, on: {done: e}}, e: {final: true}}", []),  # any plot
+        ("{a: {entry: {trigger: other.go}, on: {done: e}}, e: {final: true}}", []),  # an unknown skill
+        ("{a: {entry: {trigger: arm.grip}, on: {done: e, slipped: e}}, e: {final: true}}", ["lost"]),
+        ("{a: {use: step, on: {done: e, lost: e, failed: e}}, e: {final: true}}", []),  # passes on if not active
+        ("{a: {on: {lost: e}}, e: {final: true}}", ["lost"]),
+    ],
+)
+def test_an_outcome_that_nothing_emits_is_a_warning_where_it_is_declared(states, never):
+    made = parse_plot(f"plot: p\nemits:\n  lost:\nstates: {states}\n", "p.yaml")
+    found = review_plot(made, Library([made, STEP, INNER]), [GRIP])
+    assert [one.error.found for one in found if one.code == "emitted-outcome"] == never
+    assert all(str(one).startswith("p.yaml:3:") for one in found if one.code == "emitted-outcome")

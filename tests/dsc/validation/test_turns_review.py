@@ -30,7 +30,7 @@ handlers:
 
 def said(text, exclusive=("arm.move",)):
     library = Library([plot(text), plot(INNER)])
-    return [str(one.error.message) for one in review_plot(library.plot("p"), library, exclusive)]
+    return [str(one.error.message) for one in review_plot(library.plot("p"), library, exclusive=exclusive)]
 
 
 def test_regions_that_wait_for_each_other_are_named_with_the_component():

@@ -49,6 +49,11 @@ ALONE = [
     ("plots/deliver_all.yaml", "(forall (?p - parcel) (exists (?r - room) (and (goes-to ?p ?r) (in ?p ?r))))", "(robot-in ofice)", "no object 'ofice' of type room; did you mean 'office'"),
     ("plots/deliver_all.yaml", "done: home", "done: {to: home, when: (in parcel3 hall)}", "no object 'parcel3' of type parcel; did you mean"),
     ("plots/deliver_all.yaml", "done: home", "done: {to: home, tell: (robot-in parcel1)}", "'parcel1' is of type parcel, not of type room"),
+    ("delivery.py", "@skill\n    async def put(", "async def put(", "put `@skill` above method 'put' of component 'gripper'"),
+    ("plots/drive.yaml", "emits: {", "emits: {broken: {}, ", "the plot never emits its outcome 'broken'"),
+    ("delivery.py", 'Annotated[str, "room"]', 'Annotated[str, "rom"]', "'to' of skill 'wheels.drive' is of the unknown type 'rom'; did you mean 'room'"),
+    ("plots/deliver_all.yaml", "rules:\n  - on: blocked\n    do: {then: retry, limit: 2}", "handlers:\n  - on: blocked\n    do: {tell: (robot-in hall)}", "'blocked' is (answer it by a rule, under `rules`)"),
+    ("plots/deliver_all.yaml", "rules:\n", "handlers:\n", "`then` belongs to a rule"),
     ("delivery.py", "-> Arrived | Blocked:", "-> Arrived:", "nothing here fires the event 'blocked'"),
 ]  # fmt: skip
 """Mistakes that others of `PLANTED` would hide."""
