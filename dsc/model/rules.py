@@ -193,7 +193,9 @@ class Handler(Frozen):
     @classmethod
     def _refuse_then(cls, do: object) -> object:
         if isinstance(do, Mapping) and "then" in do:
-            raise ValueError("`then` belongs to a rule: after a handler the plot continues; see `rules` and `interrupt`")
+            raise ValueError(
+                "`then` belongs to a rule: after a handler the plot continues; see `rules` and `interrupt`"
+            )
         return do
 
     @property

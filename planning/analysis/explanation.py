@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from knowledge_base.facts import Fact, Value
@@ -14,6 +14,7 @@ from knowledge_base.language.syntax.effect import Add, AllOf, Effect, ForEach, W
 from knowledge_base.language.syntax.expression import (
     And,
     Atom,
+    Comparison,
     Expression,
     Forall,
     Imply,
@@ -25,11 +26,12 @@ from knowledge_base.language.syntax.expression import (
 )
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.view import View
+from planning.analysis.ranges import Ranges, reached_literals
 from planning.model.cancellable_work import WorkLimit
 from planning.model.domain import PlanningAction, PlanningDomain
 from planning.model.plan import PlanStep
 from planning.model.problem import Problem
-from planning.model.quantities import Assignment, NumericBound, helps, value_of
+from planning.model.quantities import NumericBound
 from planning.problem.conditions import Every, Grounder, Literal, Residual, Some, is_so
 from planning.problem.construction import ProblemBuilder, check_goal
 from planning.problem.derived import derivation
@@ -41,46 +43,64 @@ _LONGEST_CHAIN = 6
 MOST_COUNTEREXAMPLES = 100
 """Upper bound of the objects that are listed for one violated `forall` of a goal."""
 _TOGETHER = "each goal fact can be reached by itself, but not all of them together"
-_NUMBERS = "no goal fact is unreachable if numbers change without bound, but no plan reaches the goal"
+_NUMBERS = (
+    "no plan reaches the goal with the numbers {}; if they changed without limit, each part of it could be reached"
+)
+_MOST_NUMBERS = 3
 
 
 def why_unsolvable(
     domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit | None = None
 ) -> tuple[str, ...]:
+    """Return the proven reasons why a goal is unreachable, see `proven_reasons`; without any, one general sentence."""
+    reasons, numbers = _reasons(domain, world, goal, patience or WorkLimit())
+    return reasons or (_NUMBERS.format(", ".join(numbers)) if numbers else _TOGETHER,)
+
+
+def proven_reasons(
+    domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit | None = None
+) -> tuple[str, ...]:
     """Return one sentence for each goal fact that no action sequence can reach even without deletions.
 
-    Each sentence follows the nearest actions back to missing facts. If each goal fact is reachable alone, the result
-    consists of the mutexes among the goal facts.
+    Each sentence follows the nearest actions back to missing facts, and to the limits of numbers. If each goal fact is
+    reachable alone, the result consists of the mutexes among the goal facts. It is empty if nothing is proven.
     """
+    return _reasons(domain, world, goal, patience or WorkLimit())[0]
+
+
+def _reasons(
+    domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit
+) -> tuple[tuple[str, ...], list[str]]:
+    """Return the proven reasons, and some numbers that actions change."""
     check_goal(goal, world)
     derived = derivation(domain)
     domain, world, goal = derived.domain, derived.world(world), derived.expand(goal)
     grounded = ProblemBuilder(domain).grounded(world, goal, patience=patience)
     if grounded.task is None:
-        return (f"{explain(goal, world).deciding} and no planning action changes that",)
-    grounder = Grounder(world, grounded.relevant.changing, patience=patience or WorkLimit())
+        return (f"{explain(goal, world).deciding} and no planning action changes that",), []
+    grounder = Grounder(world, grounded.relevant.changing, patience=patience)
     rules = tuple(JoinRule.of(case, grounder) for action in grounded.relevant.actions for case in _cases(action))
     reach = _Reach.of(grounded.task, world)
     known = dict.fromkeys([*_present(rules, world), *sorted(reach.facts, key=str)])
     causes = _Causes(domain, rules, grounder, reach, frozenset(known), ReachedFacts(known))
-    return tuple(dict.fromkeys(causes.of(grounded.wanted))) or _not_together(
-        domain, world, goal, patience or WorkLimit(), numeric=bool(grounded.task.numbering.bounds)
-    )
+    alone = tuple(dict.fromkeys(causes.of(grounded.wanted)))
+    return alone or _exclusions(domain, world, goal, patience), _changing(grounded.task)
 
 
-def _not_together(
-    domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit, *, numeric: bool
-) -> tuple[str, ...]:
-    """Return the mutexes among the goal facts, or a sentence if no two facts exclude each other.
-
-    Relaxed reachability ignores how far a number can change, so a `numeric` problem proves no reachable goal fact.
-    """
+def _exclusions(domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit) -> tuple[str, ...]:
+    """Return a sentence for each pair of goal facts that exclude each other."""
     patience.doing = "looking for goal facts that exclude each other"
     problem = ProblemBuilder(domain).build_problem(world, goal, patience=patience)
     pairs = mutexes(problem, patience)
     told = [(one, other) for one, other in pairs if _declared(one) and _declared(other)]
-    said = [f"{_as_written(one)} and {_as_written(other)} can never hold together" for one, other in told]
-    return tuple(said) or (_NUMBERS if numeric else _TOGETHER,)
+    return tuple(f"{_as_written(one)} and {_as_written(other)} can never hold together" for one, other in told)
+
+
+def _changing(task: Task) -> list[str]:
+    """Return the first numbers that are compared and that actions change, as text."""
+    changed = {change.fluent for way in task.ways.all for change in way.assignments}
+    read = dict.fromkeys(one for bound in task.numbering.bounds.values() for one in bound.fluents() if one in changed)
+    return [*map(str, itertools.islice(read, _MOST_NUMBERS)), *["…"] * (len(read) > _MOST_NUMBERS)]
 
 
 def _declared(fact: Fact) -> bool:
@@ -95,25 +115,26 @@ def _as_written(fact: Fact) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Reach:
-    """The facts and the changes of numbers that relaxed reachability allows.
+    """The facts and the ranges of numbers that relaxed reachability allows.
 
     Attributes:
         facts: the reachable facts, in positive normal form.
-        changes: the possible changes of numbers.
+        ranges: the ranges of the numbers.
         world: the present world.
     """
 
     facts: frozenset[Fact]
-    changes: tuple[Assignment, ...]
+    ranges: Ranges
     world: World
 
     @staticmethod
     def of(task: Task, world: World) -> _Reach:
-        reach, numbering = reachable(task), task.numbering
-        literals = reach.facts.keys() - numbering.fluents - numbering.bounds.keys()
-        taken = itertools.compress(task.ways.all, reach.taken)
-        changes = dict.fromkeys(change for way in taken for change in way.assignments)
-        return _Reach(frozenset([numbering.facts[one] for one in literals]), tuple(changes), world)
+        ranges, numbering = Ranges(world), task.numbering
+        if any(way.assignments for way in task.ways.all):
+            literals = reached_literals(task, ranges)
+        else:
+            literals = reachable(task).facts.keys() - numbering.fluents - numbering.bounds.keys()
+        return _Reach(frozenset([numbering.facts[one] for one in literals]), ranges, world)
 
     def allows(self, condition: Residual) -> bool:
         """Return whether each leaf of the condition is true or may become true independently of the other leaves."""
@@ -124,10 +145,7 @@ class _Reach:
                 present = is_so(fact, self.world) is positive
                 return present or as_fact(condition) in self.facts
             case NumericBound():
-                numbers = {one: value_of(self.world, one) for one in condition.fluents()}
-                return condition.holds(numbers) or any(
-                    helps(change, condition) for change in self.changes if change.fluent in numbers
-                )
+                return self.ranges.allow(condition)
             case Every(parts):
                 return all(map(self.allows, parts))
             case Some(parts):
@@ -166,7 +184,7 @@ class _Causes:
                     yield self.chain(wanted.fact) if wanted.positive else _stays(wanted.fact)
             case NumericBound():
                 if not self.reach.allows(wanted):
-                    yield f"{wanted} does not hold, and no planning action that can be taken changes that"
+                    yield f"{wanted} cannot hold: {self.reach.ranges.limits(wanted)}"
             case Every(parts):
                 for part in parts:
                     yield from self.of(part)
@@ -239,8 +257,16 @@ class _Causes:
         inner = dict.fromkeys(fact for c in unmet for fact in self.unreached(residuals[c]))
         missing = tuple(fact for fact in needed if fact not in self.reached)
         fixed = len(unmet) + sum(fact.predicate not in self.grounder.changing for fact in missing)
-        conditions = tuple(to_text(substitute(c, bindings)) for c in unmet)
+        conditions = tuple(self.with_limits(c, residuals[c], bindings) for c in unmet)
         return _Nearest(step, missing, conditions, tuple(inner), fixed)
+
+    def with_limits(self, condition: Expression, residual: Residual, bindings: Mapping[str, Value]) -> str:
+        """Return an unreachable condition as text, a comparison with the limits of its numbers."""
+        if isinstance(residual, NumericBound):
+            return f"{residual}, but {self.reach.ranges.limits(residual)}"
+        text = to_text(substitute(condition, bindings))
+        compared = explain(condition, self.reach.world, bindings).detail if isinstance(condition, Comparison) else None
+        return f"{text}, here {compared}" if compared else text
 
     def unreached(self, condition: Residual) -> Iterator[Fact]:
         """Yield the positive facts in a condition that no action sequence reaches."""

@@ -35,13 +35,13 @@ from knowledge_base.pddl import read_problem
 from knowledge_base.pddl.domain_text import read_domain
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
-from planning.analysis.explanation import mutexes, why_unsolvable
+from planning.analysis.explanation import proven_reasons
 from planning.engines.registry import able, installed, refusal
 from planning.execution.planning_component import PlanningComponent
 from planning.execution.shipped_plots import shipped_plots
 from planning.model.cancellable_work import WorkLimit, WorkLimitError
 from planning.model.domain import PlanningDomain
-from planning.problem.construction import build_problem, check_goal
+from planning.problem.construction import check_goal
 from planning.problem.derived import derivation
 from planning.problem.relevance import numeric_constructs
 from planning.robot.bringup import begin, simulated
@@ -285,12 +285,18 @@ class _Robot:
         """Yield a warning for numbers that actions change, if no installed engine can plan with them."""
         if any(installed(one) and one.races for one in able({"numeric"})):
             return
-        goals = [] if self._bundle.goal is None else [parse_condition(self._bundle.goal)]
-        goals += [state.goal for plot in self._plots for _, state, _ in plot.walk() if isinstance(state, DynamicState)
-                  and state.goal is not None]  # fmt: skip
-        constructs = {construct.place: construct for goal in goals for construct in numeric_constructs(domain, goal)}
-        for construct in constructs.values():
-            error = InputError(f"{replace(construct, place=None)}; {refusal({'numeric'}).who}", place=construct.place)
+        goals: list[tuple[Expression, Place | None]] = []
+        if self._bundle.goal is not None:
+            goals.append((parse_condition(self._bundle.goal), None))
+        for plot in self._plots:
+            goals += [(state.goal, plot.place((*path, "goal"))) for _, state, path in plot.walk()
+                      if isinstance(state, DynamicState) and state.goal is not None]  # fmt: skip
+        found = [(construct, place) for goal, place in goals for construct in numeric_constructs(domain, goal)]
+        constructs = {construct.place: (construct, place) for construct, place in found}
+        for construct, place in constructs.values():
+            outside = construct.place is None or construct.place.source is None
+            where = place if outside else construct.place
+            error = InputError(f"{replace(construct, place=None)}; {refusal({'numeric'}).who}", place=where)
             yield Finding(error, "engine", level="warning")
 
     def pointless(self) -> Iterator[Finding]:
@@ -310,10 +316,9 @@ class _Robot:
                 error = InputError("the goal holds in the initial knowledge, so nothing is planned", place=place)
                 yield Finding(error, "goal", level="warning")
                 return
-            problem = build_problem(domain, world, goal, patience=patience)
-            if problem.unreachable or mutexes(problem, patience):
-                why = "; ".join(why_unsolvable(domain, world, goal, patience))
-                error = InputError(f"the goal cannot be reached from the initial knowledge: {why}", place=place)
+            if reasons := proven_reasons(domain, world, goal, patience):
+                message = f"the goal cannot be reached from the initial knowledge: {'; '.join(reasons)}"
+                error = InputError(message, place=place)
                 yield Finding(error, "goal", level="warning")
 
     def _first_goal(self, world: KnowledgeBase) -> tuple[Expression | None, Place | None]:
@@ -415,7 +420,8 @@ def _without_values(domain: PlanningDomain, world: KnowledgeBase) -> Iterator[Fi
     Of a function with several parameters, e.g. distances, only the lack of all values is a warning.
     """
     forms = [form for action in domain.actions.values() for form in (action.precondition, action.effect)]
-    for name in sorted({call.function for form in forms for call in _calls(form)}):
+    read = {call.function for form in forms for call in _calls(form)}
+    for name in sorted(read & domain.schema.functions.keys()):  # another finding reports an undeclared one
         declared, known = domain.schema.functions[name], {one.args for one in world.values() if one.predicate == name}
         if declared.result not in {None, "number"}:
             continue

@@ -141,7 +141,7 @@ class Simulation(ABC):
             action: the id of the action, `SkillCall.action_id`.
             kinds: the faults that can hit the action.
         """
-        if not kinds or uniform(self.seed, action, "fault") >= self.chance:
+        if not kinds or uniform(self.seed, action, " ".join(("fault", *kinds))) >= self.chance:
             return None
         fault = Fault(choose(self.seed, action, "kind", kinds), action)
         if fault not in self.fired:

@@ -316,6 +316,37 @@ def test_a_number_without_an_initial_value_is_a_warning(project, functions, read
     assert found.level == "warning"
 
 
+@pytest.mark.parametrize(
+    ("condition", "effect", "said"),
+    [
+        ("(>= (chrge) 0)", "", "there is no function 'chrge'; did you mean 'charge'?"),
+        ("(>= (charge) (size ?to))", "", "there is no function 'size'"),
+        ("(>= (full) 1)", "", "there is no function 'full'"),
+        ("", "(decrease (chrge) 1)", "there is no function 'chrge'; did you mean 'charge'?"),
+        ("", "(decrease (charge) (robot-in ?to))", "there is no function 'robot-in'"),
+    ],
+)
+def test_an_undeclared_function_of_an_action_is_found(project, condition, effect, said):
+    planted(project, [
+        ("domain.pddl", "(full))\n", "(full)) (:functions (charge))\n", ""),
+        ("domain.pddl", ":precondition (robot-in ?from)", f":precondition (and (robot-in ?from) {condition})", ""),
+        ("domain.pddl", "(not (robot-in ?from))", f"(not (robot-in ?from)) {effect}", ""),
+    ])  # fmt: skip
+    errors = [one for one in check_project(str(project)) if one.level == "error"]
+    assert [said in str(one) for one in errors] == [True]
+    assert str(errors[0]).startswith(f"{project / 'domain.pddl'}:")
+
+
+def test_a_goal_beyond_the_limit_of_a_number_is_a_warning(project):
+    planted(project, [
+        ("domain.pddl", "(full))\n", "(full)) (:functions (charge))\n", ""),
+        ("domain.pddl", ":precondition (robot-in ?from)", ":precondition (and (robot-in ?from) (>= (charge) 5))", ""),
+        ("delivery.py", "            added=(\n", "            values={fact(\"charge\"): 2.0},\n            added=(\n", ""),
+    ])  # fmt: skip
+    said = [str(one) for one in check_project(str(project)) if one.code == "goal"]
+    assert ["which needs (>= (charge) 5), here 2.0 >= 5" in one for one in said] == [True]
+
+
 def test_an_object_without_the_value_that_others_have_is_named(project):
     planted(project, [
         ("domain.pddl", "(full))\n", "(full)) (:functions (size ?r - room))\n", ""),

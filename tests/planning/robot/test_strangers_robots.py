@@ -134,7 +134,7 @@ def test_a_project_runs_by_the_command_and_its_world_judges(project):
 
 
 def test_a_seed_determines_faults_and_the_report_counts_them(project):
-    first, again = (json.loads(dsc("run", project, "--seed", 2, "--faults", 0.5, "--json")) for _ in range(2))
+    first, again = (json.loads(dsc("run", project, "--seed", 1, "--faults", 0.5, "--json")) for _ in range(2))
     assert first | {"wall_s": 0} == again | {"wall_s": 0}
     assert {one["kind"] for one in first["faults"]} == {"blocked"}
     assert first["skill_failures"]["blocked"] == len(first["faults"])
