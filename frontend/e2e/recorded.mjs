@@ -39,6 +39,12 @@ async function saved(name) {
   return readFileSync(await download.path(), "utf8");
 }
 
+/** The path of a plan's step as the page tells it: by what the step does. */
+function inWords(path, seq) {
+  const { steps } = records.findLast((rec) => rec.seq < seq && rec.type === "plan.ordered");
+  return path.replace(/step_(\d+)$/, (_, number) => `${number} ${steps[number - 1].slice(1, -1)}`);
+}
+
 /** The configuration after a record, worked out here from the steps alone. */
 function configuration(seq) {
   const paths = new Set();
@@ -88,7 +94,7 @@ test("a decision record shows each candidate and the leaf that decided", async (
 test("a state tells its parameters, and its decision", async () => {
   const decision = first((rec) => rec.type === "decision" && rec.chosen === "stack");
   await goTo(decision.seq);
-  await page.getByLabel("Decision", { exact: true }).getByRole("button", { name: decision.state }).click();
+  await page.getByLabel("Decision", { exact: true }).getByRole("button", { name: inWords(decision.state, decision.seq) }).click();
   const state = page.getByLabel("State", { exact: true });
   await state.getByRole("row", { name: `?item ${decision.arguments.item}` }).first().waitFor();
   await state.getByLabel("stack: chosen").waitFor();

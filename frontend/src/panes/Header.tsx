@@ -1,6 +1,7 @@
 /** Which run this is, and how it stands. */
 
 import { session, useShown } from "../session";
+import { stopWords } from "./Controls";
 import { Help } from "./Help";
 
 export function Header() {
@@ -13,7 +14,7 @@ export function Header() {
       <strong>{String(header.run ?? "a run")}</strong>
       <span className="quiet">{facts.join(" · ")}</span>
       <span className={`badge ${live ? "live" : ""}`}>{live ? "live" : "recorded"}</span>
-      {paused && <span className="badge bad">stands still: {paused}</span>}
+      {paused && <span className="badge bad">stands still: {stopWords(paused, moment.seq)}</span>}
       {!connected && <span className="badge bad">not connected</span>}
       {last < expected && <span className="quiet" role="status">{`${last} of ${expected} records`}</span>}
       <span className="working" aria-label="Skills at work">

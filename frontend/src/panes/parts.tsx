@@ -4,6 +4,7 @@ import { Fragment } from "react";
 import { written, type ActionRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named,
   type PlanBrokenRec, type PlanFoundRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
 import type { Damaged } from "../core/sound";
+import { wordsIn } from "../core/words";
 import { session } from "../session";
 import { seconds } from "./Timeline";
 
@@ -12,7 +13,7 @@ const LINE = 300;
 
 /** What a record says, in a line. */
 export function inShort(rec: Rec): string {
-  const said = inWords(rec);
+  const said = session.history.inWords(inWords(rec), rec.seq);
   return said.length > LINE ? `${said.slice(0, LINE)}…` : said;
 }
 
@@ -26,12 +27,12 @@ function inWords(rec: Rec): string {
     }
     case "step": {
       const taken = (rec as StepRec).microsteps.flatMap((micro) => micro.taken);
-      return taken.length ? `${ending(taken[0]!.from)} → ${ending(taken.at(-1)!.to ?? "")}` : "the start";
+      return taken.length ? `${ending(rec, taken[0]!.from)} → ${ending(rec, taken.at(-1)!.to ?? taken.at(-1)!.from)}` : "the start";
     }
     case "scene": return `${(rec as SceneRec).things.length} things`;
     case "plan.ordered": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
     case "plan.none": return String((rec as Rec & { reason?: string }).reason ?? "");
-    case "decision": return `${(rec as DecisionRec).state}: ${(rec as DecisionRec).chosen ?? "no candidate"}`;
+    case "decision": return `${inPath(rec, (rec as DecisionRec).state)}: ${(rec as DecisionRec).chosen ?? "no candidate"}`;
     case "knowledge": return `${(rec as KnowledgeRec).author}: ${news(rec as KnowledgeRec)}`;
     case "rule": return (rec as RuleRec).rule;
     case "plan.found": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
@@ -43,8 +44,13 @@ function inWords(rec: Rec): string {
 }
 
 /** The last two parts of a path: enough to know it by. */
-function ending(path: string): string {
-  return path.split("/").slice(-2).join("/");
+function ending(rec: Rec, path: string): string {
+  return inPath(rec, path).split("/").slice(-2).join("/");
+}
+
+/** A path that a record names, in words. */
+export function inPath(rec: Rec, path: string): string {
+  return session.history.words(path, rec.seq);
 }
 
 function news(rec: KnowledgeRec): string {
@@ -105,14 +111,15 @@ export function Tree({ why, decider }: { why: Explanation; decider: Explanation 
   );
 }
 
-export function Values({ values }: { values: Named }) {
+/** `words` are those of names that no author wrote. */
+export function Values({ values, words }: { values: Named; words?: Readonly<Record<string, string>> | undefined }) {
   const names = Object.keys(values);
   if (names.length === 0) return null;
   return (
     <table className="values">
       <tbody>
         {names.map((name) => (
-          <tr key={name}><th scope="row">{`?${name}`}</th><td>{shortly(values[name])}</td></tr>
+          <tr key={name}><th scope="row">{wordsIn(words, name) ?? `?${name}`}</th><td>{shortly(values[name])}</td></tr>
         ))}
       </tbody>
     </table>
