@@ -57,6 +57,15 @@ function configuration(seq) {
   return paths;
 }
 
+test("a recorded run opens at its end, and says how it ended", async () => {
+  assert.equal(await shown(), records.length);
+  const { reason } = records.at(-1);
+  await page.getByRole("banner").getByText(`finished: ${reason}`).waitFor();
+  await goTo(1);
+  await page.getByRole("banner").getByRole("button", { name: "finished: " }).click();
+  assert.equal(await shown(), records.length);
+});
+
 test("the chart shows the change of the active state, and the transition taken in the trail", async () => {
   const step = first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("clear/execute/step_2")));
   await goTo(step.seq - 1);

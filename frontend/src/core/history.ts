@@ -39,6 +39,8 @@ export class History {
   private readonly checkpoints: Moment[] = [beginning()];
   /** The damaged records found so far. */
   readonly damages: Damaged[] = [];
+  /** The record of the run's end. */
+  end: EndRec | null = null;
   private tip = beginning();
   private kept = beginning();
 
@@ -172,6 +174,7 @@ export class History {
       const { hash, plot, words } = rec as PlotRec;
       this.plots.set(hash, words ? { ...plot, words } : plot);
     }
+    if (rec.type === "end") this.end = rec as EndRec;
     if (rec.type === "step") this.bind(rec as StepRec);
     const mark = MARKS.get(rec.type) ?? (rec.type === "end" && (rec as EndRec).problem ? "failure" : undefined);
     if (mark) this.marks[mark].push(rec.seq);

@@ -151,7 +151,10 @@ export interface RuleRec extends Rec {
 
 export interface EndRec extends Rec {
   readonly finished: boolean;
+  readonly reached?: boolean;
   readonly problem: string | null;
+  readonly reason?: string;
+  readonly programming_error?: string | null;
 }
 
 /** A fact as the language writes it. */

@@ -78,7 +78,7 @@ const SHAPES = new Map<string, readonly (readonly [string, Is])[]>([
   ["event", [["name", text], ["source", optional(text)]]],
   ["scene", [["things", list(thing)]]],
   ["rule", [["rule", text], ["state", text]]],
-  ["end", [["problem", optional(text)]]],
+  ["end", [["problem", optional(text)], ["reason", optional(text)]]],
   ["plan.found", [["plot", text], ["steps", texts], ["engine", optional(text)]]],
   ["plan.ordered", [["plot", text], ["steps", texts], ["links", optional(list(link))]]],
   ["plan.skipped", [["plot", text], ["steps", texts]]],

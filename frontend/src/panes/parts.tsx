@@ -1,6 +1,7 @@
 /** Small parts that several panes show: records by name, condition trees, tables of values. */
 
 import { Fragment } from "react";
+import { endWords } from "../core/ends";
 import { written, type ActionRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named,
   type PlanBrokenRec, type PlanFoundRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
 import type { Damaged } from "../core/sound";
@@ -38,7 +39,7 @@ function inWords(rec: Rec): string {
     case "plan.found": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
     case "plan.broken": return (rec as PlanBrokenRec).reason;
     case "damaged": return (rec as Damaged).why;
-    case "end": return (rec as EndRec).problem ?? "finished";
+    case "end": return endWords(rec as EndRec);
     default: return "";
   }
 }
