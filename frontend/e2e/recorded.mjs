@@ -165,6 +165,19 @@ test("world, plan and chart of a moment are saved as one SVG, in light colours a
   assert.equal(drawn.classes, 0);
 });
 
+test("while the robot plans, the page says so, with the goal, and says when the plan is there", async () => {
+  const asked = first((rec) => rec.type === "plan.asked");
+  const found = first((rec) => rec.type === "plan.found", asked.seq);
+  const plan = page.getByLabel("Plan", { exact: true });
+  await goTo(asked.seq);
+  await page.getByRole("banner").getByText("planning …").waitFor();
+  await plan.getByText("planning …").waitFor();
+  assert.ok((await plan.innerText()).includes(asked.goal));
+  await goTo(found.seq);
+  await plan.getByText("plan found").waitFor();
+  assert.equal(await page.getByText("planning …", { exact: true }).count(), 0);
+});
+
 test("the plan is there before and after a replan, with what broke it and who did", async () => {
   const broken = first((rec) => rec.type === "plan.broken");
   const old = records.findLast((rec) => rec.seq < broken.seq && rec.type === "plan.ordered");

@@ -11,6 +11,9 @@ export const HUB = 6;
 /** Where every step of a plan leads to if it fails. */
 const WAY_OUT = /^(replan|gave_up)(_\d+)*$/;
 
+/** Where a rule tries a step of a plan again, or skips it. */
+const FOR_RULES = /^step_\d+_(again|skipped)$/;
+
 /** With more states than that in a plot, what is not active is closed until it is opened: the rest can be read then. */
 export const MANY = 60;
 
@@ -155,9 +158,9 @@ function throughGates(ways: readonly Way[], gates: ReadonlySet<string>): Through
   });
 }
 
-/** States that a rule added and that nothing uses now: a generated plot has many. */
+/** States that rules need and that nothing uses now: a generated plot has many. */
 function isSpare(on: Showing, holder: string, id: string, state: PlotState): boolean {
-  return state.form.about?.startsWith("rule: ") === true && !on.moment.active.has(id) && !on.view.all.has(holder);
+  return (state.form.about?.startsWith("rule: ") === true || FOR_RULES.test(state.name)) && !on.moment.active.has(id) && !on.view.all.has(holder);
 }
 
 /** Ways between what is shown: those between the same two are one, those across a border are lifted to it. */

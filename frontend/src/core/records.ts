@@ -104,6 +104,15 @@ export interface SceneRec extends Rec {
   readonly things: readonly Thing[];
 }
 
+export interface PlanAskedRec extends Rec {
+  readonly goal: string;
+}
+
+export interface PlanNoneRec extends Rec {
+  readonly kind: string;
+  readonly reason: string;
+}
+
 export interface PlanFoundRec extends Rec {
   readonly plot: string;
   readonly steps: readonly string[];

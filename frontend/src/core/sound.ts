@@ -79,6 +79,8 @@ const SHAPES = new Map<string, readonly (readonly [string, Is])[]>([
   ["scene", [["things", list(thing)]]],
   ["rule", [["rule", text], ["state", text]]],
   ["end", [["problem", optional(text)], ["reason", optional(text)]]],
+  ["plan.asked", [["goal", text]]],
+  ["plan.none", [["reason", text]]],
   ["plan.found", [["plot", text], ["steps", texts], ["engine", optional(text)]]],
   ["plan.ordered", [["plot", text], ["steps", texts], ["links", optional(list(link))]]],
   ["plan.skipped", [["plot", text], ["steps", texts]]],

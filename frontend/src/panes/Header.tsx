@@ -18,6 +18,7 @@ export function Header() {
       {paused && <span className="badge bad">stands still: {stopWords(paused, moment.seq)}</span>}
       {!connected && <span className="badge bad">not connected</span>}
       {last < expected && <span className="quiet" role="status">{`${last} of ${expected} records`}</span>}
+      {moment.search?.type === "plan.asked" && <span className="badge plans">planning …</span>}
       <span className="working" aria-label="Skills at work">
         {working.length > 0 && `at work: ${working.join(", ")}`}
       </span>

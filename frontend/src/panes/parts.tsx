@@ -3,7 +3,7 @@
 import { Fragment } from "react";
 import { endWords } from "../core/ends";
 import { written, type ActionRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named,
-  type PlanBrokenRec, type PlanFoundRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
+  type PlanBrokenRec, type PlanAskedRec, type PlanFoundRec, type PlanNoneRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
 import type { Damaged } from "../core/sound";
 import { wordsIn } from "../core/words";
 import { session } from "../session";
@@ -11,6 +11,9 @@ import { seconds } from "./Timeline";
 
 /** In a line; what is longer is cut: a pane would stand still over it. */
 const LINE = 300;
+
+/** Characters of a goal in a line. */
+const GOAL = 60;
 
 /** What a record says, in a line. */
 export function inShort(rec: Rec): string {
@@ -32,7 +35,8 @@ function inWords(rec: Rec): string {
     }
     case "scene": return `${(rec as SceneRec).things.length} things`;
     case "plan.ordered": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
-    case "plan.none": return String((rec as Rec & { reason?: string }).reason ?? "");
+    case "plan.asked": return `planning … ${shortGoal(rec as PlanAskedRec)}`;
+    case "plan.none": return `no plan: ${(rec as PlanNoneRec).reason}`;
     case "decision": return `${inPath(rec, (rec as DecisionRec).state)}: ${(rec as DecisionRec).chosen ?? "no candidate"}`;
     case "knowledge": return `${(rec as KnowledgeRec).author}: ${news(rec as KnowledgeRec)}`;
     case "rule": return (rec as RuleRec).rule;
@@ -42,6 +46,10 @@ function inWords(rec: Rec): string {
     case "end": return endWords(rec as EndRec);
     default: return "";
   }
+}
+
+function shortGoal({ goal }: PlanAskedRec): string {
+  return goal.length > GOAL ? `${goal.slice(0, GOAL)}…` : goal;
 }
 
 /** The last two parts of a path: enough to know it by. */
