@@ -66,7 +66,10 @@ export class Session {
         this.opening ||= !said.live && this.wanted === null && this.history.last === 0;
         this.set({ header: said.header, wrong: strange(said), live: said.live, control: said.control, expected: said.last, connected: true, following });
       },
-      status: (said: Status) => this.set({ live: said.live, paused: said.paused, expected: said.last }),
+      status: (said: Status) => {
+        const resumed = said.live && !this.shown.live && this.shown.moment.seq === this.history.last;
+        this.set({ live: said.live, paused: said.paused, expected: said.last, ...(resumed && { following: true }) });
+      },
       records: (from, records) => {
         this.history.append(from, records);
         if (!this.waits()) this.later();
