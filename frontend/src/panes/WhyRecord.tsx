@@ -79,7 +79,7 @@ function Broken({ rec }: { rec: PlanBrokenRec }) {
 function Rule({ rec }: { rec: RuleRec }) {
   return (
     <Head rec={rec}>
-      <b>{rec.rule}</b>, a rule for <button className="link" onClick={() => session.select({ kind: "state", path: rec.state })}>{inPath(rec, rec.state)}</button>
+      <b>{rec.rule}</b> at <button className="link" onClick={() => session.select({ kind: "state", path: rec.state })}>{inPath(rec, rec.state)}</button>
     </Head>
   );
 }

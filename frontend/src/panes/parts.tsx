@@ -23,7 +23,10 @@ export function inShort(rec: Rec): string {
 
 function inWords(rec: Rec): string {
   switch (rec.type) {
-    case "event": return `${(rec as EventRec).name} from ${(rec as EventRec).source}`;
+    case "event": {
+      const { name, source } = rec as EventRec;
+      return source === "timer" ? "the timer of a state" : `${name} from ${source}`;
+    }
     case "action": {
       const { action, skill, port, value, component, mode } = rec as ActionRec;
       if (action === "wait") return `${skill} waits for ${(rec as ActionRec).for}`;
@@ -31,7 +34,7 @@ function inWords(rec: Rec): string {
     }
     case "step": {
       const taken = (rec as StepRec).microsteps.flatMap((micro) => micro.taken);
-      return taken.length ? `${ending(rec, taken[0]!.from)} → ${ending(rec, taken.at(-1)!.to ?? taken.at(-1)!.from)}` : "the start";
+      return taken.length ? `${ending(rec, taken[0]!.from)} → ${ending(rec, taken.at(-1)!.to ?? taken.at(-1)!.from)}` : (rec as StepRec).microsteps.some((micro) => micro.entered.length) ? "the start" : "the run leaves its states";
     }
     case "scene": return `${(rec as SceneRec).things.length} things`;
     case "plan.ordered": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
