@@ -67,7 +67,7 @@ async function opened(trace, count) {
   try {
     const { first, all } = await unwatched(browser, program.url, count);
     const { page } = await open(browser, program.url);
-    await page.waitForSelector(".react-flow__node .state.active");
+    await page.waitForSelector(".react-flow__node .state");
     await loaded(page, count);
     const jumps = await page.evaluate(scrub, { count, jumps: JUMPS });
     const frames = await page.evaluate(dragged, { count, seconds: SECONDS });
@@ -91,7 +91,7 @@ async function unwatched(browser, url, count) {
     while (!(await tab("Runtime.evaluate", { expression, returnByValue: true })).result.value) await new Promise((done) => setTimeout(done, 10));
     return performance.now() - start;
   };
-  const first = await until(`document.querySelector(".react-flow__node .state.active") !== null`);
+  const first = await until(`document.querySelector(".react-flow__node .state") !== null`);
   const all = await until(`Number(document.querySelector("input[type=range]").max) >= ${count}`);
   await tab("Page.close");
   return { first, all };

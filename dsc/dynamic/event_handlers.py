@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from dsc.dynamic.responses import FreshNames
+from dsc.dynamic.fresh_names import FreshNames
 from dsc.dynamic.steps import mentioned_in
 from dsc.events import DONE
 from dsc.model.actions import Emit, Internal, Tell
@@ -40,7 +40,7 @@ def with_handlers(plot: ActionPlot, written: ActionPlot, added: FreshNames, entr
         entrances: for a step with insertions before it, the connector through which the step is entered.
     """
     interrupting = [one for one in written.handlers if one.interrupt]
-    listening = {one.on: added.event(f"{one.on}_heard") for one in written.handlers if one.listen is not None}
+    listening = {one.on: added.event(f"{one.on}_heard", one.on) for one in written.handlers if one.listen is not None}
     handling = _Handling(added, listening)
     if interrupting:
         states = handling.interrupted(plot.states, interrupting, entrances, at_top=True)
@@ -80,13 +80,13 @@ class _Handling:
     ) -> States:
         on, more = dict(state.on), dict[str, AnyState]()
         for handler in handlers:
-            handled = self._added.state(f"{name}_{handler.on}_handled")
+            handled = self._added.state(f"{name}_{handler.on}_handled", _words(handler))
             leading: dict[str, Transition] = {}
             for then in sorted({*handler.do.on.values()} - {RESUME}):
                 if at_top:
                     leading[then] = Transition(target=entrances.get(then, then))
                 else:  # no transition leaves its scope; this state waits for the transition at the top level
-                    waiting = self._added.state(f"{handled}_then_{then}")
+                    waiting = self._added.state(f"{handled}_then_{then}", f"then {then}")
                     more[waiting] = State(about=handler.label)
                     leading[then] = Transition(target=waiting, do=(Emit(emit=self._leaving(then)),))
             more[handled] = self._handled(handler, entrances.get(name, name), leading)
@@ -109,35 +109,38 @@ class _Handling:
     def _leaving(self, target: str) -> str:
         """Return the name of the internal event that leads to the state `target`."""
         if target not in self._leading:
-            self._leading[target] = self._added.event(f"then_{target}")
+            self._leading[target] = self._added.event(f"then_{target}", f"then {target}")
         return self._leading[target]
 
     def around(self, plot: ActionPlot, handlers: Iterable[Handler]) -> ActionPlot:
         """Return a plot with one orthogonal state: a region with `plot`, and a region for each handled event."""
         handlers = list(handlers)
         beside = [handler for handler in handlers if not handler.interrupt]
-        reached = {name: self._added.state(f"{name}_reached") for name in _ends(plot)}
+        around, words = self._added.state(ACTIVE, f"{plot.name} and its handlers"), self._added.words
+        reached = {name: self._added.state(f"{name}_reached", name) for name in _ends(plot)}
+        words.events.update({event: name for name, event in reached.items()})
         first = initial_of(plot)
         regions = {"plot": Region(states=_inside(plot, reached), initial=reached.get(first, first))}
         for event in dict.fromkeys(handler.on for handler in beside):
             mine = [handler for handler in beside if handler.on == event]
             regions[f"on_{event}"] = Region(states=self._awaiting(event, mine))
+        words.states.update({f"{around}:{region}": region.replace("on_", "on ", 1) for region in regions})
         over = {name: _told_its_attributes(end) for name, end in _ends(plot).items()}
         on = {reached[name]: (Transition(target=name),) for name in over}
         for event, heard in self._listening.items():
             mentioned = [mentioned_in(handler) for handler in handlers if handler.on == event]
             on[event] = (_passed_on(heard, frozenset().union(*mentioned)),)
         entry = tuple([handler.listen for handler in handlers if handler.listen is not None])
-        around = OrthogonalState(regions=regions, entry=entry, on=on)
-        return plot.model_copy(update={"states": {self._added.state(ACTIVE): around, **over}, "initial": None})
+        active = OrthogonalState(regions=regions, entry=entry, on=on)
+        return plot.model_copy(update={"states": {around: active, **over}, "initial": None})
 
     def _awaiting(self, event: str, handlers: list[Handler]) -> States:
-        awaited = self._added.state(f"{event}_awaited")
+        awaited = self._added.state(f"{event}_awaited", f"waits for {event}")
         ways, more = [], dict[str, AnyState]()
         for handler in handlers:
             handled = None
             if handler.do.acts:
-                handled = self._added.state(f"{event}_handled")
+                handled = self._added.state(f"{event}_handled", _words(handler))
                 leading = {
                     then: Transition(target=awaited, do=(Emit(emit=self._leaving(then)),))
                     for then in sorted({*handler.do.on.values()} - {RESUME})
@@ -165,6 +168,11 @@ class _Handling:
             use=do.use, arguments=do.arguments, entry=do.command, on={DONE: onward, **ways}, about=handler.label,
             priority=handler.priority, preempt=handler.preempt, handles=True,
         )  # fmt: skip
+
+
+def _words(handler: Handler) -> str:
+    """Return the author's name of a handler; without one, its event."""
+    return handler.name or f"handles {handler.on}"
 
 
 def _ends(plot: ActionPlot) -> dict[str, FinalState]:

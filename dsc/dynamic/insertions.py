@@ -12,7 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import partial
 
-from dsc.dynamic.responses import FreshNames, Onward, Responses, States, again
+from dsc.dynamic.fresh_names import FreshNames
+from dsc.dynamic.responses import Onward, Responses, States, again
 from dsc.dynamic.steps import Plots, Step, about_step, concerns
 from dsc.events import DONE
 from dsc.model.actions import Assign
@@ -133,7 +134,7 @@ class Insertions:
             key = f"{mark}_{number}"
             default = partial(self._default, by_default=by_default, following=following, last=last)
             onward = partial(self._onward, number=number, name=name, state=state, default=default)
-            connector = self._added.state(key)
+            connector = self._added.state(key, f"{rule.place} {name}")
             made: States = {}
             branches = self._responses.execute(rule, name, key, onward, made)
             if branches[-1].guard is not None:

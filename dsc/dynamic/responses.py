@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
-from collections import ChainMap
-from collections.abc import Callable, Container, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
 
+from dsc.dynamic.fresh_names import FreshNames
 from dsc.dynamic.steps import Plots, filled
 from dsc.events import DONE, FAILURES, GAVE_UP, SKILL_FAILURES
 from dsc.model.actions import Assign, Block, Choose, Emit, Internal, Log, Tell, Withdraw
-from dsc.model.declarations import PlotVariable
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import CONTINUE, ENTER, GIVE_UP, REPLAN, RETRY, Rule
 from dsc.model.states import AnyState, FinalState, State, SubmachineState
@@ -61,7 +58,7 @@ class Responses:
         guard, counting = self._limit(rule, key)
         if not rule.do.acts:
             return [_joined(rule, guard, counting, self._handed_out(after)) for after in onward(rule)]
-        name = self._added.state(f"{key}_{rule.do.use or 'command'}")
+        name = self._added.state(f"{key}_{rule.do.use or 'command'}", rule.label)
         kept: dict[str, lang.Term] = {}
         ways = {DONE: onward(rule), **{outcome: onward(rule.after_outcome(outcome)) for outcome in rule.do.on}}
         on = {event: tuple(self._afterwards(way, key, kept) for way in found) for event, found in ways.items()}
@@ -140,7 +137,7 @@ class Responses:
         """Return a new variable for each term; add the assignments of the terms to these variables to `kept`."""
         found: dict[str, lang.Term] = {}
         for name, term in terms.items():
-            variable = self._added.variable(f"kept_{key}_{name}", "symbol")
+            variable = self._added.variable(f"kept_{key}_{name}", f"{name}, kept", "symbol")
             kept[variable] = term
             found[name] = lang.Variable(variable)
         return found
@@ -169,7 +166,7 @@ class Responses:
         limit = limit_of(rule, generated=self._plot.generated)
         if limit is None:
             return rule.when, {}
-        counter = self._added.variable(f"tries_{key}", "number", 0)
+        counter = self._added.variable(f"tries_{key}", f"tries of {rule.label}", "number", 0)
         tries = lang.Variable(counter)
         below = lang.Comparison("<", tries, lang.Constant(limit))
         guard = below if rule.when is None else lang.And((below, rule.when))
@@ -257,43 +254,3 @@ def _joined(rule: Rule, guard: lang.Expression | None, counting: Terms, after: T
             "rule": rule.label,
         }
     )
-
-
-class FreshNames:
-    """Generator of unused names in one plot.
-
-    Attributes:
-        variables: the added variables by name.
-    """
-
-    def __init__(self, plot: ActionPlot) -> None:
-        self._names = {name for name, _, _ in plot.walk()}
-        self._events = {*plot.receives, *plot.emits}
-        self._declared = plot.parameters, plot.variables, plot.outputs
-        self.variables: dict[str, PlotVariable] = {}
-
-    def state(self, wanted: str) -> str:
-        """Return an unused name for a state: the wanted name, or the wanted name with a number."""
-        name = _unused(wanted, self._names)
-        self._names.add(name)
-        return name
-
-    def event(self, wanted: str) -> str:
-        """Return an unused name for an internal event: the wanted name, or the wanted name with a number."""
-        name = _unused(wanted, self._events)
-        self._events.add(name)
-        return name
-
-    def variable(self, wanted: str, type_: str, initial: Any = None) -> str:
-        """Add a variable and return its unused name: the wanted name, or the wanted name with a number."""
-        taken = ChainMap[str, object](self.variables, *self._declared)  # type: ignore[arg-type]
-        name = _unused(wanted.lower().replace("-", "_"), taken)
-        declared = {"type": type_} if initial is None else {"type": type_, "initial": initial}
-        self.variables[name] = PlotVariable.model_validate(declared)
-        return name
-
-
-def _unused(name: str, taken: Container[str]) -> str:
-    """Return the name if it is not in `taken`; else the name with the smallest unused number from 2."""
-    numbered = (f"{name}_{number}" for number in itertools.count(2))
-    return name if name not in taken else next(other for other in numbered if other not in taken)

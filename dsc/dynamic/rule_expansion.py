@@ -6,8 +6,9 @@ from collections.abc import Container, Iterable, Mapping, MutableMapping, Sequen
 from functools import partial
 
 from dsc.dynamic.event_handlers import with_handlers
+from dsc.dynamic.fresh_names import FreshNames
 from dsc.dynamic.insertions import Insertions
-from dsc.dynamic.responses import FreshNames, Responses, States, because, reason_of
+from dsc.dynamic.responses import Responses, States, because, reason_of
 from dsc.dynamic.steps import Plots, Step, about_step, answerable, answers_in_plans, concerns
 from dsc.events import DONE, GAVE_UP, NO_CANDIDATE, PROGRAMMING_ERROR
 from dsc.model.actions import Assign, Emit
@@ -32,7 +33,7 @@ def expand(plot: ActionPlot, plots: Plots) -> ActionPlot:
     expanded = plot.model_copy(update={**expansion.scope(plot), "rules": (), "handlers": ()})
     if plot.handlers:
         expanded = with_handlers(expanded, plot, added, expansion.detours.entrances)
-    return expanded.model_copy(update={"variables": {**plot.variables, **added.variables}})
+    return expanded.model_copy(update={"variables": {**plot.variables, **added.variables}}).with_words(added.words)
 
 
 class _Expansion:
@@ -126,7 +127,7 @@ def led_away(
     leading = {rule.outcome: rule for rule in rules if rule.leads_away and rule.then in beside}
     if not leading:
         return on
-    counter = added.variable(f"left_{name}", "number", 0)
+    counter = added.variable(f"left_{name}", f"times that rules have left {name}", "number", 0)
     ways = {**on, DONE: tuple(_resetting(way, counter) for way in on.get(DONE, ()))}
     own = on.get(GAVE_UP, ())
     for event, rule in leading.items():
@@ -134,7 +135,7 @@ def led_away(
         reason = f"the budget of {most} new plans is used up: rules have led to '{rule.then}' once more"
         ways[event] = (_way(rule, counter, most), *(because(reason, way) for way in own))
         if not _settles(own):
-            report = added.event(f"{GAVE_UP}_{name}_{rule.then}")
+            report = added.event(f"{GAVE_UP}_{name}_{rule.then}", f"{GAVE_UP} of {name}")
             abandoned[report] = reason
             ways[event] += (Transition(do=(Emit(emit=report),)),)
     return ways

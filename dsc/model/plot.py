@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 from pydantic_core import PydanticCustomError
@@ -36,6 +36,20 @@ Path = FormPath
 
 _STATE_NAME = re.compile(r"[^/#][^/]*")
 # Slashes separate state names in paths. In a stored state, a name that begins with # identifies a region.
+
+
+class AddedNames(NamedTuple):
+    """Names that the expansion of rules and handlers added to a plot, each with words for people.
+
+    Attributes:
+        states: words of the added states by name; a region has the name `STATE:REGION`.
+        events: words of the added internal events by name.
+        variables: words of the added variables by name.
+    """
+
+    states: dict[str, str]
+    events: dict[str, str]
+    variables: dict[str, str]
 
 
 class ActionPlot(Written):
@@ -82,6 +96,7 @@ class ActionPlot(Written):
     generated: bool = Field(default=False, strict=True)
     dialect: Literal["dsc", "scxml"] = "dsc"
     _text: str | None = PrivateAttr(default=None)
+    _words: AddedNames = PrivateAttr(default=AddedNames({}, {}, {}))
     _repr_svg_ = svg_by("dsc.drawing:draw")
 
     def with_default(self, name: str, value: object, who: Who) -> ActionPlot:
@@ -206,6 +221,17 @@ class ActionPlot(Written):
     def digest(self) -> str:
         """Hash of the content as 12 hexadecimal digits; equal plots, with equal order of states, have equal digests."""
         return hashlib.sha256(self.text.encode()).hexdigest()[:12]
+
+    @property
+    def words(self) -> AddedNames:
+        """The words for the names that an expansion added. The written form omits them."""
+        return self._words
+
+    def with_words(self, names: AddedNames) -> ActionPlot:
+        """Return a copy of the plot with the words for names that an expansion added."""
+        copied = self.model_copy()
+        copied._words = names  # noqa: SLF001  a plot, like this one
+        return copied
 
     def __eq__(self, other: object) -> bool:
         """Compare the contents of two plots, without the places in their files."""

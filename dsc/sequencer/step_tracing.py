@@ -166,7 +166,8 @@ class StepTracer:
                 digest = bound.plot.digest
                 if digest not in self.known_plots:
                     self.known_plots.add(digest)
-                    self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form())
+                    words = {"words": bound.plot.words._asdict()} if any(bound.plot.words) else {}
+                    self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form(), **words)
 
 
 def _micro(micro: steps.Microstep) -> dict[str, Any]:

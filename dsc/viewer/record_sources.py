@@ -14,7 +14,8 @@ from dsc.viewer.records import RecordLog, read_trace
 from knowledge_base.errors import HistoryError, Place, StoreError
 from knowledge_base.exchange import delta_form, schema_form, world_form
 from knowledge_base.facts import Change
-from knowledge_base.journal.sidecar_files import is_database
+from knowledge_base.journal.file import located
+from knowledge_base.journal.sidecar_files import has_writer, is_database
 from knowledge_base.store import KnowledgeBase
 
 LOOK_EVERY_S = 0.2
@@ -47,6 +48,8 @@ def followed(log: RecordLog, look: Callable[[], bool]) -> Iterator[RecordLog]:
 def following_run(path: Path) -> Iterator[RecordLog]:
     """Yield the records of the last run in a store; append new records during the block.
 
+    The log is live while a program has the store of an unfinished run open.
+
     Raises:
         StoreError: the file is missing, not a store, has no run, or cannot be read.
     """
@@ -57,12 +60,16 @@ def following_run(path: Path) -> Iterator[RecordLog]:
 
     def look() -> bool:
         nonlocal place
+        written = has_writer(located(path))  # before the records, so that none follows a log that is over
         with archive(path, again=True) as runs:
             for here, line in runs.lines(run.number, place):
                 if (record := _record(line, len(log), path)).seq > len(log):  # the last macrostep may get more records
                     log.receive(record)
                 place = here
-            return runs.run(run.number).ended is None
+            unfinished = runs.run(run.number).ended is None
+        if unfinished and written != log.live:
+            log.mark(live=written)
+        return unfinished
 
     if look():
         with followed(log, look):

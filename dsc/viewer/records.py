@@ -76,7 +76,11 @@ class RecordLog:
 
     def end(self) -> None:
         """Mark the end of the records."""
-        self._live = False
+        self.mark(live=False)
+
+    def mark(self, *, live: bool) -> None:
+        """Note whether more records may be appended: a killed run is over, until a program resumes it."""
+        self._live = live
         self.wake()
 
     def on_more(self, waker: Callable[[], None]) -> Callable[[], None]:

@@ -39,6 +39,12 @@ async function saved(name) {
   return readFileSync(await download.path(), "utf8");
 }
 
+/** The path of a plan's step as the page tells it: by what the step does. */
+function inWords(path, seq) {
+  const { steps } = records.findLast((rec) => rec.seq < seq && rec.type === "plan.ordered");
+  return path.replace(/step_(\d+)$/, (_, number) => `${number} ${steps[number - 1].slice(1, -1)}`);
+}
+
 /** The configuration after a record, worked out here from the steps alone. */
 function configuration(seq) {
   const paths = new Set();
@@ -50,6 +56,15 @@ function configuration(seq) {
   }
   return paths;
 }
+
+test("a recorded run opens at its end, and says how it ended", async () => {
+  assert.equal(await shown(), records.length);
+  const { reason } = records.at(-1);
+  await page.getByRole("banner").getByText(`finished: ${reason}`).waitFor();
+  await goTo(1);
+  await page.getByRole("banner").getByRole("button", { name: "finished: " }).click();
+  assert.equal(await shown(), records.length);
+});
 
 test("the chart shows the change of the active state, and the transition taken in the trail", async () => {
   const step = first((rec) => rec.type === "step" && rec.microsteps.some((micro) => micro.entered.includes("clear/execute/step_2")));
@@ -88,7 +103,7 @@ test("a decision record shows each candidate and the leaf that decided", async (
 test("a state tells its parameters, and its decision", async () => {
   const decision = first((rec) => rec.type === "decision" && rec.chosen === "stack");
   await goTo(decision.seq);
-  await page.getByLabel("Decision", { exact: true }).getByRole("button", { name: decision.state }).click();
+  await page.getByLabel("Decision", { exact: true }).getByRole("button", { name: inWords(decision.state, decision.seq) }).click();
   const state = page.getByLabel("State", { exact: true });
   await state.getByRole("row", { name: `?item ${decision.arguments.item}` }).first().waitFor();
   await state.getByLabel("stack: chosen").waitFor();
@@ -148,6 +163,19 @@ test("world, plan and chart of a moment are saved as one SVG, in light colours a
   assert.ok(drawn.texts.includes("sink"));
   assert.match(drawn.robot, /fill:\s*rgb\(0, 114, 178\)/);
   assert.equal(drawn.classes, 0);
+});
+
+test("while the robot plans, the page says so, with the goal, and says when the plan is there", async () => {
+  const asked = first((rec) => rec.type === "plan.asked");
+  const found = first((rec) => rec.type === "plan.found", asked.seq);
+  const plan = page.getByLabel("Plan", { exact: true });
+  await goTo(asked.seq);
+  await page.getByRole("banner").getByText("planning …").waitFor();
+  await plan.getByText("planning …").waitFor();
+  assert.ok((await plan.innerText()).includes(asked.goal));
+  await goTo(found.seq);
+  await plan.getByText("plan found").waitFor();
+  assert.equal(await page.getByText("planning …", { exact: true }).count(), 0);
 });
 
 test("the plan is there before and after a replan, with what broke it and who did", async () => {

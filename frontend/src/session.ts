@@ -49,6 +49,8 @@ export class Session {
   private drawn = 0;
   private clock = 0;
   private wanted: number | null = null;
+  /** Whether a recorded run is still being opened, at its end. */
+  private opening = false;
   private noted = 0;
 
   constructor() {
@@ -61,9 +63,13 @@ export class Session {
       wanted: () => this.history.last + 1,
       hello: (said: Hello) => {
         const following = said.live && this.wanted === null && (this.history.last === 0 || this.shown.following);
+        this.opening ||= !said.live && this.wanted === null && this.history.last === 0;
         this.set({ header: said.header, wrong: strange(said), live: said.live, control: said.control, expected: said.last, connected: true, following });
       },
-      status: (said: Status) => this.set({ live: said.live, paused: said.paused, expected: said.last }),
+      status: (said: Status) => {
+        const resumed = said.live && !this.shown.live && this.shown.moment.seq === this.history.last;
+        this.set({ live: said.live, paused: said.paused, expected: said.last, ...(resumed && { following: true }) });
+      },
       records: (from, records) => {
         this.history.append(from, records);
         if (!this.waits()) this.later();
@@ -85,6 +91,7 @@ export class Session {
     const wanted = Math.max(0, Math.min(seq, this.history.last));
     const moment = this.history.at(wanted);
     this.clock = moment.t;
+    this.opening = false;
     this.set({ moment, following: this.shown.live && wanted === this.history.last, playing: false, ...(select && { selection: select }) });
     clearTimeout(this.noted); // browsers refuse to be told of each place that somebody scrubs over
     this.noted = window.setTimeout(() => history.replaceState(null, "", `#${wanted}`), NOTED_MS);
@@ -152,11 +159,11 @@ export class Session {
     const { moment, playing, following } = this.shown;
     const last = this.history.last;
     let seq = moment.seq;
-    if (following) seq = last;
+    if (following || this.opening) seq = last;
     else if (playing) seq = this.played(now, seq);
     else if (this.wanted !== null && last >= this.wanted) seq = this.wanted;
-    else if (moment.seq === 0 && this.wanted === null) seq = this.history.marks.step[0] ?? 0;
     if (this.wanted !== null && last >= this.wanted) this.wanted = null;
+    if (last >= this.shown.expected) this.opening = false;
     const over = playing && seq >= last;
     const next = seq === moment.seq ? moment : this.history.at(seq);
     this.set({ moment: next, last, expected: Math.max(this.shown.expected, last), ...(over && { playing: false, following: this.shown.live }) });

@@ -327,6 +327,20 @@ class WriterLock:
         return found[1].decode()
 
 
+def has_writer(store: Path) -> bool:
+    """Return whether a living process of this machine has the store open for writing; the lock stays untouched."""
+    lock = store.with_name(store.name + LOCK)
+    found = _LOCK_MARK.fullmatch(_head(lock, len(_lock_content())) or b"")
+    try:
+        if found is not None:
+            os.kill(int(found[1]), 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass  # a process of another user
+    return found is not None
+
+
 def _lock_content() -> bytes:
     return b"dsc writer %20d\n" % os.getpid()
 

@@ -34,7 +34,7 @@ export const StateNode = memo(function StateNode({ data }: NodeProps<StateNodeTy
         <div className="bar"><span className="name">{node.name}</span></div>
       ) : (
         <div className="bar">
-          <button className="name" aria-label={said} aria-pressed={chosen} title={node.about ?? node.name} onClick={() => data.select(node.id)}>
+          <button className="name" aria-label={said} aria-pressed={chosen} title={node.about ?? shownName(node)} onClick={() => data.select(node.id)}>
             {node.kind === "gate" ? "" : (
               <>
                 {node.initial && <span className="initial" aria-hidden="true">●</span>}

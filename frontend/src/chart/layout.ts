@@ -75,7 +75,7 @@ export function sizeOf(node: ChartNode): { width: number; height: number } {
 /** The name as it is written: a plan's step by its action. */
 export function shownName(node: ChartNode): string {
   const action = stepOf(node)?.[0];
-  return action === undefined ? node.name : `${node.name.match(/\d+$/)?.[0] ?? ""} ${action}`.trim();
+  return action === undefined ? node.name : `${node.name.match(/^\d+|\d+$/)?.[0] ?? ""} ${action}`.trim();
 }
 
 /** What stands under a state's name: the arguments of a plan's step, or the plot inside. */

@@ -2,12 +2,17 @@
 
 import type { Moment, Plots } from "../core/moment";
 import { joinPath, splitPath, statesOf, waysOf, type Kind, type PlotForm, type PlotState, type Way } from "../core/plots";
+import { eventWords, stateWords } from "../core/words";
+
 
 /** So many ways into one state would be a thicket: they are drawn only when asked for. */
 export const HUB = 6;
 
 /** Where every step of a plan leads to if it fails. */
 const WAY_OUT = /^(replan|gave_up)(_\d+)*$/;
+
+/** Where a rule tries a step of a plan again, or skips it. */
+const FOR_RULES = /^step_\d+_(again|skipped)$/;
 
 /** With more states than that in a plot, what is not active is closed until it is opened: the rest can be read then. */
 export const MANY = 60;
@@ -16,6 +21,7 @@ export interface ChartNode {
   readonly id: string;
   readonly parent: string | null;
   readonly kind: Kind | "gate";
+  /** In words, as its author wrote it. */
   readonly name: string;
   readonly about: string | undefined;
   /** Name of the plot inside, if one is bound. */
@@ -97,7 +103,7 @@ function show(on: Showing, holder: string, plot: PlotForm, around: string | null
     own.push(state);
     if ((state.kind === "composite" || state.kind === "orthogonal") && !(on.view.open.get(id) ?? (!large || on.moment.active.has(id)))) closed.add(state.name);
   }
-  const edges = edgesBetween(holder, states, throughGates(waysOf(plot), gates), shown, plot.generated === true);
+  const edges = edgesBetween(holder, states, throughGates(waysOf(plot), gates), shown, plot);
   const counts = new Map<string, number>();
   for (const edge of edges) if (edge.quiet) counts.set(edge.to, (counts.get(edge.to) ?? 0) + 1);
   for (const state of own) {
@@ -122,7 +128,7 @@ function showState(
   const place = nodes.length;
   const gate = plot.generated === true && isGate(state);
   const node: ChartNode = {
-    id, parent, kind: gate ? "gate" : state.kind, name: state.name.split(":").at(-1)!, about: state.form.about,
+    id, parent, kind: gate ? "gate" : state.kind, name: stateWords(plot, state.name), about: state.form.about,
     content: inner?.plot ?? null, generated: inner?.generated === true, initial: state.initial, expandable, expanded, active,
     hidden: 0, ways,
   };
@@ -152,15 +158,15 @@ function throughGates(ways: readonly Way[], gates: ReadonlySet<string>): Through
   });
 }
 
-/** States that a rule added and that nothing uses now: a generated plot has many. */
+/** States that rules need and that nothing uses now: a generated plot has many. */
 function isSpare(on: Showing, holder: string, id: string, state: PlotState): boolean {
-  return state.form.about?.startsWith("rule: ") === true && !on.moment.active.has(id) && !on.view.all.has(holder);
+  return (state.form.about?.startsWith("rule: ") === true || FOR_RULES.test(state.name)) && !on.moment.active.has(id) && !on.view.all.has(holder);
 }
 
 /** Ways between what is shown: those between the same two are one, those across a border are lifted to it. */
 function edgesBetween(
   holder: string, states: readonly PlotState[], ways: readonly Through[], shown: ReadonlyMap<string, string | null>,
-  generated: boolean,
+  plot: PlotForm,
 ): ChartEdge[] {
   const parents = new Map(states.map((state) => [state.name, state.parent]));
   const merged = new Map<string, { from: string; to: string; labels: Set<string>; rule: boolean; via: string[] }>();
@@ -169,7 +175,7 @@ function edgesBetween(
     if (ends === null || !shown.has(ends[0]) || !shown.has(ends[1])) continue;
     const key = `${ends[0]}>${ends[1]}`;
     const edge = merged.get(key) ?? { from: ends[0], to: ends[1], labels: new Set(), rule: true, via: [] };
-    edge.labels.add(way.on);
+    edge.labels.add(eventWords(plot, way.on));
     edge.via.push(...way.via);
     edge.rule &&= way.rule !== undefined;
     merged.set(key, edge);
@@ -182,7 +188,7 @@ function edgesBetween(
     to: joinPath(holder, edge.to),
     labels: [...edge.labels],
     rule: edge.rule,
-    quiet: into.get(edge.to)! > HUB || (generated && WAY_OUT.test(edge.to)),
+    quiet: into.get(edge.to)! > HUB || (plot.generated === true && WAY_OUT.test(edge.to)),
     via: edge.via.map((one) => joinPath(holder, one)),
   }));
 }

@@ -1,10 +1,11 @@
 /** All records there are, and the moment after any of them, in a few milliseconds either way. */
 
 import { advance, beginning, copyOf, type Moment } from "./moment";
-import type { PlotForm } from "./plots";
+import { joinPath, type PlotForm } from "./plots";
 import { whole } from "./reading";
-import type { DecisionRec, EndRec, Rec } from "./records";
+import type { DecisionRec, EndRec, PlotRec, Rec, StepRec } from "./records";
 import { damaged, isDamaged, type Damaged } from "./sound";
+import { stateWords } from "./words";
 
 /** Records that are replayed at most to get to a moment. */
 export const CHECKPOINT_EVERY = 500;
@@ -33,9 +34,13 @@ export class History {
     failure: [], plan: [], decision: [], step: [], knowledge: [], scene: [],
   };
   private readonly records: Rec[] = [];
+  /** Path of a state -> when which plots became its content, in order. */
+  private readonly bound = new Map<string, { seq: number; hash: string }[]>();
   private readonly checkpoints: Moment[] = [beginning()];
   /** The damaged records found so far. */
   readonly damages: Damaged[] = [];
+  /** The record of the run's end. */
+  end: EndRec | null = null;
   private tip = beginning();
   private kept = beginning();
 
@@ -125,6 +130,27 @@ export class History {
     return low;
   }
 
+  /** The last plot up to `seq` in the state of that path. */
+  plotIn(holder: string, seq: number): PlotForm | undefined {
+    const hash = this.bound.get(holder)?.findLast((one) => one.seq <= seq)?.hash;
+    return hash === undefined ? undefined : this.plots.get(hash);
+  }
+
+  /** The path of a state in words, as of a record. */
+  words(path: string, seq: number): string {
+    let holder = "";
+    return path.split("/").map((name) => {
+      const said = stateWords(this.plotIn(holder, seq), name);
+      holder = joinPath(holder, name);
+      return said;
+    }).join("/");
+  }
+
+  /** A text of the program, with the states that it names in words. */
+  inWords(text: string, seq: number): string {
+    return text.replace(/(?<=\bstate ')[^']+(?=')/g, (path) => this.words(path, seq));
+  }
+
   /** What led to a record, itself first. */
   causes(seq: number): Rec[] {
     const found: Rec[] = [];
@@ -134,12 +160,22 @@ export class History {
     return found;
   }
 
+  private bind({ seq, microsteps }: StepRec): void {
+    for (const { state, hash } of microsteps.flatMap((micro) => micro.bound ?? [])) {
+      const known = this.bound.get(state);
+      if (known) known.push({ seq, hash });
+      else this.bound.set(state, [{ seq, hash }]);
+    }
+  }
+
   private note(rec: Rec): void {
     if (isDamaged(rec)) this.damages.push(rec);
     if (rec.type === "plot") {
-      const { hash, plot } = rec as Rec & { hash: string; plot: PlotForm };
-      this.plots.set(hash, plot);
+      const { hash, plot, words } = rec as PlotRec;
+      this.plots.set(hash, words ? { ...plot, words } : plot);
     }
+    if (rec.type === "end") this.end = rec as EndRec;
+    if (rec.type === "step") this.bind(rec as StepRec);
     const mark = MARKS.get(rec.type) ?? (rec.type === "end" && (rec as EndRec).problem ? "failure" : undefined);
     if (mark) this.marks[mark].push(rec.seq);
   }

@@ -10,7 +10,9 @@ import {
   type KnowledgeRec,
   type Micro,
   type Named,
+  type PlanAskedRec,
   type PlanFoundRec,
+  type PlanNoneRec,
   type PlanOrderedRec,
   type Rec,
   type StepRec,
@@ -20,6 +22,8 @@ import {
 } from "./records";
 
 export const TRAIL = 10;
+/** Skills that search for plans. */
+const SEARCHING: ReadonlySet<string> = new Set(["planner.plan", "planner.monitor"]);
 
 export interface Since {
   readonly seq: number;
@@ -44,6 +48,8 @@ export interface Moment {
   plans: Plan[];
   /** Path of a state -> place in `plans` of the plan that is carried out in it. */
   running: Map<string, number>;
+  /** The search for a plan that goes on, or that found none; a run has one planner. */
+  search: PlanAskedRec | PlanNoneRec | null;
   /** The rule that may turn out to be why the plan ends. */
   trouble: number | null;
   /** The last record that said that a plan does not lead to the goal any more: it may be carried out until there is another. */
@@ -62,7 +68,7 @@ export type Plots = ReadonlyMap<string, PlotForm>;
 export function beginning(): Moment {
   return {
     seq: 0, t: 0, active: new Map(), bound: new Map(), variables: new Map(), trail: [],
-    working: new Map(), plans: [], running: new Map(), trouble: null, broken: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
+    working: new Map(), plans: [], running: new Map(), search: null, trouble: null, broken: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
     scene: null, end: null,
   };
 }
@@ -92,15 +98,31 @@ const CHANGES: ReadonlyMap<string, Change> = new Map(Object.entries<Change>({
   world: worldBegins,
   knowledge: knowledgeChanged,
   action: acted,
-  event: (moment, rec: EventRec) => void (rec.cause !== null && moment.working.delete(rec.cause)),
+  event: happened,
   scene: (moment, rec: Rec) => void (moment.scene = rec.seq),
   rule: (moment, rec: Rec) => void (moment.trouble = rec.seq),
-  end: (moment, rec: Rec) => void (moment.end = rec.seq),
+  end: (moment, rec: Rec) => {
+    moment.end = rec.seq;
+    searchEnds(moment);
+  },
   "plan.broken": (moment, rec: Rec) => void (moment.broken = rec.seq),
+  "plan.asked": (moment, rec: PlanAskedRec) => void (moment.search = rec),
+  "plan.none": (moment, rec: PlanNoneRec) => void (moment.search = rec),
   "plan.found": planFound,
   "plan.ordered": planOrdered,
   "plan.skipped": stepsSkipped,
 }));
+
+/** A skill has ended, or something came from outside. */
+function happened(moment: Moment, rec: EventRec): void {
+  if (rec.cause !== null) moment.working.delete(rec.cause);
+  searchEnds(moment, rec.source);
+}
+
+/** Without a record of its own, a search ends with the skill that searches. */
+function searchEnds(moment: Moment, skill = "planner.plan"): void {
+  if (moment.search?.type === "plan.asked" && SEARCHING.has(skill)) moment.search = null;
+}
 
 /** A skill is started, waits for its component, gets it, or is cancelled since its state was left. */
 function acted(moment: Moment, rec: ActionRec): void {
@@ -108,7 +130,10 @@ function acted(moment: Moment, rec: ActionRec): void {
   if (rec.action !== "wait" && rec.action !== "begin" && rec.action !== "cancel") return;
   for (const [seq, one] of moment.working) {
     if (one.id !== rec.id) continue;
-    if (rec.action === "cancel") moment.working.delete(seq);
+    if (rec.action === "cancel") {
+      moment.working.delete(seq);
+      searchEnds(moment, one.skill);
+    }
     else moment.working.set(seq, { ...one, for: rec.for });
   }
 }
@@ -144,7 +169,9 @@ function microstepped(moment: Moment, rec: StepRec, micro: Micro, plots: Plots):
 }
 
 function planFound(moment: Moment, rec: PlanFoundRec): void {
-  moment.plans.push(newPlan(rec.plot, rec.seq, rec.steps, rec.engine));
+  const asked = moment.search?.type === "plan.asked" ? moment.search.t : null;
+  moment.plans.push({ ...newPlan(rec.plot, rec.seq, rec.steps, rec.engine), searched: asked === null ? null : rec.t - asked });
+  moment.search = null;
 }
 
 /** What is going to be carried out: the plan found, or what is left of the one before. */

@@ -20,6 +20,8 @@ export interface Plan {
   readonly steps: readonly PlanStep[];
   readonly links: readonly (readonly [number, string, number])[];
   readonly engine: string;
+  /** Seconds of run time of its search; null if no record says when it began. */
+  readonly searched: number | null;
   /** Path of the state in which its plot runs or ran. */
   readonly at: string | null;
   readonly names: ReadonlyMap<string, number>;
@@ -30,7 +32,7 @@ export interface Plan {
 }
 
 export function newPlan(name: string, seq: number, steps: readonly string[], engine = ""): Plan {
-  return { name, seq, steps: waiting(steps), links: [], engine, at: null, names: new Map(), ended: null, interrupted: false };
+  return { name, seq, steps: waiting(steps), links: [], engine, searched: null, at: null, names: new Map(), ended: null, interrupted: false };
 }
 
 /** The plan as it is going to be carried out: of the one found, what was done meanwhile is left out. */

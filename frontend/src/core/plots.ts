@@ -1,6 +1,6 @@
 /** What the form of a plot says: its states, who is inside whom, and the ways between them. */
 
-import type { Value } from "./records";
+import type { Value, Words } from "./records";
 
 export interface WayForm {
   readonly to?: string;
@@ -40,6 +40,8 @@ export interface PlotForm {
   readonly variables?: Readonly<Record<string, unknown>>;
   readonly states: Readonly<Record<string, StateForm>>;
   readonly initial?: string;
+  /** Of its record, not of its form. */
+  readonly words?: Words;
 }
 
 export type Kind = "simple" | "composite" | "orthogonal" | "region" | "submachine" | "dynamic" | "final" | "pseudo";
@@ -84,7 +86,7 @@ export function waysOf(plot: PlotForm): readonly Way[] {
 }
 
 /** A plot never changes: what was found in it is kept. */
-function kept<T>(cache: WeakMap<PlotForm, T>, plot: PlotForm, find: () => T): T {
+export function kept<T>(cache: WeakMap<PlotForm, T>, plot: PlotForm, find: () => T): T {
   let found = cache.get(plot);
   if (found === undefined) cache.set(plot, (found = find()));
   return found;

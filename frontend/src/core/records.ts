@@ -1,5 +1,7 @@
 /** The records of a trace, as `dsc/viewer/PROTOCOL.md` names them. */
 
+import type { PlotForm } from "./plots";
+
 export interface Rec {
   readonly seq: number;
   readonly t: number;
@@ -11,6 +13,19 @@ export type Value = string | number | boolean | null | readonly Value[] | { read
 export type Named = Readonly<Record<string, Value>>;
 /** Predicate, then arguments. */
 export type Fact = readonly (string | number)[];
+
+/** For each name that rules and handlers added to a plot, the words for people. */
+export interface Words {
+  readonly states?: Readonly<Record<string, string>>;
+  readonly events?: Readonly<Record<string, string>>;
+  readonly variables?: Readonly<Record<string, string>>;
+}
+
+export interface PlotRec extends Rec {
+  readonly hash: string;
+  readonly plot: PlotForm;
+  readonly words?: Words;
+}
 
 export interface Taken {
   readonly from: string;
@@ -89,6 +104,15 @@ export interface SceneRec extends Rec {
   readonly things: readonly Thing[];
 }
 
+export interface PlanAskedRec extends Rec {
+  readonly goal: string;
+}
+
+export interface PlanNoneRec extends Rec {
+  readonly kind: string;
+  readonly reason: string;
+}
+
 export interface PlanFoundRec extends Rec {
   readonly plot: string;
   readonly steps: readonly string[];
@@ -136,7 +160,10 @@ export interface RuleRec extends Rec {
 
 export interface EndRec extends Rec {
   readonly finished: boolean;
+  readonly reached?: boolean;
   readonly problem: string | null;
+  readonly reason?: string;
+  readonly programming_error?: string | null;
 }
 
 /** A fact as the language writes it. */

@@ -52,6 +52,8 @@ const form = fields({
 /** Paths are made of the names of states: a name that comes twice would lead in circles. */
 const plot: Is = (value, depth) => form(value, depth) && distinct(namesIn(value as Object_));
 
+const words = fields({ states: optional(dict(text)), events: optional(dict(text)), variables: optional(dict(text)) });
+
 const explanation: Is = (value, depth) => explanationFields(value, depth);
 const explanationFields = fields({ text: optional(text), detail: optional(text), decider: optional(count), children: optional(list(explanation)) });
 const candidate = fields({ plot: text, reason: optional(text), condition: explanation, score: optional(scalar) });
@@ -66,7 +68,7 @@ const micro = fields({
 const link: Is = (value) => Array.isArray(value) && value.length === 3 && count(value[0], 0) && text(value[1], 0) && count(value[2], 0);
 
 const SHAPES = new Map<string, readonly (readonly [string, Is])[]>([
-  ["plot", [["hash", text], ["plot", plot]]],
+  ["plot", [["hash", text], ["plot", plot], ["words", optional(words)]]],
   ["step", [["microsteps", list(micro)], ["variables", optional(dict(dict(any)))]]],
   ["decision", [["state", text], ["chosen", optional(text)], ["arguments", optional(dict(any))], ["version", optional(number)], ["candidates", optional(list(candidate))]]],
   ["world", [["version", number], ["nodes", dict(text)], ["facts", facts], ["values", facts]]],
@@ -76,7 +78,9 @@ const SHAPES = new Map<string, readonly (readonly [string, Is])[]>([
   ["event", [["name", text], ["source", optional(text)]]],
   ["scene", [["things", list(thing)]]],
   ["rule", [["rule", text], ["state", text]]],
-  ["end", [["problem", optional(text)]]],
+  ["end", [["problem", optional(text)], ["reason", optional(text)]]],
+  ["plan.asked", [["goal", text]]],
+  ["plan.none", [["reason", text]]],
   ["plan.found", [["plot", text], ["steps", texts], ["engine", optional(text)]]],
   ["plan.ordered", [["plot", text], ["steps", texts], ["links", optional(list(link))]]],
   ["plan.skipped", [["plot", text], ["steps", texts]]],

@@ -117,13 +117,15 @@ function useActs(setView: (change: (before: View) => View) => void): Acts {
 
 function Crumbs({ focus, go }: { focus: string; go: (path: string) => void }) {
   const parts = focus ? focus.split("/") : [];
+  const { seq } = useMoment();
+  const last = (path: readonly string[]) => session.history.words(path.join("/"), seq).split("/").at(-1);
   return (
     <nav aria-label="Where the chart is zoomed to">
       <button disabled={focus === ""} onClick={() => go("")}>Chart</button>
-      {parts.map((part, i) => (
+      {parts.map((_, i) => (
         <span key={i}>
           {" › "}
-          <button disabled={i === parts.length - 1} onClick={() => go(parts.slice(0, i + 1).join("/"))}>{part}</button>
+          <button disabled={i === parts.length - 1} onClick={() => go(parts.slice(0, i + 1).join("/"))}>{last(parts.slice(0, i + 1))}</button>
         </span>
       ))}
     </nav>

@@ -30,7 +30,7 @@ export function ChartTools({ nodes, edges, focus, follow, setFollow, reset }: Pr
   };
   const save = (name: string, part: Part) => {
     const run = String(session.get().header.run ?? "a run");
-    download(`${name}-${moment.seq}.svg`, sheet(part, `${run}${focus && `, ${focus}`}: ${seconds(moment.t)}, after record ${moment.seq}`));
+    download(`${name}-${moment.seq}.svg`, sheet(part, `${run}${focus && `, ${session.history.words(focus, moment.seq)}`}: ${seconds(moment.t)}, after record ${moment.seq}`));
   };
   const saveAll = () => {
     const world = worldPart(document.querySelector<SVGSVGElement>(".world svg"));

@@ -3,7 +3,7 @@
 import { useCallback, useEffect, useId, useState } from "react";
 import { eventIn } from "../core/handed";
 import { control, type Break } from "../link/requests";
-import { useShown } from "../session";
+import { session, useShown } from "../session";
 import { useMoment } from "../turn";
 
 const KINDS = [["state", "clear/execute"], ["event", "grasp_failed"], ["condition", "(holding cup1)"], ["plan_step", "(drive table sink)"]] as const;
@@ -21,7 +21,8 @@ export function Controls() {
     }, (error: Error) => setWrong(error.message));
   }, []);
   useEffect(() => send({ do: "breaks" }), [send]);
-  const { active, plans } = useMoment();
+  const moment = useMoment();
+  const { active, plans } = moment;
   const path = selection?.kind === "state" ? selection.path : null;
   const step = selection?.kind === "step" ? plans[selection.plan]?.steps[selection.step]?.text : undefined;
   const known = { state: [...active.keys()], plan_step: plans.at(-1)?.steps.map((step) => step.text) ?? [] };
@@ -35,15 +36,15 @@ export function Controls() {
         <button onClick={() => send({ do: "step" })}>One step</button>
         <button onClick={() => send({ do: "resume" })}>Go on</button>
       </div>
-      <p className="quiet">{paused ? `It stands still: ${paused}.` : "Holding it is not pausing the time line: the robot waits."}</p>
+      <p className="quiet">{paused ? `It stands still: ${stopWords(paused, moment.seq)}.` : "Holding it is not pausing the time line: the robot waits."}</p>
       <h3>Stand still at</h3>
       <ul className="plain">
         {breaks.map((one) => (
-          <li key={one.number}>{one.on} <button aria-label={`Remove ${one.on}`} onClick={() => send({ do: "unbreak", number: one.number })}>✕</button></li>
+          <li key={one.number}>{stopWords(one.on, moment.seq)} <button aria-label={`Remove ${stopWords(one.on, moment.seq)}`} onClick={() => send({ do: "unbreak", number: one.number })}>✕</button></li>
         ))}
       </ul>
       {dropped.map((one) => <p key={one} className="bad note" role="status">{`Dropped: ${one}`}</p>)}
-      {path !== null && <button onClick={() => send({ do: "break", on: { state: path } })}>{`Add the selected state ${path}`}</button>}
+      {path !== null && <button onClick={() => send({ do: "break", on: { state: path } })}>{`Add the selected state ${session.history.words(path, moment.seq)}`}</button>}
       {step !== undefined && <button onClick={() => send({ do: "break", on: { plan_step: step } })}>{`Add the selected step ${step}`}</button>}
       <Choice kinds={KINDS} known={known} act={(kind, text) => send({ do: "break", on: { [kind]: text } })} verb="Add" wrong={setWrong} />
       <h3>Hand in</h3>
@@ -53,6 +54,11 @@ export function Controls() {
       />
     </fieldset>
   );
+}
+
+/** Why a run stands still, with a state in words. */
+export function stopWords(why: string, seq: number): string {
+  return why.startsWith("state ") ? `state ${session.history.words(why.slice("state ".length), seq)}` : why;
 }
 
 interface ChoiceProps {

@@ -1,6 +1,8 @@
 /** Which run this is, and how it stands. */
 
+import { endsWell, endWords } from "../core/ends";
 import { session, useShown } from "../session";
+import { stopWords } from "./Controls";
 import { Help } from "./Help";
 
 export function Header() {
@@ -12,15 +14,28 @@ export function Header() {
     <header>
       <strong>{String(header.run ?? "a run")}</strong>
       <span className="quiet">{facts.join(" · ")}</span>
-      <span className={`badge ${live ? "live" : ""}`}>{live ? "live" : "recorded"}</span>
-      {paused && <span className="badge bad">stands still: {paused}</span>}
+      {live ? <span className="badge live">live</span> : <End />}
+      {paused && <span className="badge bad">stands still: {stopWords(paused, moment.seq)}</span>}
       {!connected && <span className="badge bad">not connected</span>}
       {last < expected && <span className="quiet" role="status">{`${last} of ${expected} records`}</span>}
+      {moment.search?.type === "plan.asked" && <span className="badge plans">planning …</span>}
       <span className="working" aria-label="Skills at work">
         {working.length > 0 && `at work: ${working.join(", ")}`}
       </span>
       <Help />
     </header>
+  );
+}
+
+/** How a recorded run ended, whatever moment is shown. */
+function End() {
+  const { last, expected, connected } = useShown();
+  const { end } = session.history;
+  if (session.kind === "store" || !connected || last === 0 || last < expected) return <span className="badge">recorded</span>;
+  return (
+    <button className={`badge end ${endsWell(end) ? "live" : "bad"}`} title="To the end" onClick={() => session.goTo(last)}>
+      {session.history.inWords(endWords(end), last)}
+    </button>
   );
 }
 

@@ -2,9 +2,11 @@
 
 import { useRef } from "react";
 import { endOf, isFinished, kinOf, nextOf, SIGNS, type Plan, type PlanStep } from "../core/plans";
+import type { PlanAskedRec, PlanNoneRec } from "../core/records";
 import { lanesOf } from "../core/why";
 import { session, useSelection } from "../session";
 import { useCalmEffect, useMoment } from "../turn";
+import { seconds } from "./Timeline";
 
 const EARLIER = 12;
 
@@ -18,13 +20,27 @@ export function PlanPane() {
     <section className="pane plan" aria-label="Plan">
       <h2>Plan</h2>
       <div className="scrolls">
-        {plans.length === 0 && <p className="quiet note">{`No plan has been made yet${moment.active.size ? ": all that was done was foreseen" : ""}.`}</p>}
+        <Search />
+        {plans.length === 0 && moment.search === null && <p className="quiet note">{`No plan has been made yet${moment.active.size ? ": all that was done was foreseen" : ""}.`}</p>}
         {shown.map(({ plan, number }, i) => (
           <PlanView key={`${number} ${plan.name}`} plan={plan} number={number} open={i === 0 || chosen === number} />
         ))}
         {plans.length > EARLIER && <p className="quiet note">{`${plans.length - EARLIER} earlier plans`}</p>}
       </div>
     </section>
+  );
+}
+
+/** What is planned for just now, or why there is no plan. */
+function Search() {
+  const { search, t } = useMoment();
+  if (search === null) return null;
+  if (search.type === "plan.none") return <p className="note bad" role="status">{`no plan at ${seconds(search.t)}: ${(search as PlanNoneRec).reason}`}</p>;
+  return (
+    <div className="note" role="status">
+      <p><b>planning …</b><span className="quiet">{` since ${seconds(t - search.t)}, for the goal`}</span></p>
+      <code className="block">{(search as PlanAskedRec).goal}</code>
+    </div>
   );
 }
 
@@ -46,6 +62,7 @@ function PlanView({ plan, number, open }: { plan: Plan; number: number; open: bo
         <span className="quiet">{`${done}/${plan.steps.length}`}</span>
         {end && <span className={`badge ${finished ? "" : "bad"}`}>{end}</span>}
       </button>
+      {open && !past && plan.at === null && <p className="note" role="status"><b>plan found</b><span className="quiet">{foundBy(plan)}</span></p>}
       {open && lanes.length > 1 && (
         <div className="lanes">
           {lanes.map((lane) => (
@@ -59,6 +76,10 @@ function PlanView({ plan, number, open }: { plan: Plan; number: number; open: bo
       {open && lanes.length <= 1 && <Steps plan={plan} number={number} which={plan.steps.map((_, i) => i)} />}
     </article>
   );
+}
+
+function foundBy({ engine, searched, steps }: Plan): string {
+  return `: ${steps.length} steps${searched === null ? "" : ` in ${seconds(searched)}`}${engine ? `, by ${engine}` : ""}`;
 }
 
 function Steps({ plan, number, which, lane = "" }: { plan: Plan; number: number; which: readonly number[]; lane?: string }) {

@@ -1,6 +1,6 @@
 /** Why: what is selected and what led to it; with nothing selected, the last decision. */
 
-import type { Rec } from "../core/records";
+import type { ActionRec, Rec } from "../core/records";
 import { session, useSelection } from "../session";
 import { useMoment } from "../turn";
 import { Causes, RecordLink } from "./parts";
@@ -36,9 +36,15 @@ function lately(seq: number): Rec[] {
   const found: Rec[] = [];
   for (let at = seq; at > 0 && found.length < LATELY; at--) {
     const rec = session.history.record(at)!;
-    if (rec.type !== "scene" && rec.type !== "plot" && rec.type !== "world") found.push(rec);
+    if (rec.type !== "scene" && rec.type !== "plot" && rec.type !== "world" && !ofPlanner(rec)) found.push(rec);
   }
   return found;
+}
+
+/** An order that the planner gets for its bookkeeping; its plans have records of their own. */
+function ofPlanner(rec: Rec): boolean {
+  const { skill, port } = rec as ActionRec;
+  return rec.type === "action" && (skill ?? port ?? "").startsWith("planner.");
 }
 
 function Body({ children, close = false }: { children: React.ReactNode; close?: boolean }) {

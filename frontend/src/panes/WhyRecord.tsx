@@ -1,11 +1,13 @@
 /** A record in full: a decision with its candidates, a broken plan with who broke it, others as they are. */
 
 import { deciding } from "../core/explanations";
+import { splitPath } from "../core/plots";
 import type { Candidate, DecisionRec, KnowledgeRec, PlanBrokenRec, PlanFoundRec, Rec, RuleRec, StepRec, Value } from "../core/records";
 import type { Damaged } from "../core/sound";
 import { breaker } from "../core/why";
+import { eventWords } from "../core/words";
 import { session } from "../session";
-import { CELL, changed, Facts, inShort, jsonOf, RecordLink, Tree, Values } from "./parts";
+import { CELL, changed, Facts, inPath, inShort, jsonOf, RecordLink, Tree, Values } from "./parts";
 
 export function WhyRecord({ rec }: { rec: Rec }) {
   switch (rec.type) {
@@ -33,7 +35,7 @@ export function Decision({ rec }: { rec: DecisionRec }) {
   return (
     <div aria-label="Decision">
       <Head rec={rec}>
-        <button className="link" onClick={() => session.select({ kind: "state", path: rec.state })}>{rec.state}</button>
+        <button className="link" onClick={() => session.select({ kind: "state", path: rec.state })}>{inPath(rec, rec.state)}</button>
         {rec.satisfied ? " had nothing to do: its goal holds." : rec.chosen === null ? ": no candidate fits." : <>{" chose "}<b>{rec.chosen}</b></>}
         {rec.version !== undefined && <span className="quiet">{` · knowledge version ${rec.version}`}</span>}
       </Head>
@@ -77,7 +79,7 @@ function Broken({ rec }: { rec: PlanBrokenRec }) {
 function Rule({ rec }: { rec: RuleRec }) {
   return (
     <Head rec={rec}>
-      <b>{rec.rule}</b>, a rule for <button className="link" onClick={() => session.select({ kind: "state", path: rec.state })}>{rec.state}</button>
+      <b>{rec.rule}</b> at <button className="link" onClick={() => session.select({ kind: "state", path: rec.state })}>{inPath(rec, rec.state)}</button>
     </Head>
   );
 }
@@ -109,7 +111,7 @@ function StepTaken({ rec }: { rec: StepRec }) {
       <Head rec={rec}>{taken.length} transitions, run to completion</Head>
       <ol className="plain">
         {taken.map((one, i) => (
-          <li key={i}><code>{one.from}</code>{" "}<b>{one.on}</b>{" → "}<code>{one.to?.split("/").at(-1) ?? "stays"}</code></li>
+          <li key={i}><code>{inPath(rec, one.from)}</code>{" "}<b>{eventWords(session.history.plotIn(splitPath(one.from)[0], rec.seq), one.on)}</b>{" → "}<code>{one.to === null ? "stays" : inPath(rec, one.to).split("/").at(-1)}</code></li>
         ))}
       </ol>
     </>

@@ -2,6 +2,7 @@
 
 import { splitPath, statesOf, type PlotForm, type StateForm } from "../core/plots";
 import type { Named } from "../core/records";
+import { eventWords, stateWords } from "../core/words";
 import { session } from "../session";
 import { useMoment } from "../turn";
 import { Values } from "./parts";
@@ -24,15 +25,15 @@ export function WhyState({ path }: { path: string }) {
     <div aria-label="State">
       <div className="what">
         <span className="quiet">{`${state?.kind ?? "state"} in ${plot?.plot ?? "a plot that does not run now"}`}</span>
-        <p><b>{name}</b>{since ? ` · active for ${seconds(moment.t - since.t)}` : " · not active"}</p>
+        <p><b>{stateWords(plot, name)}</b>{since ? ` · active for ${seconds(moment.t - since.t)}` : " · not active"}</p>
         {state?.form.about && <p className="quiet">{state.form.about}</p>}
       </div>
       {state?.form.goal && <><h3>Goal</h3><code className="block">{state.form.goal}</code></>}
       {plan !== undefined && step !== undefined && <Links at={plan} number={step} />}
       {content && <Running path={path} content={content} />}
-      {moment.variables.has(holder) && <><h3>{`Variables of ${plot?.plot ?? "its plot"}`}</h3><Values values={used(moment.variables.get(holder)!)} /></>}
+      {moment.variables.has(holder) && <><h3>{`Variables of ${plot?.plot ?? "its plot"}`}</h3><Values values={used(moment.variables.get(holder)!)} words={plot?.words?.variables} /></>}
       {decision !== undefined && <><h3>Decision</h3><Decision rec={decision} /></>}
-      {state && <Leads form={state.form} />}
+      {state && plot && <Leads form={state.form} plot={plot} />}
     </div>
   );
 }
@@ -44,7 +45,7 @@ function Running({ path, content }: { path: string; content: PlotForm }) {
       <h3>{`Inside: ${content.plot}${content.generated ? " (generated)" : ""}`}</h3>
       {content.about && <p className="quiet">{content.about}</p>}
       {content.when && <p>when <code>{content.when}</code></p>}
-      <Values values={used(moment.variables.get(path) ?? {})} />
+      <Values values={used(moment.variables.get(path) ?? {})} words={content.words?.variables} />
     </>
   );
 }
@@ -54,7 +55,7 @@ function used(values: Named): Named {
   return Object.fromEntries(Object.entries(values).filter(([name, value]) => !(name.startsWith("tries_") && value === 0)));
 }
 
-function Leads({ form }: { form: StateForm }) {
+function Leads({ form, plot }: { form: StateForm; plot: PlotForm }) {
   const ways = [...Object.entries(form.on ?? {}), ["after", form.after ?? []] as const, ["always", form.always ?? []] as const]
     .flatMap(([on, found]) => found.map((way) => ({ on, ...way })));
   if (ways.length === 0) return null;
@@ -64,7 +65,7 @@ function Leads({ form }: { form: StateForm }) {
       <ul className="plain">
         {ways.map((way, i) => (
           <li key={i}>
-            <b>{way.on}</b>{way.seconds !== undefined && ` ${way.seconds} s`}{" → "}{way.to ?? "stays"}
+            <b>{eventWords(plot, way.on)}</b>{way.seconds !== undefined && ` ${way.seconds} s`}{" → "}{way.to === undefined ? "stays" : stateWords(plot, way.to)}
             {way.rule && <span className="badge">{`rule ${way.rule}`}</span>}
             {way.when && <code className="block" title={way.when}>{way.when}</code>}
           </li>

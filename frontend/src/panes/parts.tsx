@@ -1,24 +1,32 @@
 /** Small parts that several panes show: records by name, condition trees, tables of values. */
 
 import { Fragment } from "react";
+import { endWords } from "../core/ends";
 import { written, type ActionRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named,
-  type PlanBrokenRec, type PlanFoundRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
+  type PlanBrokenRec, type PlanAskedRec, type PlanFoundRec, type PlanNoneRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
 import type { Damaged } from "../core/sound";
+import { wordsIn } from "../core/words";
 import { session } from "../session";
 import { seconds } from "./Timeline";
 
 /** In a line; what is longer is cut: a pane would stand still over it. */
 const LINE = 300;
 
+/** Characters of a goal in a line. */
+const GOAL = 60;
+
 /** What a record says, in a line. */
 export function inShort(rec: Rec): string {
-  const said = inWords(rec);
+  const said = session.history.inWords(inWords(rec), rec.seq);
   return said.length > LINE ? `${said.slice(0, LINE)}…` : said;
 }
 
 function inWords(rec: Rec): string {
   switch (rec.type) {
-    case "event": return `${(rec as EventRec).name} from ${(rec as EventRec).source}`;
+    case "event": {
+      const { name, source } = rec as EventRec;
+      return source === "timer" ? "the timer of a state" : `${name} from ${source}`;
+    }
     case "action": {
       const { action, skill, port, value, component, mode } = rec as ActionRec;
       if (action === "wait") return `${skill} waits for ${(rec as ActionRec).for}`;
@@ -26,25 +34,35 @@ function inWords(rec: Rec): string {
     }
     case "step": {
       const taken = (rec as StepRec).microsteps.flatMap((micro) => micro.taken);
-      return taken.length ? `${ending(taken[0]!.from)} → ${ending(taken.at(-1)!.to ?? "")}` : "the start";
+      return taken.length ? `${ending(rec, taken[0]!.from)} → ${ending(rec, taken.at(-1)!.to ?? taken.at(-1)!.from)}` : (rec as StepRec).microsteps.some((micro) => micro.entered.length) ? "the start" : "the run leaves its states";
     }
     case "scene": return `${(rec as SceneRec).things.length} things`;
     case "plan.ordered": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
-    case "plan.none": return String((rec as Rec & { reason?: string }).reason ?? "");
-    case "decision": return `${(rec as DecisionRec).state}: ${(rec as DecisionRec).chosen ?? "no candidate"}`;
+    case "plan.asked": return `planning … ${shortGoal(rec as PlanAskedRec)}`;
+    case "plan.none": return `no plan: ${(rec as PlanNoneRec).reason}`;
+    case "decision": return `${inPath(rec, (rec as DecisionRec).state)}: ${(rec as DecisionRec).chosen ?? "no candidate"}`;
     case "knowledge": return `${(rec as KnowledgeRec).author}: ${news(rec as KnowledgeRec)}`;
     case "rule": return (rec as RuleRec).rule;
     case "plan.found": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
     case "plan.broken": return (rec as PlanBrokenRec).reason;
     case "damaged": return (rec as Damaged).why;
-    case "end": return (rec as EndRec).problem ?? "finished";
+    case "end": return endWords(rec as EndRec);
     default: return "";
   }
 }
 
+function shortGoal({ goal }: PlanAskedRec): string {
+  return goal.length > GOAL ? `${goal.slice(0, GOAL)}…` : goal;
+}
+
 /** The last two parts of a path: enough to know it by. */
-function ending(path: string): string {
-  return path.split("/").slice(-2).join("/");
+function ending(rec: Rec, path: string): string {
+  return inPath(rec, path).split("/").slice(-2).join("/");
+}
+
+/** A path that a record names, in words. */
+export function inPath(rec: Rec, path: string): string {
+  return session.history.words(path, rec.seq);
 }
 
 function news(rec: KnowledgeRec): string {
@@ -105,14 +123,15 @@ export function Tree({ why, decider }: { why: Explanation; decider: Explanation 
   );
 }
 
-export function Values({ values }: { values: Named }) {
+/** `words` are those of names that no author wrote. */
+export function Values({ values, words }: { values: Named; words?: Readonly<Record<string, string>> | undefined }) {
   const names = Object.keys(values);
   if (names.length === 0) return null;
   return (
     <table className="values">
       <tbody>
         {names.map((name) => (
-          <tr key={name}><th scope="row">{`?${name}`}</th><td>{shortly(values[name])}</td></tr>
+          <tr key={name}><th scope="row">{wordsIn(words, name) ?? `?${name}`}</th><td>{shortly(values[name])}</td></tr>
         ))}
       </tbody>
     </table>

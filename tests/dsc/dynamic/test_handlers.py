@@ -360,3 +360,24 @@ def test_handlers_are_written_drawn_and_counted():
     assert "handler low: say" in coverage.report()
     coverage.add(run.send("low", level=3))
     assert coverage.count("p", "rule") == (1, 1)
+
+
+def test_names_that_handlers_add_have_words_for_people():
+    interrupting = "{on: low, interrupt: true, do: {use: say, on: {unheard: two}}}"
+    first, *others = plots_of("{on: go, name: greet, do: {use: say, on: {unheard: resume}}}", interrupting)
+    words = Library([first, *others]).expanded(first).words
+    assert {words.states[name] for name in ("one_low_handled", "a_low_handled")} == {"handles low"}
+    assert words.states["go_handled"] == "greet"
+    assert words.states["go_awaited"] == "waits for go"
+    assert words.states["active"] == "p and its handlers"
+    assert (words.states["active:plot"], words.states["active:on_go"]) == ("plot", "on go")
+    assert words.states["ended_well_reached"] == words.events["ended_well_reached"] == "ended_well"
+    assert words.states["a_low_handled_then_two"] == words.events["then_two"] == "then two"
+
+
+def test_every_added_state_has_words():
+    listening = "{on: heard, listen: {trigger: ear.noise, as: {noise: heard}}, do: {tell: (low)}}"
+    for plots in (plots_of(BESIDE), plots_of(INTERRUPT), plots_of(BESIDE, listening)):
+        expanded = Library(plots).expanded(plots[0])
+        written = {name for name, _, _ in plots[0].walk()}
+        assert {name for name, _, _ in expanded.walk()} - written <= expanded.words.states.keys()

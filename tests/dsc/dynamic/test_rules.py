@@ -671,3 +671,11 @@ def test_what_a_rule_hands_over_fits_by_type(rule, said):
     found = [str(one) for one in validate_plot(made[0], Library(made), schema) if one.code != "every-outcome-is-wired"]
     assert len(found) == bool(said)
     assert said in "".join(found)
+
+
+def test_names_that_rules_add_have_words_for_people():
+    retry = "{on: failed, do: {use: recover, on: {stuck: give_up}, then: retry}}"
+    plots = [plot(HOLDER + f"      - {retry}\n"), plot(STEP), plot(RECOVER)]
+    words = Library(plots).expanded(plots[0]).words
+    assert words.states == {"do_it_failed_0_recover": "failed: recover, retry"}
+    assert words.variables == {"tries_do_it_failed_0": "tries of failed: recover, retry"}

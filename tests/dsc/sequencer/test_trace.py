@@ -146,6 +146,17 @@ def test_every_plot_is_told_once_in_full_before_its_first_step():
     assert plots[0]["plot"] == plot(PLOTS).to_form()
 
 
+def test_a_plot_is_told_with_words_for_the_names_that_its_handlers_added():
+    text = "{plot: p, receives: {low: }, states: {s: }, handlers: [{on: low, do: {tell: (p)}}]}"
+    kb = KnowledgeBase(Schema.parse("(define (domain d) (:predicates (p)))"))
+    library = Library([plot(text)])
+    trace = Trace(lambda: 0.0)
+    heard: list[Record] = []
+    trace.listen(heard.append)
+    StepTracer(trace).step(Machine(library).start("p", {}, KnowledgeSituation(kb, library)))
+    assert heard[0].data["words"]["states"]["low_awaited"] == "waits for low"
+
+
 def test_a_change_of_knowledge_is_told_whole():
     heard, tracer = traced()
     delta = Delta(

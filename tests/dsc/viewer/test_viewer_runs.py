@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import threading
 from typing import Any
 
@@ -81,6 +83,27 @@ def test_what_a_run_adds_is_followed_until_its_end(tmp_path):
     opened.__exit__(None, None, None)
     assert 0 < before < len(heard)
     assert [record["seq"] for record in records(log)] == [record.seq for record in heard]
+
+
+def test_a_run_whose_process_was_killed_is_live_only_once_a_program_writes_again(tmp_path):
+    killed = tmp_path / "killed"
+
+    def halfway() -> None:
+        if not killed.exists():
+            shutil.copytree(tmp_path / "run", killed)
+
+    (tmp_path / "run").mkdir()
+    kept_run(tmp_path / "run" / "run.kb", halfway)
+    lock = killed / "run.kb-lock"
+    mark = lock.read_bytes()
+    lock.write_bytes(mark.replace(b"%20d" % os.getpid(), b"%20d" % 2**40))  # no machine has so many processes
+    with records_of(killed / "run.kb") as log:
+        assert not log.live
+        assert len(log) > 0
+        again = threading.Event()
+        log.on_more(lambda: again.set() if log.live else None)
+        lock.write_bytes(mark)
+        assert again.wait(timeout=20)
 
 
 def test_a_store_without_a_run_is_shown_as_what_it_knows(tmp_path):
