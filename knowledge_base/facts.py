@@ -150,7 +150,9 @@ def require_content(content: object, result: str, what: object, place: Place | N
         InputError: a number is not finite, or a text cannot be written to a file.
     """
     if not _is(content, result):
-        raise SchemaError(f"{what} is {_SAID[result]}, not {content!r}", place=place)
+        convertible = result == "number" and hasattr(content, "__float__") and not isinstance(content, bool)
+        hint = "; convert it with float(...)" if convertible else ""  # e.g. a scalar of numpy
+        raise SchemaError(f"{what} is {_SAID[result]}, not {content!r}{hint}", place=place)
     numbers = content if isinstance(content, tuple) else (content,)
     for number in numbers:
         if isinstance(number, str):

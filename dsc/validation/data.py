@@ -51,6 +51,8 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.text import to_text
 
 _ANY: Types = {}
+_OF_PYTHON = {"bool": "boolean", "float": "number", "int": "integer", "str": "text"}
+"""Types of Python that authors write by mistake, with the types of plots."""
 
 
 def check_data(subject: Subject) -> Iterator[Finding]:
@@ -118,7 +120,10 @@ class _Data:
         for name in names_in(data_type(text)):
             if not self._checker.knows(name):
                 valid = {*FREE_TYPES, *self._schema.types, *self._subject.records}
-                message = f"there is no type '{name}'"
+                message, meant = f"there is no type '{name}'", _OF_PYTHON.get(name)
+                if meant is not None:
+                    yield self._subject.finding(path, "known-type", message, f"write {meant}", found=name)
+                    continue
                 yield self._subject.finding(path, "known-type", message, found=name, valid=valid)
 
     def _state(self, state: State, path: Path) -> Iterator[Finding]:
@@ -228,8 +233,9 @@ class _Data:
             message = f"'{name}' is a parameter, which the plot only reads; assign a variable"
             yield self._subject.finding(path, "declared-variable", message, found=name)
         elif name not in self._assigned:
-            message = f"there is no variable '{name}'"
-            yield self._subject.finding(path, "declared-variable", message, found=name, valid=self._assigned)
+            message, called = f"there is no variable '{name}'", self._called(name)
+            fix = f"the knowledge has this value: `tell: (assign {called} ...)`" if called else ""
+            yield self._subject.finding(path, "declared-variable", message, fix, found=name, valid=self._assigned)
 
     # -- rules and handlers ------------------------------------------------------------------------------
 
@@ -381,6 +387,18 @@ class _Data:
 
     # -- types -------------------------------------------------------------------------------------------
 
+    def _meant(self, word: object, scope: Types) -> str:
+        """Return how plots write a variable or function of this name; empty for another word."""
+        if word in scope:
+            return f"write ?{word}"
+        called = self._called(str(word))
+        return f"write {called}" if called else ""
+
+    def _called(self, name: str) -> str:
+        """Return a call of the function with this name, e.g. `(need ?r)`; empty without such a function."""
+        function = None if self._schema is None else self._schema.functions.get(name)
+        return "" if function is None else f"({' '.join([name, *(f'?{one.name}' for one in function.parameters)])})"
+
     def _fits(
         self, term: Term | None, wanted: str | None, scope: Types, path: Path, what: str | None = None
     ) -> Iterator[Finding]:
@@ -400,7 +418,8 @@ class _Data:
         different = self._checker.difference(data_type(given), kind)
         if different is not None:
             message = f"'{name}' is of type {wanted}, and {to_text(term)} is {different}"
-            yield self._subject.finding(path, "value-fits", message, found=to_text(term))
+            fix = self._meant(term.value, {**self._own, **scope}) if isinstance(term, Constant) else ""
+            yield self._subject.finding(path, "value-fits", message, fix, found=to_text(term))
         elif isinstance(term, Constant) and all(map(self._checker.knows, names_in(kind))):
             try:
                 kind.check(f"'{name}'", term.value, self._subject.records)

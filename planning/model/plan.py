@@ -183,8 +183,9 @@ class Unsupported:
     @property
     def who(self) -> str:
         """The missing support, and the engines that provide it, as text."""
-        cannot = f"{self.engine} cannot do that" if self.engine else "no installed engine can do that"
-        others = ", ".join(f"{name} could ({how or 'name it as the planner'})" for name, how in self.could)
+        permitted = "permitted" if any(not how for _, how in self.could) else "installed"
+        cannot = f"{self.engine} cannot do that" if self.engine else f"no {permitted} engine can do that"
+        others = ", ".join(f"{name} could ({how or 'it is installed: permit or name it'})" for name, how in self.could)
         return f"{cannot}, {others or 'nor can any engine known here'}"
 
     @property

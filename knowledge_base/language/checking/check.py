@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Literal
 
-from knowledge_base.errors import Place, SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import GEOMETRY, Value
 from knowledge_base.language.checking.binding import check_answers, unbound_error
 from knowledge_base.language.checking.vocabulary import Computing, Signature, Vocabulary
@@ -263,7 +263,7 @@ class _Checker:
         if types is None or any(self.compatible(arg, t, w) for t in types for w in wanted):
             return
         if isinstance(arg, Constant) and types == ("text",):
-            raise unknown_object(str(arg.value), arg.place, self.names())
+            raise self.unknown_object(str(arg.value), arg.place)
         raise SchemaError(
             f"{_written(arg)} is of type {' or '.join(types)}, but '?{parameter.name}' of '{signature.name}' is of "
             f"type {' or '.join(wanted)}",
@@ -310,7 +310,19 @@ class _Checker:
         if self.objects is None or constant.quoted or not isinstance(value, str):
             return
         if value not in self.objects and value not in self.schema.constants:
-            raise unknown_object(value, constant.place, self.names())
+            raise self.unknown_object(value, constant.place)
+
+    def unknown_object(self, name: str, place: Place | None) -> InputError:
+        """Return the error for a name that is not a known object."""
+        if name[0].isdigit():
+            return SchemaError(
+                f"'{name}' is no number: a number has a point and no unit, as in 1.5", place=place, found=name
+            )
+        if name in self.schema.functions:
+            said = f"there is no object '{name}'; the value of the function is {self.schema.functions[name]}"
+            return SchemaError(said, place=place, found=name)
+        message = f"there is no object '{name}' (text is written in quotes)"
+        return UnknownNameError(message, place=place, found=name, valid=self.names())
 
     def names(self) -> tuple[str, ...]:
         """Return the names of all known objects."""
@@ -328,10 +340,3 @@ class _Checker:
             yield
         finally:
             self.scope = outer
-
-
-def unknown_object(name: str, place: Place | None, valid: tuple[str, ...]) -> UnknownNameError:
-    """Return the error for a name that is not a known object."""
-    return UnknownNameError(
-        f"there is no object '{name}' (text is written in quotes)", place=place, found=name, valid=valid
-    )

@@ -500,6 +500,7 @@ WRONG = [
     ("condition", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - before: a\n    when: (on ?step.itm table)\n    do: {use: wait}\n", 11, "mean '?step.item'", ""),
     ("known-component", ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - before: a\n    do: {command: [{switch: amr, to: rest}]}\n", 11, "mean 'arm'", ""),
     ("rule-event", ITEM + "  a:\n" + GRASP + "    on: {done: b, failed: e, lost: e}\n  b: {use: wait, on: {done: e}}\n" + E + "rules:\n  - on: lost\n    of: b\n    do: {then: e}\n", 11, "'b' cannot end with 'lost'", ""),
+    ("known-type", "plot: p\nparameters: {n: float}\nstates:\n" + E, 2, "no type 'float'", "write number"),
     ("known-event", S + "  a: {on: {done: e}}\n" + E + "handlers:\n  - on: low\n    do: {use: wait}\n", 6, "nothing here fires the event 'low'", "listen"),
     ("handlers", S + "  a: {on: {done: e, x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    interrupt: true\n    do: {tell: (free)}\n", 7, "interrupts nothing", "use"),
     ("dialect", H + "  a: {on: {x: e}}\n" + E + "receives: {x: }\nhandlers:\n  - on: x\n    do: {use: wait}\n", 7, "handlers are for plots of dialect dsc", "transitions"),

@@ -167,7 +167,7 @@ def test_no_engine_that_can_is_an_outcome_that_says_how_to_get_one():
 
     found = asyncio.run(run())
     assert isinstance(found, Unsupported)
-    assert found.message.startswith("the problem needs STRIPS; no installed engine can do that, fast-downward could")
+    assert found.message.startswith("the problem needs STRIPS; no permitted engine can do that, fast-downward could")
 
 
 def test_two_at_most_race_and_only_those_that_can():

@@ -60,7 +60,10 @@ def test_who_could_plan_is_said_with_how_to_get_it(jars):
 
 def test_without_such_a_construct_it_is_said_what_is_needed(jars):
     said = why_no_engine(jars, parse_condition("(washed a)"), Unsupported("", (), (("enhsp", ""),)))
-    assert said == "the problem needs STRIPS; no installed engine can do that, enhsp could (name it as the planner)"
+    assert (
+        said
+        == "the problem needs STRIPS; no permitted engine can do that, enhsp could (it is installed: permit or name it)"
+    )
 
 
 def test_a_robot_says_which_condition_no_installed_engine_can_do(jars, world_of, monkeypatch):
