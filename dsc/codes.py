@@ -45,6 +45,7 @@ CODES: Mapping[str, str] = {
     "known-plot": "The library has the plot that a state, rule or handler uses.",
     "known-skill": "A deployed component offers the skill or event that a plot triggers.",
     "known-type": "The domain, a record or the language declares the type.",
+    "made-true": "A predicate that conditions read is an initial fact, or a part of the robot makes it true.",
     "no-border-crossing": "A transition stays in the scope of its state; a composite state has its own transitions.",
     "no-circle": "Plots do not use each other in a cycle.",
     "no-dead-end": "A transition leaves each simple state, or the state is final.",
@@ -66,6 +67,7 @@ CODES: Mapping[str, str] = {
     "term": "A term has a value: its functions, conversions and parts of values exist.",
     "transitions": "The condition of a transition can hold, and no earlier transition is always taken.",
     "turns": "Parallel work does not wait for itself at a component that executes one skill at a time.",
+    "used-plot": "A plot implements a planning action, or another part of the robot names it.",
     "value-fits": "A value has the type of its place.",
 }
 """Conditions that hold without the finding, by code."""

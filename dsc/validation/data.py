@@ -233,7 +233,7 @@ class _Data:
             message = f"'{name}' is a parameter, which the plot only reads; assign a variable"
             yield self._subject.finding(path, "declared-variable", message, found=name)
         elif name not in self._assigned:
-            message, called = f"there is no variable '{name}'", self._called(name)
+            message, called = f"there is no variable '{name}'", self._call_of(name)
             fix = f"the knowledge has this value: `tell: (assign {called} ...)`" if called else ""
             yield self._subject.finding(path, "declared-variable", message, fix, found=name, valid=self._assigned)
 
@@ -391,10 +391,10 @@ class _Data:
         """Return how plots write a variable or function of this name; empty for another word."""
         if word in scope:
             return f"write ?{word}"
-        called = self._called(str(word))
+        called = self._call_of(str(word))
         return f"write {called}" if called else ""
 
-    def _called(self, name: str) -> str:
+    def _call_of(self, name: str) -> str:
         """Return a call of the function with this name, e.g. `(need ?r)`; empty without such a function."""
         function = None if self._schema is None else self._schema.functions.get(name)
         return "" if function is None else f"({' '.join([name, *(f'?{one.name}' for one in function.parameters)])})"

@@ -50,6 +50,7 @@ from planning.robot.fact_names import sources_of, wrong_facts
 from planning.robot.simulation import Setup, Simulation
 from planning.robot.soundness import IMPLEMENTED, check_implementations, interfaces
 from planning.robot.targets import bundle_at
+from planning.robot.unused import never_true, unused_plots
 
 READABLE = "readable"
 """The rule of findings about files and parts that cannot be read."""
@@ -227,14 +228,16 @@ class _Robot:
             found += mistakes or review_plot(plot, library, skills, exclusive)
         found = without_consequences(found, self._broken_files())
         if self._domain is not None:
+            files = sources_of([*(self._components or ()), *filter(None, [self._simulation])])
             found += without_consequences(check_implementations(library, self._domain), self._broken_files())
             self._check_task(world or KnowledgeBase(self._domain.schema))
             found += self._unplannable(self._domain)
             found += () if world is None else _without_values(self._domain, world)
             found += review_types(skills or (), self._domain.schema)
-            found += wrong_facts(
-                sources_of([*(self._components or ()), *filter(None, [self._simulation])]), self._domain.schema
-            )
+            found += wrong_facts(files, self._domain.schema)
+            texts = [_text(file) for file in {*files, *(one for one in self._files if one.suffix == ".py")}]
+            found += unused_plots(self._plots, self._bundle.main, texts)
+            found += () if world is None else never_true(self._plots, self._domain, world, texts)
         self._check_components()
         return found
 
@@ -368,7 +371,11 @@ class _Robot:
             configure(self._components)
         for file in self._profiles():
             with tolerated():
-                self.check_profile(load_profile(file))
+                profile = load_profile(file)
+                self.check_profile(profile)
+                if profile.name != file.stem:
+                    message = f"the profile is named '{profile.name}', and its file '{file.stem}': runs use the file's name"
+                    raise InputError(message, place=profile.place(("profile",)), found=profile.name)
 
     def _profiles(self) -> Iterator[Path]:
         """Yield the files of the bundle's profiles, and of other profiles in the project that no other robot has."""

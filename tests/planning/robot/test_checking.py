@@ -54,6 +54,8 @@ ALONE = [
     ("delivery.py", 'Annotated[str, "room"]', 'Annotated[str, "rom"]', "'to' of skill 'wheels.drive' is of the unknown type 'rom'; did you mean 'room'"),
     ("plots/deliver_all.yaml", "rules:\n  - on: blocked\n    do: {then: retry, limit: 2}", "handlers:\n  - on: blocked\n    do: {tell: (robot-in hall)}", "'blocked' is (answer it by a rule, under `rules`)"),
     ("plots/deliver_all.yaml", "rules:\n", "handlers:\n", "`then` belongs to a rule"),
+    ("profiles/fast.yaml", "profile: fast", "profile: quick", "the profile is named 'quick', and its file 'fast'"),
+    ("plots/drive.yaml", "implements: drive\n", "", "nothing uses the plot 'drive'"),
     ("delivery.py", "-> Arrived | Blocked:", "-> Arrived:", "nothing here fires the event 'blocked'"),
 ]  # fmt: skip
 """Mistakes that others of `PLANTED` would hide."""
@@ -326,6 +328,31 @@ def test_a_number_without_an_initial_value_is_a_warning(project, functions, read
         ("", "(decrease (charge) (robot-in ?to))", "there is no function 'robot-in'"),
     ],
 )
+@pytest.mark.parametrize(
+    ("file", "right", "wrong"),
+    [
+        ("plots/deliver_all.yaml", "done: home", "done: [{to: home, when: (full)}, failed]"),
+        ("domain.pddl", "(and (robot-in ?at) (in", "(and (robot-in ?at) (full) (in"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("source", "before", "makes"),
+    [
+        (None, "", ""),
+        ("plots/drive.yaml", "arrived: there", "arrived: {to: there, tell: (full)}"),
+        ("domain.pddl", "(robot-in ?to)))", "(robot-in ?to) (full)))"),
+        ("delivery.py", "added=(", 'added=(fact("full"), '),
+        ("domain.pddl", "  (:action drive", "  (:derived (full) (robot-in hall))\n  (:action drive"),
+    ],
+)
+def test_a_predicate_that_nothing_makes_true_is_a_warning(project, file, right, wrong, source, before, makes):
+    planted(project, [(file, right, wrong, ""), *([(source, before, makes, "")] if source else [])])
+    said = [str(one) for one in check_project(str(project)) if one.code == "made-true"]
+    assert ["domain.pddl:5:" in one and "nothing makes (full) true, and " in one for one in said] == [True] * (
+        source is None
+    )
+
+
 def test_an_undeclared_function_of_an_action_is_found(project, condition, effect, said):
     planted(project, [
         ("domain.pddl", "(full))\n", "(full)) (:functions (charge))\n", ""),

@@ -1,0 +1,85 @@
+"""Parts of a robot without an effect: plots that nothing uses, and predicates that nothing makes true."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Iterator
+from typing import Any
+
+from dsc.errors import Finding
+from dsc.model.plot import ActionPlot
+from knowledge_base.errors import SchemaError
+from knowledge_base.language.syntax.effect import Form, parts_of_form
+from knowledge_base.language.syntax.expression import Atom
+from knowledge_base.view import View
+from planning.model.domain import PlanningDomain
+
+_WORD = re.compile(r"[\w-]+")
+_CONDITIONS = frozenset({"goal", "when"})
+
+
+def unused_plots(plots: Collection[ActionPlot], main: str | None, sources: Iterable[str]) -> Iterator[Finding]:
+    """Yield a warning for each plot that implements no action and whose name occurs nowhere else.
+
+    Args:
+        plots: the plots of the robot.
+        main: the plot with which a run begins.
+        sources: texts of Python files, which may name a plot.
+    """
+    words = {plot.name: set(_WORD.findall(plot.text)) for plot in plots}
+    elsewhere = set(_WORD.findall("\n".join(sources)))
+    for plot in plots:
+        others = set[str]().union(*(found for name, found in words.items() if name != plot.name))
+        if plot.implements is None and plot.name not in {main, *elsewhere, *others}:
+            error = SchemaError(f"nothing uses the plot '{plot.name}'", place=plot.place(("plot",)), found=plot.name)
+            fix = "name it in a state, a rule or a handler, or say which planning action it `implements`"
+            yield Finding(error, "used-plot", fix, "warning")
+
+
+def never_true(
+    plots: Collection[ActionPlot], domain: PlanningDomain, world: View, sources: Iterable[str]
+) -> Iterator[Finding]:
+    """Yield a warning for each predicate that a plot or action reads and that no part of the robot makes true.
+
+    Args:
+        plots: the plots of the robot.
+        domain: the planning domain.
+        world: the initial knowledge.
+        sources: texts of Python files, whose strings may be predicates.
+    """
+    changed = {one.predicate for one in world.facts()} | set(_WORD.findall("\n".join(sources)))
+    read = dict[str, str]()
+    for plot in plots:
+        for key, text in _texts(plot.to_form()):
+            words = dict.fromkeys(_WORD.findall(text), f"plot '{plot.name}'")
+            if key in _CONDITIONS:
+                read = {**words, **read}
+            elif key == "tell":
+                changed.update(words)
+    for action in domain.actions.values():
+        changed.update(_predicates(action.effect))
+        read = {**dict.fromkeys(_predicates(action.precondition), f"planning action '{action.name}'"), **read}
+    schema = domain.schema
+    defined = {*schema.computed, *(axiom.predicate for axiom in schema.axioms)}
+    for name, signature in schema.predicates.items():
+        if name in read and name not in changed | defined:
+            message = f"nothing makes {signature} true, and {read[name]} reads it"
+            fix = "it is in no initial fact, no effect, no `tell` and no `fact(...)`"
+            yield Finding(SchemaError(message, place=signature.place, found=name), "made-true", fix, "warning")
+
+
+def _texts(form: Any, key: str = "") -> Iterator[tuple[str, str]]:
+    """Yield each text in a form with the nearest key."""
+    if isinstance(form, dict):
+        for name, part in form.items():
+            yield from _texts(part, name)
+    elif isinstance(form, list):
+        for part in form:
+            yield from _texts(part, key)
+    elif isinstance(form, str):
+        yield key, form
+
+
+def _predicates(form: Form) -> set[str]:
+    own = {form.predicate} if isinstance(form, Atom) else set[str]()
+    return own.union(*map(_predicates, parts_of_form(form)))
