@@ -15,6 +15,7 @@ from planning.execution.shipped_plots import shipped_plots as shipped_plots
 from planning.generation.plan_to_plot import plot_from_plan as plot_from_plan
 from planning.model.domain import PlanningAction as PlanningAction
 from planning.model.domain import PlanningDomain as PlanningDomain
+from planning.model.ground_action import GroundAction as GroundAction
 from planning.model.plan import EngineFailed as EngineFailed
 from planning.model.plan import NoneFound as NoneFound
 from planning.model.plan import Plan as Plan
@@ -25,7 +26,6 @@ from planning.model.plan import ProvenUnsolvable as ProvenUnsolvable
 from planning.model.plan import TimedOut as TimedOut
 from planning.model.plan import Timing as Timing
 from planning.model.plan import Unsupported as Unsupported
-from planning.model.problem import GroundAction as GroundAction
 from planning.model.problem import Problem as Problem
 from planning.model.problem import UnsupportedActionError as UnsupportedActionError
 from planning.model.problem import UnsupportedGoalError as UnsupportedGoalError

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from knowledge_base.facts import Fact
-    from planning.model.problem import GroundAction, Problem
+    from planning.model.ground_action import GroundAction
+    from planning.model.problem import Problem
     from planning.model.quantities import Numbers
 
 

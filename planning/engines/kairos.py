@@ -11,7 +11,8 @@ from knowledge_base.facts import Fact
 from planning.engines.registry import Engine
 from planning.engines.request import read
 from planning.engines.worker import Answers, Request, Search
-from planning.model.problem import ActionSpan, GroundAction, Problem
+from planning.model.ground_action import ActionSpan, GroundAction
+from planning.model.problem import Problem
 from planning.model.quantities import Assignment, NumericBound, Quantity, fluents
 
 _ONE_RESULT = {"anytime": False, "threads": 1, "seed": 0, "timeout": 1e6}
@@ -90,15 +91,24 @@ class _Text:
 
     def _durative(self, name: str, action: GroundAction, span: ActionSpan) -> str:
         length = f"(and (>= ?duration {_figure(span.least)}) (<= ?duration {_figure(span.most)}))"
+        conditions = (
+            ("at start", action.precondition, action.bounds),
+            ("over all", span.over_all, span.lasting_bounds),
+            ("at end", span.end, span.end_bounds),
+        )
+        changes = (
+            ("at start", action.adds, action.deletes, action.assignments),
+            ("at end", span.adds, span.deletes, span.assignments),
+        )
         needs = [
-            f"({when} {self._facts[fact]})"
-            for when, facts in (("at start", action.precondition), ("over all", span.over_all), ("at end", span.end))
-            for fact in facts
+            f"({when} {condition})"
+            for when, facts, bounds in conditions
+            for condition in (*map(self._facts.__getitem__, facts), *map(self._bound, bounds))
         ]
         effects = [
             f"({when} {change})"
-            for when, adds, deletes in (("at start", action.adds, action.deletes), ("at end", span.adds, span.deletes))
-            for change in self._changes(adds, deletes)
+            for when, adds, deletes, assignments in changes
+            for change in (*self._changes(adds, deletes), *map(self._assignment, assignments))
         ]
         what = f":condition (and {' '.join(needs)}) :effect (and {' '.join(effects)})"
         return f"(:durative-action {name} :parameters () :duration {length} {what})"
@@ -125,9 +135,12 @@ class _Text:
 def _fluents(problem: Problem) -> Iterator[Fact]:
     """Yield the numeric fluents of a problem, some repeatedly."""
     yield from problem.numbers
-    for bound in (*problem.bounds, *(bound for action in problem.actions for bound in action.bounds)):
+    spans = [action.span for action in problem.actions if action.span is not None]
+    bounds = [bound for span in spans for bound in (*span.lasting_bounds, *span.end_bounds)]
+    for bound in (*problem.bounds, *(bound for action in problem.actions for bound in action.bounds), *bounds):
         yield from bound.fluents()
-    for one in (assignment for action in problem.actions for assignment in action.assignments):
+    parts: list[GroundAction | ActionSpan] = [*problem.actions, *spans]
+    for one in (change for part in parts for change in part.assignments):
         yield one.fluent
         yield from fluents(one.amount)
 

@@ -16,14 +16,15 @@ Keys of the JSON object:
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
 from knowledge_base.facts import Fact
 from knowledge_base.language.syntax.identity_cache import IdentityCache
+from planning.model.ground_action import ActionSpan, GroundAction
 from planning.model.plan import PlanStep
-from planning.model.problem import ActionSpan, GroundAction, Problem
+from planning.model.problem import Problem
 from planning.model.quantities import Assignment, NumericBound, from_json, to_json
 
 _Row = tuple[str, tuple[Fact, ...]]
@@ -55,8 +56,8 @@ def read(request: Mapping[str, Any]) -> Problem:
                 named(gone),
                 cost,
                 tuple(map(_bound_from_json, bounds)),
-                tuple(Assignment(_fluent(one), from_json(amount), more) for one, amount, more in assignments),
-                None if span is None else ActionSpan(span[0], span[1], *map(named, span[2:])),
+                _assignments_from_json(assignments),
+                None if span is None else _span(span, named),
             )
             for step, pre, add, gone, cost, bounds, assignments, span in request["actions"]
         ),
@@ -104,10 +105,34 @@ def _row(action: GroundAction) -> _Row:
         *gaps[:3],
         _text(action.cost),
         _text(list(map(_bound_to_json, action.bounds))),
-        _text([[to_json(one.fluent), to_json(one.amount), one.increase] for one in action.assignments]),
-        "null" if span is None else f"[{','.join([_text(span.least), _text(span.most), *gaps[3:]])}]",
+        _text(_assignments_to_json(action.assignments)),
+        "null" if span is None else f"[{','.join([*_span_text(span), *gaps[3:]])}]",
     ]
     return f"[{','.join(parts)}]", tuple(chain.from_iterable(groups))
+
+
+def _span_text(span: ActionSpan) -> list[str]:
+    """Return all parts of a span except its facts."""
+    bounds = (list(map(_bound_to_json, some)) for some in (span.lasting_bounds, span.end_bounds))
+    return [*map(_text, (span.least, span.most, *bounds, _assignments_to_json(span.assignments)))]
+
+
+def _span(data: Sequence[Any], named: Callable[[Iterable[int]], tuple[Fact, ...]]) -> ActionSpan:
+    least, most, lasting, end, assignments, *facts = data
+    over_all, at_end, adds, deletes = map(named, facts)
+    return ActionSpan(
+        least, most, over_all, at_end, adds, deletes,
+        lasting_bounds=tuple(map(_bound_from_json, lasting)), end_bounds=tuple(map(_bound_from_json, end)),
+        assignments=_assignments_from_json(assignments),
+    )  # fmt: skip
+
+
+def _assignments_to_json(assignments: Iterable[Assignment]) -> list[Any]:
+    return [[to_json(one.fluent), to_json(one.amount), one.increase] for one in assignments]
+
+
+def _assignments_from_json(data: Iterable[Any]) -> tuple[Assignment, ...]:
+    return tuple(Assignment(_fluent(one), from_json(amount), more) for one, amount, more in data)
 
 
 def _text(part: Any) -> str:

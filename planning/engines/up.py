@@ -28,7 +28,8 @@ from knowledge_base.facts import Fact
 from planning.engines.registry import Engine
 from planning.engines.request import read
 from planning.engines.worker import Answers, Request, Search
-from planning.model.problem import ActionSpan, GroundAction, Problem
+from planning.model.ground_action import ActionSpan, GroundAction
+from planning.model.problem import Problem
 from planning.model.quantities import Assignment, NumericBound, Operation, Quantity
 
 

@@ -7,25 +7,23 @@ form). The predicate of the complementary fact is `not p`, with a blank, so that
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from operator import itemgetter
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
-from planning.model.plan import Plan, PlanStep, Timing
-from planning.model.quantities import Assignment, Numbers, NumericBound
-from planning.model.timeline import FINEST, Act, Changes, Flaw, TimelineEvent, execute
+from planning.model.ground_action import GroundAction, GroundState, after, missing_condition
+from planning.model.plan import Plan, Timing
+from planning.model.quantities import NumericBound
+from planning.model.timeline import FINEST, Flaw, execute
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
 
 FEATURES = ("numeric", "costs", "durations", "derived")
 """Features beyond STRIPS that a problem may need; problem construction compiles all other features away."""
-
-_NONE: Numbers = MappingProxyType({})
 
 
 class UnsupportedGoalError(InputError):
@@ -34,90 +32,6 @@ class UnsupportedGoalError(InputError):
 
 class UnsupportedActionError(InputError):
     """Error: a relevant planning action contains a construct that no engine supports."""
-
-
-@dataclass(frozen=True, slots=True)
-class ActionSpan:
-    """Duration, later conditions and later effects of a durative ground action.
-
-    The attributes `precondition`, `adds` and `deletes` of the `GroundAction` apply to the action's start.
-
-    Attributes:
-        least, most: bounds of the duration, in seconds.
-        over_all: facts that must hold from the start of the action to its end.
-        end: facts that must hold just before the end of the action.
-        adds: facts that hold after the end of the action.
-        deletes: facts that no longer hold after the end of the action, none of them in `adds`.
-    """
-
-    least: float
-    most: float
-    over_all: tuple[Fact, ...] = ()
-    end: tuple[Fact, ...] = ()
-    adds: tuple[Fact, ...] = ()
-    deletes: tuple[Fact, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class GroundAction:
-    """One alternative of a plan step.
-
-    A step with a disjunctive precondition or conditional effects has several ground actions.
-
-    Attributes:
-        step: the plan step; `None` for a bookkeeping action, which no plan shows.
-        precondition: facts that must hold before the action.
-        adds: facts that hold after the action.
-        deletes: facts that no longer hold after the action, none of them in `adds`.
-        cost: the share of the plan's cost; never negative, by default 1.
-        bounds: numeric conditions that must hold before the action.
-        assignments: numeric changes, one for each fluent, computed from the numbers before the action.
-        span: conditions and effects of a durative action after its start; a durative action has no numbers.
-    """
-
-    step: PlanStep | None
-    precondition: tuple[Fact, ...]
-    adds: tuple[Fact, ...]
-    deletes: tuple[Fact, ...]
-    cost: float = 1.0
-    bounds: tuple[NumericBound, ...] = ()
-    assignments: tuple[Assignment, ...] = ()
-    span: ActionSpan | None = None
-
-    def applicable(self, state: Collection[Fact], numbers: Numbers = _NONE) -> bool:
-        """Return whether the precondition holds in `state` and the numeric conditions hold for `numbers`."""
-        return self.lacks(state, numbers) is None
-
-    def lacks(self, state: Collection[Fact], numbers: Numbers = _NONE) -> Fact | NumericBound | None:
-        """Return the first fact or numeric condition of the precondition that does not hold, or `None`."""
-        missing = next((needed for needed in self.precondition if needed not in state), None)
-        return missing or next((bound for bound in self.bounds if not bound.holds(numbers)), None)
-
-    def apply(self, state: Iterable[Fact]) -> frozenset[Fact]:
-        """Return the state after the action."""
-        return (frozenset(state) - frozenset(self.deletes)) | frozenset(self.adds)
-
-    def count(self, numbers: Numbers) -> Numbers:
-        """Return the numbers after the action.
-
-        Raises:
-            ArithmeticError: the new value of a fluent cannot be computed.
-        """
-        if not self.assignments:
-            return numbers
-        return {**numbers, **{one.fluent: one.result(numbers) for one in self.assignments}}
-
-    def facts(self) -> tuple[Fact, ...]:
-        """Return every fact that the action mentions."""
-        later = () if self.span is None else (*self.span.over_all, *self.span.end, *self.span.adds, *self.span.deletes)
-        return (*self.precondition, *self.adds, *self.deletes, *later)
-
-    def act(self, timing: Timing) -> Act[frozenset[Fact]]:
-        """Return the action as an act on the time line, for a state that is a set of facts."""
-        start, span = _event(self.precondition, self.adds, self.deletes), self.span
-        if span is None:
-            return Act(timing, start)
-        return Act(timing, start, partial(_missing, span.over_all), _event(span.end, span.adds, span.deletes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +98,7 @@ class Problem:
         An engine without support for `costs` still solves the problem, but its plan may be expensive.
         """
         costs = {action.cost for action in self.actions if action.step is not None}
-        numeric = bool(self.bounds) or any(action.bounds or action.assignments for action in self.actions)
+        numeric = bool(self.bounds) or any(action.is_numeric for action in self.actions)
         durative = any(action.span is not None for action in self.actions)
         needs = {"costs": len(costs) > 1, "numeric": numeric, "durations": durative}
         return frozenset(feature for feature, needed in needs.items() if needed)
@@ -243,29 +157,17 @@ class Problem:
             if not least - FINEST <= seconds <= most + FINEST:
                 return f"{action.step} takes {seconds:g} s, which is not between {least:g} and {most:g}"
             acts.append(action.act(Timing(start, seconds)))
-        state = execute(acts, frozenset(self.init), _changed)
+        try:
+            state = execute(acts, GroundState(frozenset(self.init), self.numbers), after)
+        except ArithmeticError as error:
+            return f"an effect cannot be computed: {error}"
         if isinstance(state, Flaw):
             return f"{self.actions[chosen[state.act][0]].step} needs {state.why}"
-        missing = [wanted for wanted in self.goal if wanted not in state]
-        if missing:
-            return f"goal fact {missing[0]} does not hold at the end"
+        missing = missing_condition(self.goal, self.bounds, state)
+        if missing is not None:
+            return f"goal fact {missing} does not hold at the end"
         steps = [(self.actions[index].step, act.timing) for (index, _, _), act in zip(chosen, acts, strict=True)]
         return Plan(
             tuple(step for step, _ in steps if step is not None),
             tuple(timing for step, timing in steps if step is not None),
         )
-
-
-def _missing(needed: tuple[Fact, ...], state: frozenset[Fact]) -> str | None:
-    return next((str(one) for one in needed if one not in state), None)
-
-
-def _event(
-    needed: tuple[Fact, ...], adds: tuple[Fact, ...], deletes: tuple[Fact, ...]
-) -> TimelineEvent[frozenset[Fact]]:
-    changes = {**dict.fromkeys(deletes, False), **dict.fromkeys(adds, True)}
-    return TimelineEvent(partial(_missing, needed), lambda _: changes)
-
-
-def _changed(state: frozenset[Fact], changes: Changes) -> frozenset[Fact]:
-    return (state - changes.keys()) | {fact for fact, holds in changes.items() if holds}

@@ -24,7 +24,8 @@ from knowledge_base.world.derived import Axiom
 from planning.model.actions import PlanningAction
 from planning.model.cancellable_work import WorkLimit
 from planning.model.domain import PlanningDomain
-from planning.model.problem import GroundAction, Problem, UnsupportedActionError, UnsupportedGoalError
+from planning.model.ground_action import GroundAction
+from planning.model.problem import Problem, UnsupportedActionError, UnsupportedGoalError
 from planning.problem.construction import build_problem
 from planning.problem.derived import Derivation, derivation
 from planning.problem.expressions import name_of

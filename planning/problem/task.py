@@ -10,8 +10,9 @@ from typing import Any, NamedTuple, TypeVar
 
 from knowledge_base.facts import Fact, Value
 from knowledge_base.language.evaluation.world_protocol import World
+from planning.model.ground_action import GroundAction
 from planning.model.plan import PlanStep
-from planning.model.problem import GroundAction, Problem
+from planning.model.problem import Problem
 from planning.model.quantities import Assignment, NumericBound, fluents, value_of
 from planning.problem.conditions import Leaf, Literal, is_so
 

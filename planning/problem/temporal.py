@@ -19,8 +19,10 @@ from knowledge_base.language.syntax.effect import AllOf
 from knowledge_base.language.syntax.expression import And, Expression
 from planning.model.cancellable_work import WorkLimit
 from planning.model.domain import PlanningAction, PlanningDomain
+from planning.model.ground_action import ActionSpan, GroundAction
 from planning.model.plan import PlanStep
-from planning.model.problem import ActionSpan, GroundAction, Problem, UnsupportedActionError
+from planning.model.problem import Problem, UnsupportedActionError
+from planning.model.quantities import Assignment, NumericBound, fluents, value_of
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, alternatives
 from planning.problem.expressions import changed
 from planning.problem.grounding import Variant, variants
@@ -36,8 +38,8 @@ _MOST_ALTERNATIVES = 64  # alternatives of one step
 _ENDS, _BEGUN = " ends", "begun "  # the blanks distinguish the names from every declared name
 
 
-class _NotOfFactsError(Exception):
-    """Error: the problem needs numeric conditions or a disjunctive goal, which no supported temporal engine handles."""
+class _TooComplexError(Exception):
+    """Error: the problem has a disjunctive goal, variable durations, or too many alternatives of one step."""
 
 
 def durative(domain: PlanningDomain, goal: Expression) -> bool:
@@ -50,7 +52,7 @@ def durative(domain: PlanningDomain, goal: Expression) -> bool:
 def build_temporal_problem(
     domain: PlanningDomain, world: World, goal: Expression, patience: WorkLimit
 ) -> Problem | None:
-    """Return the problem with durations; `None` if it contains numeric conditions or a disjunctive goal.
+    """Return the problem with durations; `None` if it has a disjunctive goal, or durations that actions change.
 
     Args:
         domain: the domain without derived predicates, see `planning.problem.derived.derivation`.
@@ -66,15 +68,15 @@ def build_temporal_problem(
     # Functions in the bounds of durations are relevant too.
     changing = matters.changing.union(*(changed(action.effect) for action in matters.actions))
     try:
-        wanted = _literals(Grounder(world, matters.changing, keep_false=True, patience=patience).residual(goal, {}))
+        wanted = _leaves(Grounder(world, matters.changing, keep_false=True, patience=patience).residual(goal, {}))
         steps, missing = _possible(actions.values(), matters, wanted, world, patience)
         if missing:
             return Problem(domain.name, {}, (), (), (), missing)
         grounding = _Grounding(actions, Grounder(world, changing, patience=patience), world)
         found = [action for step in steps for action in grounding.of(step)]
-    except (_NotOfFactsError, UnsupportedActionError):
+    except (_TooComplexError, UnsupportedActionError):
         return None
-    return _restricted(domain.name, found, tuple(map(as_fact, wanted)), world)
+    return _restricted(domain.name, found, wanted, world)
 
 
 def _relevant(domain: PlanningDomain, goal: Expression) -> Relevant:
@@ -90,11 +92,11 @@ def _whole(action: PlanningAction) -> PlanningAction:
     return replace(action, precondition=precondition, effect=AllOf((timed.start_effect, timed.end_effect)))
 
 
-def _literals(wanted: Residual) -> tuple[Literal, ...]:
+def _leaves(wanted: Residual) -> tuple[Leaf, ...]:
     parts = wanted.parts if isinstance(wanted, Every) else (wanted,)
-    found = tuple(part for part in parts if isinstance(part, Literal))
+    found = tuple(part for part in parts if isinstance(part, Literal | NumericBound))
     if len(found) < len(parts):
-        raise _NotOfFactsError
+        raise _TooComplexError
     return found
 
 
@@ -113,7 +115,7 @@ def _end(action: PlanningAction, *needed: Expression) -> Iterator[PlanningAction
 def _possible(
     actions: Iterable[PlanningAction],
     matters: Relevant,
-    wanted: tuple[Literal, ...],
+    wanted: tuple[Leaf, ...],
     world: World,
     patience: WorkLimit,
 ) -> tuple[list[PlanStep], tuple[str, ...]]:
@@ -138,7 +140,7 @@ def _possible(
     reach = reachable(Task(numbering, numbering.present(world) - begun, goal, ways))
     missing = [one for one, number in zip(wanted, goal, strict=True) if number not in reach.facts]
     if missing:
-        return [], tuple(str(one.fact) if one.positive else f"(not {one.fact})" for one in missing)
+        return [], tuple(map(_as_text, missing))
     taken = {way.step: None for way, so in zip(ways.all, reach.taken, strict=True) if so and way.step is not None}
     endless = {action.name for action in actions if action.timed is None}
     return [s for s in taken if s.action in endless or PlanStep(s.action + _ENDS, s.args) in taken], ()
@@ -159,9 +161,10 @@ class _Grounding:
         starts = list(variants(_start(action), bindings, self.grounder))
         spans = list(self._spans(action, bindings))
         if len(starts) * len(spans) > _MOST_ALTERNATIVES:
-            raise _NotOfFactsError
+            raise _TooComplexError
         for start, span in itertools.product(starts, spans):
-            yield GroundAction(step, *_parts(start), span=span)
+            bounds, assignments = _bounds(start.condition), start.assignments
+            yield GroundAction(step, *_facts_of(start), bounds=bounds, assignments=assignments, span=span)
 
     def _spans(self, action: PlanningAction, bindings: Mapping[str, Value]) -> Iterator[ActionSpan | None]:
         timed, duration = action.timed, action.duration
@@ -169,7 +172,7 @@ class _Grounding:
             yield None
             return
         if any(map(self.grounder.changes, (duration.least, duration.most))):
-            raise _NotOfFactsError
+            raise _TooComplexError
         least, most = (
             as_number(evaluate_term(one, self.world, bindings), "a duration", one.place)
             for one in (duration.least, duration.most)
@@ -179,29 +182,54 @@ class _Grounding:
         )
         ends = [end for one in _end(action, timed.end) for end in variants(one, bindings, self.grounder)]
         if len(lasting) * len(ends) > _MOST_ALTERNATIVES:
-            raise _NotOfFactsError
+            raise _TooComplexError
         for always, end in itertools.product(lasting, ends):
-            yield ActionSpan(least, min(most, LONGEST), _facts(always), *_parts(end))
+            facts, bounds = _facts_of(end), (_bounds(always), _bounds(end.condition))
+            yield ActionSpan(least, min(most, LONGEST), _facts(always), *facts, *bounds, end.assignments)
 
 
-def _parts(variant: Variant) -> tuple[tuple[Fact, ...], tuple[Fact, ...], tuple[Fact, ...]]:
+def _facts_of(variant: Variant) -> tuple[tuple[Fact, ...], tuple[Fact, ...], tuple[Fact, ...]]:
     """Return the facts that the variant needs, adds and deletes."""
-    if variant.assignments:
-        raise _NotOfFactsError
     effects = variant.effects
     return _facts(variant.condition), _facts(effects), _facts(one.negated for one in effects)
 
 
 def _facts(leaves: Iterable[Leaf]) -> tuple[Fact, ...]:
-    found = tuple(leaves)
-    literals = tuple(one for one in found if isinstance(one, Literal))
-    if len(literals) < len(found):
-        raise _NotOfFactsError
-    return tuple(map(as_fact, literals))
+    return tuple(as_fact(one) for one in leaves if isinstance(one, Literal))
 
 
-def _restricted(name: str, actions: list[GroundAction], goal: tuple[Fact, ...], world: World) -> Problem:
-    """Return the problem without facts that no condition reads, and without facts that hold and are never deleted."""
+def _bounds(leaves: Iterable[Leaf]) -> tuple[NumericBound, ...]:
+    return tuple(one for one in leaves if isinstance(one, NumericBound))
+
+
+def _as_text(leaf: Leaf) -> str:
+    return str(leaf) if isinstance(leaf, NumericBound) else str(leaf.fact) if leaf.positive else f"(not {leaf.fact})"
+
+
+def _numbers(actions: Iterable[GroundAction], goal: Iterable[NumericBound]) -> set[Fact]:
+    """Return the numbers that conditions read, directly or in the changes of such numbers."""
+    parts = [part for action in actions for part in (action, action.span) if part is not None]
+    bounds = [*goal, *(bound for action in actions for bound in action.bounds)]
+    bounds += [
+        bound for part in parts if isinstance(part, ActionSpan) for bound in (*part.lasting_bounds, *part.end_bounds)
+    ]
+    read, found = set[Fact](), {one for bound in bounds for one in bound.fluents()}
+    while found - read:
+        read |= found
+        found = {
+            one
+            for part in parts
+            for change in part.assignments
+            if change.fluent in read
+            for one in fluents(change.amount)
+        }
+    return read
+
+
+def _restricted(name: str, actions: list[GroundAction], wanted: tuple[Leaf, ...], world: World) -> Problem:
+    """Return the problem without facts and numbers that no condition reads, and without facts that never change."""
+    goal, bounds = _facts(wanted), _bounds(wanted)
+    read = _numbers(actions, bounds)
     asked = dict.fromkeys([*goal, *(fact for action in actions for fact in _needed(action))])
     gone = {fact for action in actions for fact in (*action.deletes, *(action.span.deletes if action.span else ()))}
     present = [fact for fact in asked if _holds(fact, world)]
@@ -210,17 +238,25 @@ def _restricted(name: str, actions: list[GroundAction], goal: tuple[Fact, ...], 
     def among(facts: tuple[Fact, ...]) -> tuple[Fact, ...]:
         return tuple(fact for fact in facts if fact in kept)
 
+    def with_read(assignments: tuple[Assignment, ...]) -> tuple[Assignment, ...]:
+        return tuple(one for one in assignments if one.fluent in read)
+
     def small(action: GroundAction) -> GroundAction:
         one = action.span
-        span = one and ActionSpan(one.least, one.most, *map(among, (one.over_all, one.end, one.adds, one.deletes)))
+        span = one and replace(
+            one, over_all=among(one.over_all), end=among(one.end), adds=among(one.adds), deletes=among(one.deletes),
+            assignments=with_read(one.assignments),
+        )  # fmt: skip
         return replace(
             action, precondition=among(action.precondition), adds=among(action.adds), deletes=among(action.deletes),
-            span=span,
+            assignments=with_read(action.assignments), span=span,
         )  # fmt: skip
 
     mentioned = dict.fromkeys(arg for action in actions if action.step for arg in action.step.args)
     objects = {one: kind for one in mentioned if (kind := world.type_of(one)) is not None}
-    return Problem(name, objects, tuple(f for f in present if f in kept), among(goal), tuple(map(small, actions)))
+    numbers = {one: value_of(world, one) for one in sorted(read, key=str)}
+    init = tuple(one for one in present if one in kept)
+    return Problem(name, objects, init, among(goal), tuple(map(small, actions)), numbers=numbers, bounds=bounds)
 
 
 def _needed(action: GroundAction) -> tuple[Fact, ...]:

@@ -374,7 +374,9 @@ class _Robot:
                 profile = load_profile(file)
                 self.check_profile(profile)
                 if profile.name != file.stem:
-                    message = f"the profile is named '{profile.name}', and its file '{file.stem}': runs use the file's name"
+                    message = (
+                        f"the profile is named '{profile.name}', and its file '{file.stem}': runs use the file's name"
+                    )
                     raise InputError(message, place=profile.place(("profile",)), found=profile.name)
 
     def _profiles(self) -> Iterator[Path]:

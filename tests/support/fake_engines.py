@@ -9,8 +9,9 @@ from pathlib import Path
 
 from knowledge_base.facts import Fact
 from planning.engines.planner import PlannerProcess
+from planning.model.ground_action import GroundAction
 from planning.model.plan import PlanStep
-from planning.model.problem import GroundAction, Problem
+from planning.model.problem import Problem
 
 READY = "import json, sys, time, os, signal\nprint('{\"ready\": true}', flush=True)\n"
 HANGING = READY + "time.sleep(600)\n"

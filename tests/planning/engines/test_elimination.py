@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from knowledge_base.facts import Fact
 from planning.engines.action_elimination import indispensable
+from planning.model.ground_action import GroundAction
 from planning.model.plan import Plan, PlanStep
-from planning.model.problem import GroundAction, Problem
+from planning.model.problem import Problem
 from planning.model.quantities import Assignment, NumericBound
 
 HOME, AWAY, DONE = Fact("at", ("home",)), Fact("at", ("away",)), Fact("done")

@@ -22,8 +22,9 @@ from planning.cli.doctor import DISTRIBUTION
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.engines.registry import ENGINES
 from planning.engines.request import written
+from planning.model.ground_action import GroundAction
 from planning.model.plan import PlanStep
-from planning.model.problem import GroundAction, Problem
+from planning.model.problem import Problem
 from planning.problem.construction import build_problem
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import os
 import random
@@ -16,12 +17,14 @@ from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from knowledge_base import Delta, KnowledgeBase, fact
 from knowledge_base.facts import Fact
 from knowledge_base.language.syntax.text import parse_condition
+from planning.analysis.validation import validate
 from planning.engines.process import Deadline, EngineProcess, worker
 from planning.engines.registry import engine
-from planning.engines.request import written
+from planning.engines.request import read, written
 from planning.model.domain import PlanningDomain
+from planning.model.ground_action import GroundAction
 from planning.model.plan import Plan, PlanStep
-from planning.model.problem import GroundAction, Problem
+from planning.model.problem import Problem
 from planning.model.quantities import Assignment, NumericBound
 from planning.problem.construction import build_problem
 from planning.robot.robot import Robot
@@ -121,6 +124,57 @@ def test_a_plan_with_durations_is_valid_and_the_same_again(kairos, seed):
     found = answer(kairos, problem)["timed"]
     assert isinstance(problem.scheduled([tuple(one) for one in found]), Plan)
     assert answer(kairos, problem)["timed"] == found
+
+
+BOTH = PlanningDomain.parse("""(define (domain farm) (:types row)
+  (:predicates (at ?r - row) (linked ?a ?b - row) (sprayed ?r - row) (socket ?r - row) (still))
+  (:functions (battery) (tank) (need ?r - row) (far ?a ?b - row))
+  (:durative-action drive :parameters (?a ?b - row) :duration (= ?duration (far ?a ?b))
+    :condition (and (at start (at ?a)) (at start (linked ?a ?b)) (at start (>= (battery) (far ?a ?b))))
+    :effect (and (at start (not (at ?a))) (at end (at ?b)) (at end (decrease (battery) (far ?a ?b)))))
+  (:durative-action charge :parameters (?r - row) :duration (and (>= ?duration 2) (<= ?duration 5))
+    :condition (and (over all (at ?r)) (over all (socket ?r)) (at end (<= (battery) 20)))
+    :effect (at end (increase (battery) 9)))
+  (:durative-action fill :parameters (?r - row) :duration (= ?duration 3)
+    :condition (and (over all (at ?r)) (over all (socket ?r)) (over all (>= (battery) 1)))
+    :effect (at end (assign (tank) 10)))
+  (:durative-action spray :parameters (?r - row) :duration (= ?duration (* 2 (need ?r)))
+    :condition (and (over all (at ?r)) (at start (>= (tank) (need ?r))))
+    :effect (and (at start (decrease (tank) (need ?r))) (at end (sprayed ?r)))))""")
+
+
+def farm(seed):
+    draw = random.Random(seed)  # noqa: S311  no secret depends on it
+    rows = [f"r{n}" for n in range(draw.randint(2, 5))]
+    links = [pair for one in pairwise(rows) for pair in (one, one[::-1])]
+    world = KnowledgeBase(BOTH.schema)
+    facts = [fact("at", rows[0]), fact("socket", rows[0]), *(fact("linked", *one) for one in links)]
+    values = {fact("battery"): draw.choice([0.5, 2, 8]), fact("tank"): 0}
+    values |= {fact("need", one): draw.choice([2, 3.5]) for one in rows}
+    values |= {fact("far", *one): draw.choice([1, 1.5]) for one in links}
+    world.apply(Delta(nodes=dict.fromkeys(rows, "row"), added=tuple(facts), values=values), "test")
+    goal = f"(and {' '.join(f'(sprayed {one})' for one in rows[-2:])} (>= (battery) {draw.choice([0, 3])}))"
+    return world, parse_condition(goal)
+
+
+@pytest.mark.parametrize("seed", range(15))
+def test_a_plan_with_numbers_and_durations_is_valid_in_the_ground_problem_and_in_the_domain(kairos, seed):
+    world, goal = farm(seed)
+    problem = build_problem(BOTH, world, goal, durations=True).timed
+    assert problem is not None
+    assert problem.features >= {"numeric", "durations"}
+    assert read(json.loads(written(problem))) == problem
+    found = answer(kairos, problem)["timed"]
+    plan = problem.scheduled([tuple(one) for one in found])
+    assert isinstance(plan, Plan), plan
+    assert validate(plan, BOTH, world, goal).valid
+    assert answer(kairos, problem)["timed"] == found
+
+
+def test_a_number_that_durative_actions_cannot_reach_is_no_plan(kairos):
+    world, _ = farm(0)
+    problem = build_problem(BOTH, world, parse_condition("(> (tank) 10)"), durations=True).timed
+    assert problem is None or problem.unreachable or answer(kairos, problem)["actions"] is None
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -15,8 +15,9 @@ from planning.engines.process import Deadline, EngineProcess, OutOfTimeError, wo
 from planning.engines.registry import ENGINES
 from planning.engines.request import written
 from planning.model.domain import PlanningDomain
+from planning.model.ground_action import GroundAction
 from planning.model.plan import PlanStep
-from planning.model.problem import GroundAction, Problem
+from planning.model.problem import Problem
 from planning.problem.construction import build_problem
 from planning.robot.robot import Robot
 

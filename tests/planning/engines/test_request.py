@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from knowledge_base.facts import Fact
 from planning.engines.request import read, written
+from planning.model.ground_action import ActionSpan, GroundAction
 from planning.model.plan import PlanStep
-from planning.model.problem import ActionSpan, GroundAction, Problem
+from planning.model.problem import Problem
 from planning.model.quantities import Assignment, NumericBound, Operation
 
 NAMES = st.sampled_from(["cup", "50% full", "%d", 'quoted "name"', "a-b"])

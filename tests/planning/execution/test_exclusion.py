@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from knowledge_base.facts import Fact
 from planning.analysis.explanation import goal_mutexes
 from planning.model.cancellable_work import WorkLimit
+from planning.model.ground_action import GroundAction
 from planning.model.plan import PlanStep
-from planning.model.problem import GroundAction, Problem
+from planning.model.problem import Problem
 
 FACTS = tuple(Fact("p", (i,)) for i in range(5))
 HOME, AWAY, TIRED = Fact("home"), Fact("away"), Fact("tired")

@@ -8,7 +8,8 @@ from planning import PlanningDomain, PlanStep
 from planning.execution.attempt import MOST_RESUMED, Attempt, EscalationStep, Failure
 from planning.execution.escalation import situation
 from planning.execution.search import without
-from planning.model.problem import GroundAction, Problem
+from planning.model.ground_action import GroundAction
+from planning.model.problem import Problem
 
 STEP = PlanStep("go", ("a", "b"))
 HERE = Failure(STEP, "no_path", "here")

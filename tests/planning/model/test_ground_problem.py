@@ -4,8 +4,9 @@ import json
 
 from knowledge_base.facts import Fact
 from planning.engines.request import read, written
+from planning.model.ground_action import GroundAction
 from planning.model.plan import PlanStep
-from planning.model.problem import GroundAction, Problem
+from planning.model.problem import Problem
 
 HERE, THERE = Fact("here"), Fact("there")
 
