@@ -9,7 +9,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
-.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run pictures viewer lock-viewer test-viewer screenshots docs clean
+.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -90,6 +90,9 @@ soak-suspensions: $(VENV)/.test   ## runs suspended at random moments and resume
 lively: $(VENV)/.test   ## robots in a world that changes every half second: is each needed step carried out once? (HOURS=H SEED=N)
 	$(BIN)/python tests/support/lively_world.py --hours $(or $(HOURS),1) --seed $(or $(SEED),0)
 
+test-wire: $(VENV)/.test   ## the whole suite of a transport over Zenoh, also over a bad network, in real time
+	WIRE=1 $(BIN)/python -m pytest -n 4 tests/dsc/wire/test_zenoh.py
+
 kill-kb: $(VENV)/.test   ## kill -9 a process that writes a store, for each durability: is all that it acknowledged there? (KILLS=N)
 	KILLS=$(or $(KILLS),100) $(BIN)/python -m pytest tests/knowledge_base/journal/test_kb_kill.py
 
@@ -151,6 +154,9 @@ bench-planning: $(VENV)/.engines   ## tables of 5 to 50 items: each engine alone
 
 bench-kb: $(BENCH)/.peers   ## what facts, questions, updates and conditions cost: an index by hand, this knowledge base, four peers (WRITE=1 writes the docs)
 	$(BENCH)/bin/python benchmarks/kb.py $(if $(WRITE),--write)
+
+bench-wire: $(VENV)/.test   ## a call in a process and over Zenoh, and Zenoh alone; times until a death is noticed (QUICK=1, WRITE=1 writes the docs)
+	$(BIN)/python benchmarks/wire.py $(if $(QUICK),--quick) $(if $(WRITE),--write)
 
 bench-run: $(VENV)/.run   ## a macrostep without a store and with one, and 1,000 plots at once, as ratios (QUICK=1, PLOTS=N, SECONDS=N, WRITE=1 writes the docs)
 	$(BIN)/python benchmarks/run.py $(if $(QUICK),--quick) $(if $(PLOTS),--plots $(PLOTS)) $(if $(SECONDS),--seconds $(SECONDS)) $(if $(WRITE),--write)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "dependencies.md"
-LOWER = ("core", "test", "viewer", "bt")
+LOWER = ("core", "test", "viewer", "bt", "zenoh")
 """What `make lower-bounds` installs at its lower bounds."""
 
 
@@ -49,6 +49,7 @@ WHY = {
     "up-aries": ("the engine `aries`", APART),
     "kairos-planner": ("the engine `kairos`", APART),
     "py-trees": ("behaviour trees as skills", "imported by `dsc.components.behaviour_trees`"),
+    "eclipse-zenoh": ("robots in several processes", "imported by `dsc.wire.zenoh_transport`"),
     "starlette": ("the page's requests", "imported where a page is served"),
     "uvicorn": ("the page's server", "imported where a page is served"),
     "websockets": ("the page's socket", "imported where a page is served"),
@@ -81,7 +82,7 @@ WHY = {
 """What each is for, and how it is met."""
 LICENCES = {
     "up-fast-downward": "GPL-3.0 (the engine)", "up-enhsp": "Apache-2.0; the engine GPL-3.0", "up-aries": "MIT",
-    "kairos-planner": "Apache-2.0",
+    "kairos-planner": "Apache-2.0", "eclipse-zenoh": "EPL-2.0 OR Apache-2.0",
     "pyoxigraph": "MIT OR Apache-2.0", "python-statemachine": "MIT", "rdflib": "BSD-3-Clause", "sismic": "LGPL-3.0",
     "scipy": "BSD-3-Clause", "transitions": "MIT", "xstate-statemachine": "MIT", "hatchling": "MIT",
     "mutmut": "BSD-3-Clause", "nbclient": "BSD-3-Clause", "mkdocs": "BSD-2-Clause", "mkdocs-material": "MIT", "mkdocstrings-python": "ISC",
@@ -90,7 +91,7 @@ LICENCES = {
 SPELT = {"GPL3+": "GPL-3.0-or-later", "APACHE": "Apache-2.0", "BSD 2-Clause License": "BSD-2-Clause"}
 """Licences as packages say them, and as SPDX does."""
 TITLES = {
-    "core": "Core", "viewer": "Extra `viewer`", "bt": "Extra `bt`", "fast": "Extra `fast`", "numeric": "Extra `numeric`",
+    "core": "Core", "viewer": "Extra `viewer`", "bt": "Extra `bt`", "zenoh": "Extra `zenoh`", "fast": "Extra `fast`", "numeric": "Extra `numeric`",
     "durations": "Extra `durations`", "numbers": "Extra `numbers`", "test": "Extra `test`", "check": "Extra `check`", "docs": "Extra `docs`", "bench": "Extra `bench`",
     "mutation": "Extra `mutation`",
     "build": "To build the package",
@@ -101,7 +102,7 @@ HEAD = """# Dependencies
 The project itself is Apache-2.0.
 
 `make lower-bounds` installs the core and the packages of its tests exactly at the lower bounds, in a separate
-environment, and runs tests of every room. Only the engine `kairos` has an upper bound.
+environment, and runs tests of every room. Only the engine `kairos` and Zenoh have an upper bound.
 
 Planning engines never run in the program's process: `planning/engines/process.py` starts `planning.engines.worker` for
 each and exchanges lines of JSON with it. `pyperplan` is GPL-3.0-or-later, and only that worker imports it. A program
@@ -155,4 +156,10 @@ if __name__ == "__main__":
     if "--write" in sys.argv:
         PAGE.write_text(page())
     if "--lower" in sys.argv:
-        print("\n".join(f"{one.package}=={one.bound}" for one in requirements() if one.group in LOWER and one.bound))
+        print(
+            "\n".join(
+                f"{one.package}=={one.bound.partition(',')[0]}"
+                for one in requirements()
+                if one.group in LOWER and one.bound
+            )
+        )

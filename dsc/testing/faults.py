@@ -29,6 +29,7 @@ from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessag
 from dsc.outcomes import Outcome
 from dsc.sequencer.sequencer import Sequencer
 from dsc.wire.endpoint import LocalTransport
+from dsc.wire.presence import Presence
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 
@@ -312,7 +313,7 @@ class LossyTransport(LocalTransport):
         seed: the seed of all draws.
         loss: probability that a frame is lost.
         double: probability that a frame arrives twice.
-        delay: maximum delay of a frame in seconds.
+        delay: maximum delay of a frame in seconds; the delay of each report to a watch.
     """
 
     def __init__(self, seed: int, *, loss: float = 0.2, double: float = 0.2, delay: float = 0.1) -> None:
@@ -321,6 +322,7 @@ class LossyTransport(LocalTransport):
         self._loss = loss
         self._double = double
         self._delay = delay
+        self._presence = Presence(delay)
         self._sent: Counter[str] = Counter()
 
     def send(self, sender: str, to: str, frame: bytes) -> None:

@@ -13,10 +13,10 @@ the communication patterns. A transport may therefore lose, duplicate, delay and
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
-from functools import wraps
-from typing import Any, ClassVar, Never
+from functools import partial, wraps
+from typing import Any
 
 import pytest
 
@@ -24,15 +24,14 @@ from dsc.calls import SkillCall
 from dsc.components.assembly import Wiring
 from dsc.components.component import Component
 from dsc.components.life_cycle import Life
-from dsc.components.ports import event, query, takes
-from dsc.components.streams import Push, Stream
+from dsc.components.streams import Stream
 from dsc.errors import NoAnswerError, NotAliveError, ProgrammingError, RefusedError
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
-from dsc.skills import skill
 from dsc.supervision.activation import ComponentActivation
 from dsc.supervision.component_registry import ComponentRegistry
 from dsc.supervision.skill_dependencies import SkillDependencies
+from dsc.testing.suite_components import Laser, Mapper, SuiteRobot
 from dsc.wire.endpoint import Endpoint, Transport
 from dsc.wire.heartbeat import BEAT, SILENCE, Heartbeat
 from dsc.wire.host import Host
@@ -43,106 +42,6 @@ from knowledge_base.facts import Delta, fact
 
 PATIENCE = 20.0
 """Seconds of loop time within which each guarantee must be fulfilled."""
-
-
-class There(Outcome):
-    """The event `there`."""
-
-    to: object
-
-
-class Passed(Outcome):
-    """The event `passed`."""
-
-    n: float
-
-
-class Doubled(Outcome):
-    """The event `doubled`."""
-
-    n: float
-
-
-class Low(Outcome):
-    """The event `low`."""
-
-    level: float
-
-
-class Measure(Outcome):
-    """The event `measure`."""
-
-    metres: float
-
-
-class SuiteRobot(Component):
-    """A component with every kind of port."""
-
-    name = "robot"
-    modes = ("scanning", "resting")
-    needs: ClassVar[Mapping[str, tuple[str, ...]]] = {"scanning": ("power", "light"), "resting": ()}
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.log: list[Any] = []
-
-    @skill
-    async def go(self, call: SkillCall[Passed], to: str, steps: int = 3) -> There:
-        """Report each step, and end at the destination."""
-        self.log.append(f"go {to}")
-        try:
-            for n in range(steps):
-                await call.clock.sleep(0.3)
-                call.report(Passed(n=n))
-        except asyncio.CancelledError:
-            self.log.append("cancelled")
-            raise
-        return There(to=to, observed=Delta(added=(fact("at", to),)))
-
-    @skill
-    async def fall(self, call: SkillCall) -> Never:
-        """Fail."""
-        raise RuntimeError(f"{call.action_id} fell")
-
-    @query
-    async def doubled(self, n: float) -> Doubled:
-        """Return the doubled number."""
-        return Doubled(n=2 * n)
-
-    @event
-    def low(self, level: float, below: float = 20.0) -> Low | None:
-        """Return the event's attributes if the level is low."""
-        return Low(level=level) if level < below else None
-
-    @takes
-    async def say(self, text: str) -> None:
-        """Record the text."""
-        self.log.append(text)
-
-    async def configure(self, parameter: str, value: object) -> None:
-        """Record the setting."""
-        self.log.append((parameter, value))
-
-
-class Laser(Component):
-    """A component that publishes values."""
-
-    name = "laser"
-    scan = Push({"metres": "number"})
-    heat = Push({"celsius": "number"}, period=0.1)
-
-    @query
-    async def measure(self) -> Measure:
-        """Return the published value."""
-        return Measure(metres=9)
-
-
-class Mapper(Component):
-    """A component that subscribes to values."""
-
-    name = "mapper"
-    scan = Stream("laser.scan", {"metres": "number"})
-    heat = Stream("laser.heat", {"celsius": "number"})
 
 
 async def until(holds: Callable[[], bool]) -> None:
@@ -351,6 +250,88 @@ class TransportSuite:
                 Publisher(theirs, "scan").put(value)
                 await until(lambda value=value: subscription.value == value)  # type: ignore[misc]
                 await theirs.close()
+
+    # -- presence ----------------------------------------------------------------------------------------
+
+    @in_loop
+    async def test_the_presence_of_an_address_is_reported(self) -> None:
+        """Cases: an address that appears, disappears and returns, one that was there before, and an ended watch."""
+        transport, reports = self.transport(), list[bool]()
+        stop = transport.watch("server", reports.append)
+        for number in range(2):
+            server = Endpoint("server", transport)
+            await until(lambda n=number: reports == [True, False] * n + [True])  # type: ignore[misc]
+            await server.close()
+            await until(lambda n=number: reports == [True, False] * (n + 1))  # type: ignore[misc]
+        stop()
+        server, late = Endpoint("server", transport), list[bool]()
+        await asyncio.sleep(1.0)
+        ends = [transport.watch("server", late.append) for _ in range(2)]
+        await until(lambda: late == [True, True])
+        ends[0]()
+        ends[0]()  # the end of an ended watch does nothing
+        await server.close()
+        await until(lambda: late == [True, True, False])
+        assert reports == [True, False, True, False]
+
+    @in_loop
+    async def test_addresses_with_any_characters_are_different(self) -> None:
+        """Case: characters that have a meaning in the keys, paths or patterns of a transport."""
+        transport = self.transport()
+        addresses = ["a/b", "a", "a/*", "**", "a?b#c", "a$*", "%2F", " ", "für Arm 7", "@x", "{}"]
+        received: dict[str, list[Any]] = {address: [] for address in addresses}
+        present: dict[str, list[bool]] = {address: [] for address in addresses}
+        for address in addresses:
+            transport.watch(address, present[address].append)
+        client = Endpoint("client/*", transport)
+
+        async def note(to: str, sender: str, body: Any) -> None:
+            received[to].append((sender, body))
+
+        for address in addresses:
+            Endpoint(address, transport).answer("note", partial(note, address))
+        for address in addresses:
+            await client.call(address, "note", address, PATIENCE)
+        assert received == {address: [("client/*", address)] for address in addresses}
+        await until(lambda: all(reports == [True] for reports in present.values()))
+
+    @in_loop
+    async def test_a_death_is_noticed_before_its_silence(self) -> None:
+        """The component is in FatalError when its address has disappeared, and recovers when the address returns."""
+        async with self._robot() as (_, remote, host):
+            remote.watch(True)  # noqa: FBT003
+            await asyncio.sleep(1.0)
+            assert remote.life.state is Life.ALIVE
+            at = asyncio.get_running_loop().time()
+            await host.close()
+            await until(lambda: remote.life.state is Life.FATAL_ERROR)
+            assert remote.life.reason == "'robot' is gone: its program has ended, or cannot be reached"
+            assert asyncio.get_running_loop().time() - at < SILENCE / 2
+            again = Host(SuiteRobot(), remote._transport, LoopClock())  # noqa: SLF001
+            await until(lambda: remote.life.state is not Life.FATAL_ERROR)
+            remote.watch(False)  # noqa: FBT003
+            await again.close()
+
+    @in_loop
+    async def test_the_needs_of_a_dead_activator_end_before_its_silence(self) -> None:
+        """The address of the activator disappears without a last heartbeat."""
+        transport = self.transport()
+
+        async def ignore(_: bool) -> None:  # noqa: FBT001
+            pass
+
+        arm, motor = Endpoint("arm", transport), Heartbeat(Endpoint("motor", transport), list, ignore)
+        async with running(motor.run()):
+            task = asyncio.ensure_future(Heartbeat(arm, lambda: ["motor"], ignore, root=True).run())
+            await until(lambda: motor.active)
+            await asyncio.sleep(1.0)
+            arm.broadcast = lambda *_: None  # type: ignore[method-assign]
+            await asyncio.sleep(0.5)  # messages may still be in transit
+            at = asyncio.get_running_loop().time()
+            await arm.close()
+            await until(lambda: not motor.active)
+            assert asyncio.get_running_loop().time() - at < SILENCE / 2
+            task.cancel()
 
     # -- components --------------------------------------------------------------------------------------
 

@@ -16,13 +16,14 @@ import asyncio
 import json
 import secrets
 from collections import Counter
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from dsc.components.frames import encoded
 from dsc.components.hooks import contained
 from dsc.errors import NoAnswerError, ProgrammingError, RefusedError
+from dsc.wire.presence import Presence, PresenceChanged
 from knowledge_base.errors import InputError, described, text_of
 
 Answers = Callable[[str, Any], Awaitable[Any]]
@@ -45,6 +46,8 @@ REMEMBERED = 60.0
 """Seconds without a frame after which a full endpoint may forget a sender."""
 MOST_CALLS = 1_000
 """Number of calls of one sender that are running, or whose answer the sender may still need."""
+MOST_BYTES = 16 << 20
+"""Maximum number of bytes of a frame."""
 _LONGEST = 1_000
 """Maximum number of characters of a `kind` or `life` in a frame."""
 
@@ -68,23 +71,46 @@ class Transport(Protocol):
         """Send a frame to an address, or to `BROADCAST`. The frame may be lost, duplicated, delayed, or overtaken."""
         ...
 
+    def watch(self, address: str, changed: PresenceChanged) -> Callable[[], None]:
+        """Report whether any program has attached the address, from the loop's own thread; a report may be late.
+
+        The first report is `changed(True)`, now or when the address appears. `changed(False)` follows when its program
+        has detached it, has ended, or cannot be reached, and `changed(True)` when it returns.
+
+        Returns:
+            A function that ends the reports.
+        """
+        ...
+
+
+def require_free(address: str, attached: Collection[str]) -> None:
+    """Raise `InputError` if the address is among the attached ones."""
+    if address in attached:
+        message = f"the address '{address}' is in use: share its endpoint (`host.endpoint`), or close it first"
+        raise InputError(message, found=address)
+
 
 class LocalTransport:
     """A transport inside one process: every frame arrives, one time, in order."""
 
     def __init__(self) -> None:
         self._attached: dict[str, Receive] = {}
+        self._presence = Presence()
 
     def attach(self, address: str, receive: Receive) -> None:
         """Pass frames for the address to `receive`; raise `InputError` if the address is in use."""
-        if address in self._attached:
-            message = f"the address '{address}' is in use: share its endpoint (`host.endpoint`), or close it first"
-            raise InputError(message, found=address)
+        require_free(address, self._attached)
         self._attached[address] = receive
+        self._presence.appear(address)
 
     def detach(self, address: str) -> None:
         """Stop passing frames for the address."""
         self._attached.pop(address, None)
+        self._presence.disappear(address)
+
+    def watch(self, address: str, changed: PresenceChanged) -> Callable[[], None]:
+        """Report whether the address is attached, in a later iteration of the loop."""
+        return self._presence.watch(address, changed)
 
     def send(self, sender: str, to: str, frame: bytes) -> None:
         """Send a frame; it arrives in the next iteration of the loop."""
@@ -198,6 +224,10 @@ class Endpoint:
         """Send a push to `BROADCAST`."""
         self.push(BROADCAST, kind, body)
 
+    def watch(self, address: str, changed: PresenceChanged) -> Callable[[], None]:
+        """Report the presence of another address, as `Transport.watch`."""
+        return self._transport.watch(address, changed)
+
     async def close(self) -> None:
         """Detach from the address, and cancel running calls."""
         self._transport.detach(self.address)
@@ -211,10 +241,13 @@ class Endpoint:
     def _send(self, to: str, what: str, kind: str, number: int, body: Any) -> None:
         # The receiver may forget answers to calls before `low`: this endpoint no longer waits for them.
         low = min(self._asked, default=number)
-        frame = {"what": what, "kind": kind, "n": number, "low": low, "life": self.life, "body": body}
-        self._transport.send(self.address, to, encoded(frame))
+        content = {"what": what, "kind": kind, "n": number, "low": low, "life": self.life, "body": body}
+        self._transport.send(self.address, to, _frame_of(content))
 
     def _receive(self, sender: str, frame: bytes) -> None:
+        if len(frame) > MOST_BYTES:
+            self.dropped["too long"] += 1
+            return
         said = _frame(frame)
         if said is None:
             self.dropped["no frame"] += 1
@@ -294,29 +327,40 @@ class Endpoint:
         task.add_done_callback(self._running.discard)
 
     async def _execute(self, sender: str, peer: _Peer, said: Mapping[str, Any]) -> None:
-        what, body = await self._answer_to(sender, said)
-        frame = encoded({"what": what, "n": said["n"], "life": said["life"], "body": body})
+        frame = await self._answer_to(sender, said)
         if said["n"] >= peer.forgotten:
             peer.answers[said["n"]] = frame
         self._transport.send(self.address, sender, frame)
 
-    async def _answer_to(self, sender: str, said: Mapping[str, Any]) -> tuple[str, Any]:
+    async def _answer_to(self, sender: str, said: Mapping[str, Any]) -> bytes:
+        """Execute a call, and return the frame of its answer."""
+
+        def frame(what: str, body: Any) -> bytes:
+            return _frame_of({"what": what, "n": said["n"], "life": said["life"], "body": body})
+
         answers = self._answering.get(said["kind"])
         if answers is None:
-            return "refusal", f"'{self.address}' does not answer '{said['kind']}'"
+            return frame("refusal", f"'{self.address}' does not answer '{said['kind']}'")
         try:
             with contained():
                 body = await answers(sender, said["body"])
-            encoded(body)
+            return frame("answer", body)
         except ProgrammingError as error:
-            return "bug", str(error)
+            return frame("bug", str(error))
         except Exception as error:  # noqa: BLE001  # any error reaches the caller as text
-            return "refusal", described(error, named=not isinstance(error, InputError))
-        return "answer", body
+            return frame("refusal", described(error, named=not isinstance(error, InputError)))
 
 
 _TO_CALLER = frozenset({"answer", "refusal", "bug", "running"})
 """Kinds of the frames that an endpoint receives about its calls."""
+
+
+def _frame_of(content: Mapping[str, Any]) -> bytes:
+    """Return a frame; raise `InputError` if the content is not plain data, or longer than `MOST_BYTES`."""
+    frame = encoded(content)
+    if len(frame) > MOST_BYTES:
+        raise InputError(f"a message has at most {MOST_BYTES} bytes, not {len(frame)}; send a file's name, or parts")
+    return frame
 
 
 def _frame(frame: bytes) -> dict[str, Any] | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Collection
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from dsc.wire.endpoint import Endpoint
@@ -44,6 +45,7 @@ class Heartbeat:
         self._root = root
         self._busy = busy
         self._activators: dict[str, float] = {}  # by name, the loop time of the last heartbeat
+        self._watches: dict[str, Callable[[], None]] = {}  # by activator, how to end its watch
         self._stirred = asyncio.Event()
         self.active = False
         endpoint.receive("heartbeat", self._received)
@@ -70,11 +72,14 @@ class Heartbeat:
                     async with asyncio.timeout(BEAT):
                         await self._stirred.wait()
         finally:
+            for name in tuple(self._activators):
+                self._remove(name)
             await self._become(active=False)
 
     async def _beat(self) -> None:
         now = asyncio.get_running_loop().time()
-        self._activators = {name: at for name, at in self._activators.items() if now - at < SILENCE}
+        for silent in [name for name, at in self._activators.items() if now - at >= SILENCE]:
+            self._remove(silent)
         await self._become(active=self._root or bool(self._activators) or self._busy())
         if self.active:
             self._endpoint.broadcast("heartbeat", {"needs": sorted(self._needs())})
@@ -92,9 +97,20 @@ class Heartbeat:
         self._received(sender, {"needs": [self._endpoint.address]})
 
     def _received(self, sender: str, said: Any) -> None:
-        needed = self._endpoint.address in said["needs"]
-        before = self._activators.pop(sender, None)
-        if needed:
-            self._activators[sender] = asyncio.get_running_loop().time()
-        if needed != (before is not None):
+        if self._endpoint.address not in said["needs"]:
+            self._remove(sender)
+            return
+        if sender not in self._activators:
+            self._watches[sender] = self._endpoint.watch(sender, partial(self._note_presence, sender))
+            self.stir()
+        self._activators[sender] = asyncio.get_running_loop().time()
+
+    def _note_presence(self, activator: str, present: bool) -> None:  # noqa: FBT001
+        if not present:
+            self._remove(activator)
+
+    def _remove(self, activator: str) -> None:
+        """Remove an activator, if it is one: it needs this component no longer, or is gone."""
+        if self._activators.pop(activator, None) is not None:
+            self._watches.pop(activator)()
             self.stir()

@@ -134,6 +134,10 @@ class Subscription:
                     self.problem = described(error, named=not isinstance(error, InputError))
             await asyncio.sleep(RENEWED)
 
+    def forget_age(self) -> None:
+        """Return to the age before the first message, since the publisher is gone; the value stays known."""
+        self._at = -math.inf
+
     def _pushed(self, sender: str, newest: Any) -> None:
         if sender == self._publisher:
             self.take(newest)

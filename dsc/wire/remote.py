@@ -2,15 +2,16 @@
 
 An action has an id, by which the host executes it only one time, also if frames are repeated. The host stores the
 action's end until the client has received it, so that a resumed run also receives it. During a run, the client queries
-the host every second. After `SILENCE` seconds without an answer, the client's component enters FatalError, also if no
-skill uses it. A skill then ends with `skill_error`, and the next one connects again.
+the host every second, and watches its address. When the address is gone, or after `SILENCE` seconds without an answer,
+the client's component enters FatalError, also if no skill uses it. A skill then ends with `skill_error`, and the next
+one connects again.
 """
 
 from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -54,11 +55,14 @@ class RemoteComponent(Component):
         self._values_there: dict[str, Any] = {}
         self._profile: dict[str, Any] | None = None  # values of this program's profile; `None` before the first start
         self._is_silent = False
+        self._is_gone = False
+        self._presence_changed = asyncio.Event()
         self._unreleased: dict[str, None] = {}  # ids of actions, in their order
         self._releasing: asyncio.Task[None] | None = None
         self._beating: asyncio.Task[None] | None = None
         self._is_watched = False
         self._watching: tuple[asyncio.Task[None], ...] = ()
+        self._end_watch: Callable[[], None] = _do_nothing
         self._program = ""  # the host's life
 
     def remember(self) -> str:
@@ -152,9 +156,12 @@ class RemoteComponent(Component):
     def _begin_or_end_queries(self) -> None:
         loop, wanted = asyncio.get_running_loop(), self._is_watched or self._beating is not None
         if wanted and not self._watching:
+            self._end_watch = self._endpoint.watch(self.name, self._note_presence)
             self._watching = loop.create_task(self._watch()), loop.create_task(self._condition.run())
         elif not wanted:
             watched, self._watching = self._watching, ()
+            self._end_watch()
+            self._is_gone = False
             for task in watched:
                 task.cancel()
 
@@ -183,23 +190,40 @@ class RemoteComponent(Component):
         if life != Life.ALIVE:
             raise RefusedError(f"it is in '{life}' there" + (f": {reason}" if reason else ""))
 
+    def _note_presence(self, present: bool) -> None:  # noqa: FBT001
+        self._is_gone = not present
+        if self._is_gone:
+            self._condition.forget_age()  # only a message of the returned host is a sign of life
+        self._presence_changed.set()
+
     async def _watch(self) -> None:
-        """Enter FatalError after a silence of the host, and leave it when the host answers again."""
+        """Enter FatalError when the host is gone or silent, and leave it when the host answers again."""
         loop = asyncio.get_running_loop()
         began = loop.time()
         while True:
-            left = SILENCE - min(self._condition.age, loop.time() - began)
+            left = 0.0 if self._is_gone else SILENCE - min(self._condition.age, loop.time() - began)
+            self._presence_changed.clear()
             if left > RESOLUTION:
                 if self._is_silent:
                     self._is_silent = False
                     self._follow(self._condition.value)
                     self._releasing = loop.create_task(self._release())
-                await asyncio.sleep(left)
+                await self._wait_for_presence(left)
                 continue
             self._is_silent = True
             if self.life.state in {Life.INIT, Life.ALIVE}:
-                self.life.become(Life.FATAL_ERROR, f"'{self.name}' has not answered for {SILENCE:g} s")
-            await asyncio.sleep(AGAIN)
+                lost = "is gone: its program has ended, or cannot be reached"
+                self.life.become(
+                    Life.FATAL_ERROR,
+                    f"'{self.name}' {lost if self._is_gone else f'has not answered for {SILENCE:g} s'}",
+                )
+            await self._wait_for_presence(AGAIN)
+
+    async def _wait_for_presence(self, seconds: float) -> None:
+        """Wait for a report about the host's address, at most that many seconds."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await self._presence_changed.wait()
 
     def _changed(self, condition: Any, _: float) -> None:
         match condition:
@@ -220,7 +244,7 @@ class RemoteComponent(Component):
     def _follow(self, condition: Mapping[str, Any]) -> None:
         """Enter the state that the component has at its host."""
         life, reason, mine = Life(condition["life"]), condition["reason"], self.life
-        if not self._watching or mine.starting:
+        if not self._watching or mine.starting or self._is_gone:
             return
         if not mine.active and life is not Life.FATAL_ERROR:  # this program does not use the component
             if mine.state is Life.FATAL_ERROR:
@@ -371,6 +395,10 @@ class RemoteComponent(Component):
             if self.life.state is Life.ALIVE:
                 self.life.become(Life.FATAL_ERROR, str(error))
             raise
+
+
+def _do_nothing() -> None:
+    """Do nothing: no watch has begun."""
 
 
 async def _ignore(_: bool) -> None:  # noqa: FBT001

@@ -20,6 +20,7 @@ DISTRIBUTION = "dynamic-state-charts"
 EXTRAS = {
     "viewer": "dsc run --view and dsc view: runs in the browser",
     "bt": "behaviour trees of py_trees as skills",
+    "zenoh": "robots in several processes or on several machines",
     "fast": "plans for large problems in less time, improved during the run",
     "numeric": "planning with numbers that actions change",
     "durations": "planning with durations and concurrent actions",

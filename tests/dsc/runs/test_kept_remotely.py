@@ -77,6 +77,9 @@ class Mortal:
     def attach(self, address, receive):
         self.transport.attach(address, lambda sender, frame: None if self.dead else receive(sender, frame))
 
+    def watch(self, address, changed):
+        return self.transport.watch(address, lambda present: None if self.dead else changed(present))
+
     def detach(self, address):
         self.transport.detach(address)
 

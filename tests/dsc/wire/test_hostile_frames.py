@@ -26,6 +26,7 @@ from dsc.wire.endpoint import BROADCAST, Endpoint, LocalTransport
 from dsc.wire.host import CONDITION, Host
 from dsc.wire.publication import Subscription
 from dsc.wire.remote import RemoteComponent
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
 
@@ -365,5 +366,30 @@ def test_a_host_bounds_what_it_keeps_of_one_action(monkeypatch):
         assert heard[-1].attributes == {"n": 1_999}
         assert len(heard) < 60
         await host.close()
+
+    run_simulated(main())
+
+
+def test_messages_beyond_the_bound_are_refused_with_the_reason(monkeypatch):
+    monkeypatch.setattr(endpoints, "MOST_BYTES", 1000)
+
+    async def main():
+        transport = LocalTransport()
+        server, client = Endpoint("server", transport), Endpoint("client", transport)
+
+        async def long(_, length):
+            return "x" * length
+
+        server.answer("long", long)
+        assert await client.call("server", "long", 800) == 800 * "x"
+        with pytest.raises(RefusedError, match="a message has at most 1000 bytes, not 10"):
+            await client.call("server", "long", 1000)
+        with pytest.raises(InputError, match="a message has at most 1000 bytes, not 10"):
+            await client.call("server", "long", "x" * 1000)
+        with pytest.raises(InputError, match="a message has at most 1000 bytes"):
+            client.broadcast("news", "x" * 1000)
+        transport.send("client", "server", b"{" + 1000 * b" ")
+        await asyncio.sleep(0.1)
+        assert server.dropped == {"too long": 1}
 
     run_simulated(main())

@@ -53,11 +53,12 @@ class Arm(Component):
 
 
 class Cut:
-    """A transport that can be cut."""
+    """A transport that can be cut, which nobody reports; `reports` tells whether it reports the end of a program."""
 
-    def __init__(self, inner):
+    def __init__(self, inner, reports):
         self.inner = inner
         self.cut = False
+        self.reports = reports
 
     def attach(self, address, receive):
         self.inner.attach(address, receive)
@@ -69,6 +70,9 @@ class Cut:
         if not self.cut:
             self.inner.send(sender, to, frame)
 
+    def watch(self, address, changed):
+        return self.inner.watch(address, changed if self.reports else lambda _: None)
+
 
 TRANSPORTS = {
     "local": LocalTransport,
@@ -77,8 +81,13 @@ TRANSPORTS = {
 
 
 @pytest.fixture(params=TRANSPORTS)
-def transport(request):
-    return Cut(TRANSPORTS[request.param]())
+def transport(request, reports):
+    return Cut(TRANSPORTS[request.param](), reports)
+
+
+@pytest.fixture(params=[True, False], ids=["reported", "silent"])
+def reports(request):
+    return request.param
 
 
 def ran(text, transport, arm, meanwhile=None):
@@ -107,6 +116,7 @@ def ran(text, transport, arm, meanwhile=None):
     return (*run_simulated(main()), found)
 
 
+GONE = "'arm' is gone: its program has ended, or cannot be reached"
 IDLE = "{plot: p, states: {a: {after: {seconds: 60, to: e}}, e: {final: true}}}"
 
 
@@ -120,8 +130,9 @@ def test_plots_hear_of_the_loss_and_the_return_of_an_unused_component(transport)
     end, _, found = ran(IDLE, transport, Arm(), crash)
     assert end.finished
     (lost, failed, why), (back, recovered, which) = found[:2]
-    assert (failed, why) == ("component_failed", {"component": "arm", "reason": "'arm' has not answered for 3 s"})
-    assert 12 <= lost <= 13
+    reason = GONE if transport.reports else "'arm' has not answered for 3 s"
+    assert (failed, why) == ("component_failed", {"component": "arm", "reason": reason})
+    assert lost == 10 if transport.reports else 12 <= lost <= 13
     assert (recovered, which) == ("component_recovered", {"component": "arm"})
     assert 30 <= back <= 32
 
@@ -134,7 +145,27 @@ def test_plots_hear_of_a_restart_of_the_program_of_an_unused_component(transport
 
     _, _, found = ran(IDLE, transport, Arm(), restart)
     assert [name for _, name, _ in found[:2]] == ["component_failed", "component_recovered"]
-    assert found[0][2]["reason"] == "the program of 'arm' was restarted"
+    assert found[0][2]["reason"] in {"the program of 'arm' was restarted", *([GONE] if transport.reports else ())}
+
+
+def test_a_skill_fails_when_the_program_of_its_component_is_gone(transport):
+    text = """
+        plot: p
+        states:
+          a: {entry: {trigger: arm.move, with: {seconds: 100}}, on: {moved: x, skill_error: e}}
+          x:
+          e: {final: true}
+    """
+
+    async def crash(hosts):
+        await asyncio.sleep(10)
+        await hosts[0].close()
+
+    end, _, found = ran(text, transport, Arm(), crash)
+    assert end.finished, end
+    (at, name, _), *_ = found
+    assert name == "skill_error"
+    assert at == 10 if transport.reports else 12 <= at <= 13
 
 
 def test_an_action_whose_stop_was_lost_is_stopped_when_the_host_answers_again(transport):
