@@ -71,6 +71,8 @@ class SkillCall(Generic[Reported_contra]):
         waits: reports, as text, the skill of another program for which the component lets this skill wait; empty when
             the wait ends.
         run: identifies the run, see `key`; empty in a run without an id.
+        fence: the fencing number of the program that hosts the component; 0 without a host. A later host has a greater
+            number, so that a device can refuse a host that was replaced.
 
     After a crash, a resumed run may repeat a call with an equal id. The clock of the repeated call begins at the start
     of the action, and repeated reports are dropped. So a skill that acts only one time for each id executes the same
@@ -85,6 +87,7 @@ class SkillCall(Generic[Reported_contra]):
     rank: Rank = ORDINARY
     waits: Callable[[str], None] = lambda _: None
     run: str = ""
+    fence: int = 0
 
     @property
     def key(self) -> str:

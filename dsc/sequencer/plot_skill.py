@@ -52,7 +52,7 @@ class PlotComponent(Component):
         self._library = library
         self._components = tuple(components)
         self._knowledge = knowledge
-        self._signatures = {plot.name: _signature(self.name, plot, after_crash) for plot in library}
+        self._signatures = {plot.name: plot_signature(self.name, plot, after_crash) for plot in library}
 
     async def stop(self) -> None:
         """Stop the components that the plots have started."""
@@ -100,7 +100,8 @@ class PlotComponent(Component):
         return ended[0]
 
 
-def _signature(component: str, plot: ActionPlot, after_crash: AfterCrash) -> SkillSignature:
+def plot_signature(component: str, plot: ActionPlot, after_crash: AfterCrash) -> SkillSignature:
+    """Return the signature of a plot as a skill: its parameters, outcomes and, with `completed`, its outputs."""
     defaults = {name: one.default for name, one in plot.parameters.items() if not one.required}
     return SkillSignature(
         component=component,

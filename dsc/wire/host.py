@@ -7,6 +7,7 @@ A host stores an action's reports and end until the client releases them, within
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext
 from dataclasses import asdict, dataclass, field
@@ -25,7 +26,7 @@ from dsc.outcomes import Outcome
 from dsc.rank import ORDINARY, Rank
 from dsc.run_log import run_logger
 from dsc.wire.endpoint import Endpoint, Transport
-from dsc.wire.heartbeat import Heartbeat
+from dsc.wire.heartbeat import BEAT, Heartbeat
 from dsc.wire.publication import HostedStreams, Publisher
 from knowledge_base.errors import InputError
 from knowledge_base.exchange import delta_form, delta_of
@@ -44,15 +45,22 @@ CONDITION = "its condition"
 class Host:
     """The services of one component on a transport, and its part in the activation tree, until `close`.
 
+    At most one program should host a component. If a second one begins, e.g. while the first one hangs, the first host
+    closes itself as soon as it hears of the second. Until then, a device can tell them apart by `SkillCall.fence`.
+
     Attributes:
         endpoint: the component's address, which all these services share.
+        fence: the fencing number: the time of the start in milliseconds, so that a later host has a greater number.
+        replaced: is set when a later host has taken over.
     """
 
     def __init__(self, component: Component, transport: Transport, clock: Clock) -> None:
         self._component = component
         self.endpoint = Endpoint(component.name, transport)
         self._condition = Publisher(self.endpoint, CONDITION)
-        self._actions = HostedActions(component, self.endpoint, clock)
+        self.fence = time.time_ns() // 1_000_000
+        self.replaced = asyncio.Event()
+        self._actions = HostedActions(component, self.endpoint, clock, self.fence)
         self._streams = HostedStreams(component, self.endpoint)
         self.endpoint.answer("hull", self._hull)
         self.endpoint.answer("come alive", self._come_alive)
@@ -65,7 +73,10 @@ class Host:
         self._answer("diagnose", "diagnose", lambda _: component.diagnose())
         self._is_active = asyncio.Event()
         self._heart = Heartbeat(self.endpoint, self._needed, self._activated, busy=self._actions.is_any_active)
-        self._beating = asyncio.get_running_loop().create_task(self._heart.run())
+        loop = asyncio.get_running_loop()
+        self._claims = Endpoint(f"host of {component.name} {self.endpoint.life}", transport)
+        self._claims.receive("host", self._note_host)
+        self._tasks = [loop.create_task(self._heart.run()), loop.create_task(self._claim())]
         self._changed()
         component.life.listen(self._changed)
 
@@ -83,9 +94,10 @@ class Host:
     async def close(self) -> None:
         """Stop all services without a message, then the component; clients treat the component as failed."""
         self._component.life.leave(self._changed)
+        await self._claims.close()
         await self.endpoint.close()
         await self._actions.close()
-        tasks = [self._beating, *self._streams.close()]
+        tasks = [*self._tasks, *self._streams.close()]
         for task in tasks:
             task.cancel()
         await asyncio.wait(tasks)
@@ -94,6 +106,20 @@ class Host:
                 await self._component.life.retire()
         except Exception as error:  # noqa: BLE001  # the host ends after any error
             _LOG.warning("component '%s' could not stop: %s", self._component.name, reason_of(error))
+
+    async def _claim(self) -> None:
+        """Announce this host to other hosts of the component, until cancelled."""
+        while True:
+            self._claims.broadcast("host", {"of": self._component.name, "fence": self.fence})
+            await asyncio.sleep(BEAT)
+
+    def _note_host(self, _: str, said: Any) -> None:
+        """Stop answering if a later host of the same component exists."""
+        if said["of"] == self._component.name and said["fence"] > self.fence and not self.replaced.is_set():
+            _LOG.warning("component '%s' has a later host, so this host ends", self._component.name)
+            self.replaced.set()
+            self._actions.cancel()
+            self._tasks.append(asyncio.get_running_loop().create_task(self.endpoint.close()))
 
     def _changed(self) -> None:
         life = self._component.life
@@ -223,9 +249,10 @@ class _Action:
 class HostedActions:
     """Handler of the calls `start`, `how` and `stop` at an endpoint, for a component's skills."""
 
-    def __init__(self, component: Component, endpoint: Endpoint, clock: Clock) -> None:
+    def __init__(self, component: Component, endpoint: Endpoint, clock: Clock, fence: int) -> None:
         self._component = component
         self._endpoint = endpoint
+        self._fence = fence
         self._clock = clock
         self._actions: dict[tuple[str, str], _Action] = {}
         self._active: set[asyncio.Task[Any]] = set()
@@ -292,8 +319,9 @@ class HostedActions:
             rank = _rank_of(said.get("rank"))
             run = str(said.get("of_run", ""))
             call = SkillCall(
-                said["id"], self._clock, lambda one: reports.put(_plain(one)), rank=rank, run=run, **seconds
-            )
+                said["id"], self._clock, lambda one: reports.put(_plain(one)), rank=rank, run=run, fence=self._fence,
+                **seconds,
+            )  # fmt: skip
             async with asyncio.timeout(said["seconds"]), self._turn(said, action, rank), self._alive():
                 with contained(f"{self._component.name}.{said['skill']}", self._component.device_errors):
                     outcome = await self._component.execute(said["skill"], call, said["arguments"])

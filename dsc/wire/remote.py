@@ -125,6 +125,15 @@ class RemoteComponent(Component):
         """Return the names of the components that this one needs in its present mode, from the host's last message."""
         return tuple(self._condition.value["needs"])
 
+    @property
+    def condition(self) -> Mapping[str, Any]:
+        """The component's `life`, `reason`, `mode` and `needs`, from the host's last message."""
+        return dict(self._condition.value)
+
+    async def disconnect(self) -> None:
+        """Release the address of this client; its component at the host continues."""
+        await self._endpoint.close()
+
     async def reach(self, name: str) -> Component:
         """Wait for a required component on the transport of this one."""
         while True:

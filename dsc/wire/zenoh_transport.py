@@ -62,6 +62,9 @@ class ZenohTransport:
         config: file with Zenoh's own settings, e.g. certificates and access control. An argument above replaces the
             setting in the file; without the argument, the file's setting or Zenoh's own default applies.
 
+    Attributes:
+        realm: the name of the realm.
+
     Raises:
         InputError: the extra is not installed, an endpoint is malformed or in use, or the file cannot be read.
     """
@@ -90,6 +93,7 @@ class ZenohTransport:
         }
         settings = {} if config else dict(_DEFAULTS)
         self._session = _session(config, settings | {key: value for key, value in given.items() if value is not None})
+        self.realm = realm
         self._id = str(self._session.zid())
         self._realm = _chunk(realm)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -118,6 +122,7 @@ class ZenohTransport:
 
     def send(self, sender: str, to: str, frame: bytes) -> None:
         """Send a frame to an address, or to `BROADCAST`; it is lost if no program has the address, or after `close`."""
+        self._loop = asyncio.get_running_loop()  # a later loop may use endpoints that an earlier one has attached
         if not self._session.is_closed():
             self._publisher(to).put(frame, attachment=sender.encode(errors="surrogateescape"))
 
@@ -128,6 +133,16 @@ class ZenohTransport:
             tokens = f"{self._realm}/alive/*/*"
             self._observer = self._session.liveliness().declare_subscriber(tokens, self._observe, history=True)
         return self._presence.watch(address, changed)
+
+    async def addresses(self) -> set[str]:
+        """Return the addresses that all transports of the realm have attached."""
+
+        def ask() -> set[str]:
+            replies = self._session.liveliness().get(f"{self._realm}/alive/*/*", timeout=LEASE)
+            keys = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+            return {_address(key.split("/")[-2]) for key in keys}
+
+        return await asyncio.to_thread(ask)
 
     def close(self) -> None:
         """Detach all addresses, and close the session."""
@@ -244,8 +259,10 @@ def _session(config: str | Path | None, settings: dict[str, Any]) -> zenoh.Sessi
         raise InputError(f"Zenoh cannot be started: {reason}{remedy}") from None
 
 
+IN_USE = "Address already in use"
+"""Part of the error about an endpoint on which another program listens."""
 _REMEDIES = {
-    "Address already in use": "; end the program that listens there, or listen on another port (0 chooses a free one)",
+    IN_USE: "; end the program that listens there, or listen on another port (0 chooses a free one)",
     "Cannot assign requested address": "; listen on an address of this machine",
     "failed to lookup address": "; listen on an address of this machine",
     "Unable to connect": "; start the program that listens there, or correct the endpoint",

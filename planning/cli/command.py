@@ -16,11 +16,13 @@ from dsc.cli import plots
 from dsc.cli.logs import PROGRAMMING_ERROR
 from dsc.cli.runs import app as runs_app
 from dsc.cli.runs import view_command
+from dsc.cli.wire import call_command, ps_command
 from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import register_reader
 from planning.cli import bundles_command, plan_command
 from planning.cli.check import check_command
 from planning.cli.doctor import doctor_command
+from planning.cli.host import host_command
 from planning.cli.new import new_command
 from planning.cli.run import components_of_target, robot_knowledge, run_command
 
@@ -57,6 +59,9 @@ app.add_typer(kb_app, name="kb")
 app.add_typer(runs_app, name="runs")
 app.command("new")(new_command)
 app.command("run")(run_command)
+app.command("host")(host_command)
+app.command("ps")(ps_command)
+app.command("call")(call_command)
 app.command("check")(check_command)
 app.command("plan")(plan_command)
 app.command("doctor")(doctor_command)

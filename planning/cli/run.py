@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import ExitStack
 from enum import StrEnum
 from functools import partial
 from math import inf
@@ -13,6 +14,7 @@ import typer
 
 from dsc.cli.logs import PROGRAMMING_ERROR, Quiet, Verbose, show_logs
 from dsc.cli.runs import NoOpen, Port
+from dsc.cli.wire import REALM, Connect, Realm, ZenohFile
 
 if TYPE_CHECKING:
     from dsc.components.component import Component
@@ -107,6 +109,9 @@ def run_command(
         typer.Option("--allow-control", help="With --view: the page may pause the run, and post events and facts."),
     ] = False,
     no_wait: Annotated[bool, typer.Option("--no-wait", help="With --view: end with the run, not at Ctrl-C.")] = False,
+    realm: Realm = REALM,
+    connect: Connect = None,
+    zenoh: ZenohFile = None,
     verbose: Verbose = 0,
     quiet: Quiet = False,
 ) -> None:
@@ -125,6 +130,7 @@ def run_command(
         raise InputError("a run is in real time, or in simulated time at a --speed")
     output = None if trace is None else Output(trace, "--trace", scenario, settings, store, resume, over=BEGINS)
     planner = None if engine is None else _planner(engine)
+    wire = _Wire(realm, connect or (), zenoh)
     if resume is not None:
         beginning = {
             "--goal": goal, "--plot": plot, "--with": with_, "--scenario": scenario, "--seed": seed,
@@ -133,14 +139,17 @@ def run_command(
         given = [name for name, value in beginning.items() if value is not None] + ["--real-time"] * real_time
         if given:
             raise InputError(f"--resume continues a run as it began, without {', '.join(given)}")
-        robot = _resume(resume, target, durability, planner)
+        robot = _resume(resume, target, durability, planner, wire)
     else:
         bundle = _bundle(target)
+        if bundle.remote and speed is not None:
+            raise InputError("a run with components of other programs is in real time, without --speed")
+        clock: ClockKind = "real" if real_time or bundle.remote else "simulated"
         robot = _robot(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
-                             durability, target, planner, "real" if real_time else "simulated")  # fmt: skip
+                             durability, target, planner, clock, wire)  # fmt: skip
     follow = partial(_followed, robot, speed=inf if speed is None else speed, until=until,
                      on_signal=on_signal, quiet=json or quiet, trace=output)  # fmt: skip
-    with robot:
+    with wire, robot:
         if not view:
             report = follow()
             _print(report, as_json=json)
@@ -151,6 +160,41 @@ def run_command(
     if report.programming_error is not None:
         raise typer.Exit(PROGRAMMING_ERROR)
     raise typer.Exit(GOAL_REACHED if report.goal_reached else SOMETHING_LEFT)
+
+
+class _Wire:
+    """The connection of a run to the components that other programs host; opened if the robot has some.
+
+    Args:
+        realm, endpoints, settings: see `dsc.wire.client_transport`.
+    """
+
+    def __init__(self, realm: str, endpoints: Collection[str], settings: Path | None) -> None:
+        self._how = realm, endpoints, settings
+        self._open = ExitStack()
+
+    def connect(self, bundle: Bundle) -> Sequence[Component]:
+        """Return the remote components of a bundle; errors as for `dsc.wire.connect_all`."""
+        if not bundle.remote:
+            return ()
+        import asyncio
+
+        from dsc.wire.realm import client_transport, connect_all
+
+        transport = self._open.enter_context(client_transport(*self._how))
+        typer.echo(f"connecting to {', '.join(bundle.remote)} in the realm '{transport.realm}'", err=True)
+        try:
+            return asyncio.run(connect_all(bundle.remote, transport))
+        except BaseException:
+            self._open.close()
+            raise
+
+    def __enter__(self) -> None:
+        """Do nothing: `connect` has opened the connection."""
+
+    def __exit__(self, *_: object) -> None:
+        """Close the connection."""
+        self._open.close()
 
 
 def _bundle(target: str | None) -> Bundle:
@@ -196,6 +240,7 @@ def _robot(
     target: str | None,
     planner: Planner | None,
     clock: ClockKind,
+    wire: _Wire,
 ) -> Robot:
     from dsc.text.profiles import find_profile
     from planning.robot.bringup import deploy
@@ -205,7 +250,7 @@ def _robot(
     return deploy(
         bundle, task, seed=seed, faults=faults, scenario=scenario, profile=settings, store=store,
         durability=durability.value, planner=planner, target=None if target is None else full_target(target),
-        clock=clock,
+        clock=clock, remote=wire.connect(bundle),
     )  # fmt: skip
 
 
@@ -217,7 +262,7 @@ def _planner(engine: str) -> Planner:
     return CachingPlanner(PlannerRace(choose=only(engine)))
 
 
-def _resume(store: Path, target: str | None, durability: Durability, planner: Planner | None) -> Robot:
+def _resume(store: Path, target: str | None, durability: Durability, planner: Planner | None, wire: _Wire) -> Robot:
     """Deploy the robot that began the run in a store; `target` replaces the target that the store has kept."""
     from knowledge_base.errors import Place, StoreError
     from planning.robot.bringup import kept_run, resume
@@ -228,7 +273,8 @@ def _resume(store: Path, target: str | None, durability: Durability, planner: Pl
     if wanted is None:
         whose = f"the run of '{run.plot}' in this store is another program's, which resumes it: Robot.resume()"
         raise StoreError(whose, place=Place(str(store)))
-    return resume(bundle_at(str(wanted)), store, durability=durability.value, planner=planner)
+    bundle = bundle_at(str(wanted))
+    return resume(bundle, store, durability=durability.value, planner=planner, remote=wire.connect(bundle))
 
 
 def _viewed(
@@ -275,7 +321,7 @@ def _followed(
     With `quiet`, texts that the robot prints go to standard error: standard output has only the report.
     """
     import sys
-    from contextlib import ExitStack, redirect_stdout
+    from contextlib import redirect_stdout
 
     from rich.console import Console
 

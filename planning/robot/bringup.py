@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -47,6 +47,7 @@ def deploy(
     listener: Listener | None = None,
     target: str | None = None,
     clock: ClockKind | None = None,
+    remote: Sequence[Component] = (),
 ) -> Robot:
     """Return the robot of a bundle, with its simulated world; the caller must close it.
 
@@ -63,6 +64,7 @@ def deploy(
         listener: called with every record of the run.
         target: the text that `dsc run --resume` uses to find the bundle again.
         clock: the kind of time; by default simulated if the bundle has a simulation, otherwise see `Robot`.
+        remote: the components of `Bundle.remote`, which other programs host, see `dsc.wire.connect_all`.
 
     Raises:
         InputError: the bundle has no task, or no simulation for an option. The task does not fit the bundle, a file
@@ -82,7 +84,7 @@ def deploy(
         kept["goal"] = bundle.goal
     if clock is None and bundle.simulation is not None:
         clock = "simulated"
-    return _deployed(bundle, setup, task, durability, planner, listener, kept, clock)
+    return _deployed(bundle, setup, task, durability, planner, listener, kept, clock, remote)
 
 
 def resume(
@@ -92,6 +94,7 @@ def resume(
     durability: Durability = "process",
     planner: Planner | None = None,
     listener: Listener | None = None,
+    remote: Sequence[Component] = (),
 ) -> Robot:
     """Deploy a bundle to resume the run in a store; for the arguments see `deploy`.
 
@@ -120,7 +123,7 @@ def resume(
         task = Task(goal=str(run.arguments["goal"]))
     elif run.plot == bundle.main and not run.arguments:
         task = Task(plot=bundle.main)
-    return _deployed(bundle, setup, task, durability, planner, listener, {}, kind_of(run))
+    return _deployed(bundle, setup, task, durability, planner, listener, {}, kind_of(run), remote)
 
 
 def kept_run(store: Path) -> RunRow:
@@ -152,10 +155,12 @@ def _deployed(
     listener: Listener | None,
     kept: Mapping[str, Any],
     clock: ClockKind | None,
+    remote: Sequence[Component],
 ) -> Robot:
+    _require_remote(bundle, remote)
     simulation = simulated(bundle, setup)
     try:
-        components = _components(bundle, simulation)
+        components = [*_components(bundle, simulation), *remote]
         configure(components, setup.profile)
         robot = Robot(
             bundle.planning_domain, _library(bundle, setup.profile), components, None, planner,
@@ -179,6 +184,23 @@ def _deployed(
     if listener is not None:
         robot.listen(listener)
     return robot
+
+
+def _require_remote(bundle: Bundle, remote: Sequence[Component]) -> None:
+    """Raise `InputError` unless the remote components are those of the bundle."""
+    given = {one.name for one in remote}
+    for name in bundle.remote:
+        if name not in given:
+            message = f"another program hosts the component '{name}' of '{bundle.name}': `deploy(remote=...)` takes it"
+            raise InputError(message, found=name)
+
+
+def devices(bundle: Bundle, *, seed: int | None = None, faults: float | None = None) -> tuple[Component, ...]:
+    """Return new components of a bundle, those of its simulation included, to host them; errors as for `deploy`."""
+    _require_simulated(bundle, seed=seed, faults=faults)
+    components = require_instances(_components(bundle, simulated(bundle, Setup(seed, faults))))
+    configure(components)
+    return components
 
 
 def components_for(bundle: Bundle) -> tuple[Component, ...]:

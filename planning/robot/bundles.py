@@ -56,6 +56,7 @@ class BundleParts(TypedDict, total=False):
     failures: Collection[str]
     profiles: Path | None
     conversions: tuple[Conversion[..., Any], ...]
+    remote: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)  # without slots, for the cached properties
@@ -82,6 +83,7 @@ class Bundle:
             plots pass on to their caller, and the failures of all skills, e.g. `timed_out`.
         profiles: a folder of settings profiles (`*.yaml`), which `dsc run --profile` finds by name.
         conversions: the functions that terms of the plots may call, see `dsc.conversion`.
+        remote: the names of components that other programs host (`dsc host`). A run connects to them, in real time.
     """
 
     name: str
@@ -99,6 +101,7 @@ class Bundle:
     failures: Collection[str] = frozenset()
     profiles: Path | None = None
     conversions: tuple[Conversion[..., Any], ...] = ()
+    remote: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.failures, str):

@@ -242,7 +242,7 @@ class _Robot:
         return found
 
     def _skills(self) -> list[SkillSignature] | None:
-        if self._components is None:
+        if self._components is None or self._bundle.remote:  # the skills of other programs are unknown
             return None
         own = [skill for component in self._components for skill in component.skills().values()]
         return [*own, *signatures(PlanningComponent, PlanningComponent.name).values()]
@@ -257,7 +257,7 @@ class _Robot:
         )
 
     def _interfaces(self) -> dict[str, Interface] | None:
-        return None if self._components is None else interfaces(self._components)
+        return None if self._components is None or self._bundle.remote else interfaces(self._components)
 
     def _world(self, schema: Schema) -> KnowledgeBase | None:
         """Return the initial knowledge, or `None` if it has a mistake."""

@@ -1,0 +1,110 @@
+"""Command `dsc host`: offer the components of a robot, or its plots, to other programs of a realm."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dsc.cli.logs import Quiet, Verbose, show_logs
+from dsc.cli.wire import REALM, Connect, Realm, ZenohFile
+from knowledge_base.errors import InputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from dsc.components.component import Component
+    from dsc.wire.host import Host
+    from dsc.wire.zenoh_transport import ZenohTransport
+    from planning.robot.bundles import Bundle
+
+
+def host_command(
+    target: Annotated[str, typer.Argument(metavar="TARGET", help="The robot, as for dsc run.")],
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="COMPONENT", help="Host only this component; repeatable.")
+    ] = None,
+    plots: Annotated[
+        str | None, typer.Option("--plots", metavar="NAME", help="Host the robot's plots instead, as this component.")
+    ] = None,
+    replace: Annotated[
+        bool,
+        typer.Option("--replace", help="Take over from a program that hosts the same components, e.g. one that hangs."),
+    ] = False,
+    seed: Annotated[int | None, typer.Option(help="Seed of the simulation's faults.")] = None,
+    faults: Annotated[float | None, typer.Option(min=0.0, max=1.0, help="Chance of a fault per skill call.")] = None,
+    realm: Realm = REALM,
+    listen: Annotated[
+        list[str] | None, typer.Option("--listen", metavar="ENDPOINT", help="Listen here, e.g. tcp/0.0.0.0:7447.")
+    ] = None,
+    connect: Connect = None,
+    zenoh: ZenohFile = None,
+    verbose: Verbose = 0,
+    quiet: Quiet = False,
+) -> None:
+    """Host the components of a robot until Ctrl-C, in real time.
+
+    Programs of one machine meet without options. On several machines, one program listens and the others connect.
+    """
+    from dsc.wire.realm import host_transport
+    from planning.robot.targets import bundle_at
+
+    show_logs(verbose, quiet=quiet)
+    components = _chosen(bundle_at(target), only or [], plots, seed, faults)
+    with host_transport(realm, listen or (), connect or (), zenoh) as transport:
+        asyncio.run(_host(components, transport, replace=replace))
+
+
+def _chosen(
+    bundle: Bundle, only: list[str], plots: str | None, seed: int | None, faults: float | None
+) -> list[Component]:
+    """Return the components to host: those of the bundle, some of them, or one whose skills are the bundle's plots."""
+    from planning.robot.bringup import deploy, devices
+    from planning.robot.robot_component import RobotComponent
+
+    if plots is not None:
+        if only:
+            raise InputError("a program hosts components, or plots: give --only, or --plots")
+        return [RobotComponent(plots, deploy(bundle, seed=seed, faults=faults, clock="real"))]
+    found = {one.name: one for one in devices(bundle, seed=seed, faults=faults)}
+    for name in only:
+        if name not in found:
+            raise UnknownNameError(f"'{bundle.name}' has no component '{name}'", found=name, valid=found)
+    if not found:
+        raise InputError(f"'{bundle.name}' has no components to host; --plots NAME hosts its plots", found=bundle.name)
+    return [one for name, one in found.items() if not only or name in only]
+
+
+async def _host(components: list[Component], transport: ZenohTransport, *, replace: bool) -> None:
+    """Host the components until SIGINT or SIGTERM, or until later hosts have taken over."""
+    from dsc.sequencer.clock import LoopClock
+    from dsc.wire.host import Host
+    from dsc.wire.realm import SOON, hosted_names
+
+    taken = [] if replace else await hosted_names(transport, SOON)
+    for one in components:
+        if one.name in taken:
+            message = f"another program hosts '{one.name}' in the realm '{transport.realm}': end it, or --replace it"
+            raise InputError(message, found=one.name)
+    hosts = [Host(one, transport, LoopClock()) for one in components]
+    names = ", ".join(one.name for one in components)
+    typer.echo(f"hosting {names} in the realm '{transport.realm}'; Ctrl-C ends it")
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with suppress(NotImplementedError):  # Windows
+            loop.add_signal_handler(number, ended.set)
+    waiting = [loop.create_task(ended.wait()), loop.create_task(_all_replaced(hosts))]
+    await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+    for task in waiting:
+        task.cancel()
+    for host in hosts:
+        await host.close()
+    if not ended.is_set():
+        raise InputError("later hosts have taken over all components")
+
+
+async def _all_replaced(hosts: list[Host]) -> None:
+    for host in hosts:
+        await host.replaced.wait()

@@ -1,0 +1,99 @@
+"""Robots as components: the plots of a robot, and its goals, are skills of another program (S2.6, S2.7, S1.22)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from dsc.calls import SkillCall
+from dsc.components.component import Component
+from dsc.dynamic.knowledge_situation import ACHIEVE
+from dsc.dynamic.steps import NO_PLAN_KINDS
+from dsc.errors import ProgrammingError, SkillError
+from dsc.events import GAVE_UP, NO_PLAN
+from dsc.outcomes import Outcome
+from dsc.sequencer.plot_skill import COMPLETED, plot_signature
+from dsc.sequencer.run_end import RunEnd
+from dsc.skills import SkillSignature, check_arguments
+from knowledge_base.errors import UnknownNameError
+from planning.execution.shipped_plots import shipped_plots
+from planning.robot.robot import Robot
+
+_REASON = {"reason": "text"}
+GOAL_SKILL = SkillSignature(
+    "", ACHIEVE, {"goal": "text"}, {}, {COMPLETED: {}, NO_PLAN: {**_REASON, "kind": NO_PLAN_KINDS}, GAVE_UP: _REASON}
+)
+"""The skill with which another program gives a robot a goal."""
+
+
+class RobotComponent(Component):
+    """A component whose skills are the plots of a robot with its own knowledge, planner and devices.
+
+    What a dynamic state of the robot becomes is decided there, on the robot's own knowledge. The skill `achieve` plans
+    for a goal. Several skills may be executed at a time; they share the robot's components.
+
+    Args:
+        name: the component's name in charts.
+        robot: the robot; the component closes it.
+    """
+
+    concurrent = True
+
+    def __init__(self, name: str, robot: Robot) -> None:
+        super().__init__(name)
+        self._robot = robot
+        shipped = {plot.name for plot in shipped_plots()}
+        plots = [plot for plot in robot.library if plot.name not in shipped and not plot.generated]
+        own = {plot.name: plot_signature(name, plot, "sense") for plot in plots} | {ACHIEVE: GOAL_SKILL}
+        self._signatures = {key: replace(one, component=name, unlimited=True) for key, one in own.items()}
+
+    async def stop(self) -> None:
+        """End the runs of the robot, and close it."""
+        for run in self._robot.runs:
+            await run.cancel("its host ends")
+        self._robot.close()
+
+    def skills(self) -> dict[str, SkillSignature]:
+        """Return the signatures of the plots, and of `achieve`."""
+        return dict(self._signatures)
+
+    async def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
+        """Run the plot, or plan for the goal, and return the last outcome event.
+
+        Earlier events become reports. A cancelled skill ends the run after its exit actions.
+
+        Raises:
+            UnknownNameError: there is no such plot.
+            InputError: an argument is missing or unknown, or the goal has a mistake.
+            SkillError: the run ended before its final state.
+            ProgrammingError: code failed in the run.
+        """
+        if skill_name not in self._signatures:
+            message = f"component '{self.name}' has no skill '{skill_name}'"
+            raise UnknownNameError(message, found=skill_name, valid=self._signatures)
+        check_arguments(self._signatures[skill_name], arguments)
+        if skill_name == ACHIEVE:
+            run = self._robot.start(str(arguments["goal"]))
+        else:
+            run = self._robot.start(skill_name, arguments)
+        try:
+            end = await asyncio.shield(run.task)
+        except asyncio.CancelledError:
+            await run.cancel("its caller has cancelled it")
+            raise
+        return _outcome(end, call)
+
+
+def _outcome(end: RunEnd[Any], call: SkillCall[Any]) -> Outcome:
+    """Return the outcome of a run, after reports of its earlier events."""
+    if end.programming_error is not None:
+        raise ProgrammingError(end.programming_error)
+    if end.problem is not None or not end.finished:
+        raise SkillError(end.problem or "it did not reach its end")
+    said = [Outcome(event.name, dict(event.attributes)) for event in end.emitted]
+    last = said.pop() if said and not end.outputs else Outcome(COMPLETED, dict(end.outputs))
+    for outcome in said:
+        call.report(outcome)
+    return last

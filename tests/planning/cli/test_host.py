@@ -1,0 +1,137 @@
+"""Robots in several processes: `dsc host`, `dsc ps`, `dsc call`, and a run whose host is killed or stopped."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from wire_programs import free_endpoint
+
+pytest.importorskip("zenoh")
+
+DSC = Path(sys.executable).with_name("dsc")
+CELL = Path(__file__).parents[2] / "support" / "cell"
+CYCLES = int(os.environ.get("CYCLES", "2"))
+
+
+class Cell:
+    """The programs of the cell, in a realm of their own."""
+
+    def __init__(self, folder):
+        self.endpoint, self.world = free_endpoint(), folder / "world.jsonl"
+        self._programs = []
+
+    def program(self, *arguments):
+        """Start a command of this project."""
+        environment = {**os.environ, "CELL_WORLD": str(self.world)}
+        started = subprocess.Popen(
+            [DSC, *arguments], cwd=CELL, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        self._programs.append(started)
+        return started
+
+    def host(self, *options, target="cell.py:arm"):
+        """Start a host, and return it when it hosts."""
+        started = self.program("host", target, "--listen", self.endpoint, *options)
+        line = started.stdout.readline()
+        assert line.startswith("hosting"), line + started.stdout.read()
+        return started
+
+    def said(self, *arguments, status=0):
+        """Run a command to its end, and return its text."""
+        done = self.program(*arguments, "--connect", self.endpoint)
+        text, _ = done.communicate(timeout=60)
+        assert done.returncode == status, text
+        return text
+
+    def lines(self):
+        return [json.loads(line) for line in self.world.read_text().splitlines()]
+
+    def close(self):
+        for one in self._programs:
+            if one.poll() is None:
+                one.send_signal(signal.SIGCONT)
+                one.kill()
+                one.wait()
+            one.stdout.close()
+
+
+@pytest.fixture
+def cell(tmp_path):
+    made = Cell(tmp_path)
+    yield made
+    made.close()
+
+
+def test_hosted_components_are_listed_called_and_set(cell):
+    assert "no program hosts a component in the realm 'dsc'" in cell.said("ps")
+    host = cell.host()
+    assert cell.said("ps").split() == ["arm", "init", "neutral", "look,", "move"]
+    assert json.loads(cell.said("call", "arm.move", "box=box1", "--json")) == {"event": "moved"}
+    assert [(one["what"], one["box"]) for one in cell.lines()] == [("moved", "box1")]
+    assert "needs its parameter 'box'" in cell.said("call", "arm.move", status=2)
+    assert "has no skill 'mov'; did you mean 'move'" in cell.said("call", "arm.mov", status=2)
+    assert "did you mean 'arm'" in cell.said("call", "amr.move", status=2)
+    assert "another program hosts 'arm'" in cell.said("host", "cell.py:arm", status=2)
+    host.send_signal(signal.SIGINT)
+    assert host.wait(20) == 0
+
+
+def test_a_run_waits_for_its_components_and_uses_them(cell):
+    run = cell.program("run", "cell.py", "--connect", cell.endpoint, "--json")
+    time.sleep(1)
+    cell.host()
+    text, _ = run.communicate(timeout=60)
+    assert run.returncode == 0, text
+    assert sorted(one["box"] for one in cell.lines() if one["what"] == "moved") == [f"box{n}" for n in range(1, 6)]
+
+
+def test_a_component_that_nobody_hosts_is_named(cell):
+    assert "no program hosts the component 'arm'" in cell.said("run", "cell.py", status=2)
+
+
+def test_a_later_host_takes_over_and_the_world_refuses_the_former_one(cell):
+    former = cell.host()
+    cell.said("call", "arm.look")
+    former.send_signal(signal.SIGSTOP)
+    cell.endpoint, old = free_endpoint(), cell.endpoint
+    cell.host("--replace", "--connect", old)
+    cell.said("call", "arm.look")
+    former.send_signal(signal.SIGCONT)
+    assert "later hosts have taken over" in former.communicate(timeout=20)[0]
+    assert former.returncode == 2
+    first, later = [one["fence"] for one in cell.lines()]
+    assert first < later
+
+
+@pytest.mark.parametrize("seed", range(CYCLES))
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_host_that_dies_or_hangs_moves_nothing_twice(cell, number, seed):
+    draw, host = random.Random(seed), cell.host()  # noqa: S311
+    run = cell.program("run", "cell.py", "--connect", cell.endpoint, "--json")
+    while not cell.world.exists():
+        time.sleep(0.01)
+    time.sleep(draw.uniform(0, 0.6))
+    host.send_signal(number)
+    hit = time.monotonic()
+    if number == signal.SIGKILL:
+        host.wait()
+        time.sleep(draw.uniform(0, 0.5))
+        cell.host()
+    else:
+        time.sleep(draw.uniform(1, 5))
+        host.send_signal(signal.SIGCONT)
+    text, _ = run.communicate(timeout=60)
+    report = json.loads(next(line for line in text.splitlines() if line.startswith("{")))
+    assert run.returncode == 0, text
+    assert report["goal_reached"], (text, time.monotonic() - hit)
+    moved = Counter(one["box"] for one in cell.lines() if one["what"] == "moved")
+    assert moved == {f"box{n}": 1 for n in range(1, 6)}

@@ -1,0 +1,5 @@
+(define (domain cell)
+  (:requirements :strips :typing)
+  (:types box)
+  (:predicates (on-table ?b - box))
+  (:action move :parameters (?box - box) :precondition () :effect (on-table ?box)))
