@@ -67,7 +67,7 @@ CODES: Mapping[str, str] = {
     "term": "A term has a value: its functions, conversions and parts of values exist.",
     "transitions": "The condition of a transition can hold, and no earlier transition is always taken.",
     "turns": "Parallel work does not wait for itself at a component that executes one skill at a time.",
-    "used-plot": "A plot implements a planning action, or another part of the robot names it.",
+    "used-plot": "A plot with `when` implements a planning action, or another part of the robot names it.",
     "value-fits": "A value has the type of its place.",
 }
 """Conditions that hold without the finding, by code."""

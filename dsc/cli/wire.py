@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -37,7 +36,7 @@ FAILED = 1
 
 def ps_command(realm: Realm = REALM, connect: Connect = None, zenoh: ZenohFile = None, as_json: AsJson = False) -> None:
     """List the components that programs host, with their state."""
-    found = _with_transport(_described, realm, connect, zenoh)
+    found = _with_transport(_describe, realm, connect, zenoh)
     if as_json:
         print_line(found)
         return
@@ -82,7 +81,7 @@ def call_command(
         if switch is not None:
             await remote.change_mode(switch)
         if skill:
-            return _form(await _executed(remote, skill, given, within))
+            return _form(await _execute(remote, skill, given, within))
         return await remote.diagnose() if diagnose else _hull(remote)
 
     try:
@@ -101,6 +100,8 @@ def call_command(
 def _with_transport(
     act: Callable[[ZenohTransport], Awaitable[T]], realm: str, connect: list[str] | None, zenoh: Path | None
 ) -> T:
+    import asyncio
+
     from dsc.wire.realm import client_transport
 
     async def main() -> T:
@@ -110,7 +111,7 @@ def _with_transport(
     return asyncio.run(main())
 
 
-async def _described(transport: ZenohTransport) -> list[dict[str, Any]]:
+async def _describe(transport: ZenohTransport) -> list[dict[str, Any]]:
     from dsc.wire.realm import SOON, connect_all, hosted_names
 
     names = await hosted_names(transport, SOON)
@@ -130,8 +131,9 @@ def _hull(remote: RemoteComponent) -> dict[str, Any]:
     }
 
 
-async def _executed(remote: RemoteComponent, skill: str, arguments: dict[str, Any], within: float) -> Outcome:
+async def _execute(remote: RemoteComponent, skill: str, arguments: dict[str, Any], within: float) -> Outcome:
     """Execute a skill, with its reports on standard error, and return its outcome."""
+    import asyncio
     from secrets import token_hex
 
     from dsc.calls import SkillCall

@@ -45,8 +45,8 @@ CONDITION = "its condition"
 class Host:
     """The services of one component on a transport, and its part in the activation tree, until `close`.
 
-    At most one program should host a component. If a second one begins, e.g. while the first one hangs, the first host
-    closes itself as soon as it hears of the second. Until then, a device can tell them apart by `SkillCall.fence`.
+    At most one program should host a component. If a second one begins, e.g. as the first one hangs, the first
+    host ends at the first message of the second. Until then, a device can tell them apart by `SkillCall.fence`.
 
     Attributes:
         endpoint: the component's address, which all these services share.

@@ -56,7 +56,7 @@ async def connect_all(
     Raises:
         UnknownNameError: no program has hosted a component within that time; the message has the hosted ones.
     """
-    found = await asyncio.gather(*(_connected(name, transport, within) for name in names))
+    found = await asyncio.gather(*(_connect(name, transport, within) for name in names))
     missing = [name for name, one in zip(names, found, strict=True) if one is None]
     if missing:
         message = (
@@ -80,7 +80,7 @@ async def hosted_names(transport: ZenohTransport, within: float = 0.0) -> list[s
         await asyncio.sleep(_AGAIN)
 
 
-async def _connected(name: str, transport: ZenohTransport, within: float) -> RemoteComponent | None:
+async def _connect(name: str, transport: ZenohTransport, within: float) -> RemoteComponent | None:
     loop = asyncio.get_running_loop()
     until = loop.time() + within
     while (left := until - loop.time()) > 0:

@@ -10,6 +10,7 @@ one connects again.
 from __future__ import annotations
 
 import asyncio
+import math
 import secrets
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -210,7 +211,9 @@ class RemoteComponent(Component):
         loop = asyncio.get_running_loop()
         began = loop.time()
         while True:
-            left = 0.0 if self._is_gone else SILENCE - min(self._condition.age, loop.time() - began)
+            if self._is_gone:
+                began = -math.inf  # the known condition is that of the former program
+            left = SILENCE - min(self._condition.age, loop.time() - began)
             self._presence_changed.clear()
             if left > RESOLUTION:
                 if self._is_silent:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-import signal
-from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -47,26 +44,31 @@ def host_command(
 
     Programs of one machine meet without options. On several machines, one program listens and the others connect.
     """
+    import asyncio
+
     from dsc.wire.realm import host_transport
     from planning.robot.targets import bundle_at
 
     show_logs(verbose, quiet=quiet)
-    components = _chosen(bundle_at(target), only or [], plots, seed, faults)
-    with host_transport(realm, listen or (), connect or (), zenoh) as transport:
-        asyncio.run(_host(components, transport, replace=replace))
+    bundle = bundle_at(target)
+
+    async def main() -> None:
+        with host_transport(realm, listen or (), connect or (), zenoh) as transport:
+            if plots is None:
+                components = _devices(bundle, only or [], seed, faults)
+            elif only:
+                raise InputError("a program hosts components, or plots: give --only, or --plots")
+            else:
+                components = [await _robot(bundle, plots, seed, faults, transport)]
+            await _host(components, transport, replace=replace)
+
+    asyncio.run(main())
 
 
-def _chosen(
-    bundle: Bundle, only: list[str], plots: str | None, seed: int | None, faults: float | None
-) -> list[Component]:
-    """Return the components to host: those of the bundle, some of them, or one whose skills are the bundle's plots."""
-    from planning.robot.bringup import deploy, devices
-    from planning.robot.robot_component import RobotComponent
+def _devices(bundle: Bundle, only: list[str], seed: int | None, faults: float | None) -> list[Component]:
+    """Return the components of a bundle, or some of them."""
+    from planning.robot.bringup import devices
 
-    if plots is not None:
-        if only:
-            raise InputError("a program hosts components, or plots: give --only, or --plots")
-        return [RobotComponent(plots, deploy(bundle, seed=seed, faults=faults, clock="real"))]
     found = {one.name: one for one in devices(bundle, seed=seed, faults=faults)}
     for name in only:
         if name not in found:
@@ -76,8 +78,24 @@ def _chosen(
     return [one for name, one in found.items() if not only or name in only]
 
 
+async def _robot(
+    bundle: Bundle, name: str, seed: int | None, faults: float | None, transport: ZenohTransport
+) -> Component:
+    """Return the robot of a bundle as a component of that name."""
+    from dsc.wire.realm import connect_all
+    from planning.robot.bringup import deploy
+    from planning.robot.robot_component import RobotComponent
+
+    remote = await connect_all(bundle.remote, transport)
+    return RobotComponent(name, deploy(bundle, seed=seed, faults=faults, clock="real", remote=remote))
+
+
 async def _host(components: list[Component], transport: ZenohTransport, *, replace: bool) -> None:
     """Host the components until SIGINT or SIGTERM, or until later hosts have taken over."""
+    import asyncio
+    import signal
+    from contextlib import suppress
+
     from dsc.sequencer.clock import LoopClock
     from dsc.wire.host import Host
     from dsc.wire.realm import SOON, hosted_names

@@ -187,7 +187,7 @@ def _deployed(
 
 
 def _require_remote(bundle: Bundle, remote: Sequence[Component]) -> None:
-    """Raise `InputError` unless the remote components are those of the bundle."""
+    """Raise `InputError` for a remote component of the bundle that is not given."""
     given = {one.name for one in remote}
     for name in bundle.remote:
         if name not in given:

@@ -86,7 +86,7 @@ def check_project(target: str) -> list[Finding]:
         files = list(_sources(path)) if path.is_dir() else []
         robot = None if bundle is None else _Robot(bundle, files, whole=whole)
         findings = [] if robot is None else robot.findings()
-        if robot is not None and not errors and not findings:
+        if robot is not None and not errors and all(one.level == "warning" for one in findings):
             findings += robot.pointless()
     findings += [Finding(error, READABLE) for error in errors]
     if path.is_dir():

@@ -31,7 +31,7 @@ GOAL_SKILL = SkillSignature(
 class RobotComponent(Component):
     """A component whose skills are the plots of a robot with its own knowledge, planner and devices.
 
-    What a dynamic state of the robot becomes is decided there, on the robot's own knowledge. The skill `achieve` plans
+    The robot itself decides what a dynamic state becomes, on its own knowledge. The skill `achieve` plans
     for a goal. Several skills may be executed at a time; they share the robot's components.
 
     Args:

@@ -15,24 +15,29 @@ from knowledge_base.view import View
 from planning.model.domain import PlanningDomain
 
 _WORD = re.compile(r"[\w-]+")
+_QUOTED = re.compile(r"[\"']([\w-]+)[\"']")
 _CONDITIONS = frozenset({"goal", "when"})
 
 
 def unused_plots(plots: Collection[ActionPlot], main: str | None, sources: Iterable[str]) -> Iterator[Finding]:
-    """Yield a warning for each plot that implements no action and whose name occurs nowhere else.
+    """Yield a warning for each candidate, a plot with `when`, that implements no action and is named nowhere else.
+
+    A plot without `when` may be run by its name.
 
     Args:
         plots: the plots of the robot.
         main: the plot with which a run begins.
         sources: texts of Python files, which may name a plot.
     """
-    words = {plot.name: set(_WORD.findall(plot.text)) for plot in plots}
-    elsewhere = set(_WORD.findall("\n".join(sources)))
+    words = {plot.name: {text for _, text in _texts(plot.to_form())} for plot in plots}
+    elsewhere = set(_QUOTED.findall("\n".join(sources)))
     for plot in plots:
         others = set[str]().union(*(found for name, found in words.items() if name != plot.name))
-        if plot.implements is None and plot.name not in {main, *elsewhere, *others}:
-            error = SchemaError(f"nothing uses the plot '{plot.name}'", place=plot.place(("plot",)), found=plot.name)
-            fix = "name it in a state, a rule or a handler, or say which planning action it `implements`"
+        is_candidate = plot.when is not None and plot.implements is None
+        if is_candidate and plot.name not in {main, *elsewhere, *others}:
+            message = f"nothing chooses the plot '{plot.name}', which has a condition `when`"
+            error = SchemaError(message, place=plot.place(("plot",)), found=plot.name)
+            fix = "name it under `dynamic`, or say which planning action it `implements`"
             yield Finding(error, "used-plot", fix, "warning")
 
 
@@ -47,7 +52,7 @@ def never_true(
         world: the initial knowledge.
         sources: texts of Python files, whose strings may be predicates.
     """
-    changed = {one.predicate for one in world.facts()} | set(_WORD.findall("\n".join(sources)))
+    changed = {one.predicate for one in world.facts()} | set(_QUOTED.findall("\n".join(sources)))
     read = dict[str, str]()
     for plot in plots:
         for key, text in _texts(plot.to_form()):
@@ -60,7 +65,7 @@ def never_true(
         changed.update(_predicates(action.effect))
         read = {**dict.fromkeys(_predicates(action.precondition), f"planning action '{action.name}'"), **read}
     schema = domain.schema
-    defined = {*schema.computed, *(axiom.predicate for axiom in schema.axioms)}
+    defined = {*schema.computed, *(axiom.predicate for axiom in (*domain.axioms, *schema.axioms))}
     for name, signature in schema.predicates.items():
         if name in read and name not in changed | defined:
             message = f"nothing makes {signature} true, and {read[name]} reads it"

@@ -112,6 +112,18 @@ def test_a_later_host_takes_over_and_the_world_refuses_the_former_one(cell):
     assert first < later
 
 
+def test_a_robot_is_a_component_of_another_program_with_a_device_of_a_third_one(cell):
+    cell.host()
+    device, cell.endpoint = cell.endpoint, free_endpoint()
+    cell.host("--plots", "tidier", "--connect", device, target="cell.py")
+    assert cell.said("call", "tidier.tidy") == "{event: completed}\n"
+    assert sorted(one["box"] for one in cell.lines() if one["what"] == "moved") == [f"box{n}" for n in range(1, 6)]
+    assert cell.said("call", "tidier.achieve", "goal=(on-table box1)") == "{event: completed}\n"
+    assert "no predicate 'in-table'; did you mean 'on-table'" in cell.said(
+        "call", "tidier.achieve", "goal=(in-table box1)", status=1
+    )
+
+
 @pytest.mark.parametrize("seed", range(CYCLES))
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_host_that_dies_or_hangs_moves_nothing_twice(cell, number, seed):
