@@ -212,7 +212,7 @@ class RemoteComponent(Component):
         began = loop.time()
         while True:
             if self._is_gone:
-                began = -math.inf  # the known condition is that of the former program
+                began = -math.inf  # the former program has sent the known condition
             left = SILENCE - min(self._condition.age, loop.time() - began)
             self._presence_changed.clear()
             if left > RESOLUTION:
