@@ -245,6 +245,8 @@ def _session(config: str | Path | None, settings: dict[str, Any]) -> zenoh.Sessi
     except ModuleNotFoundError as error:
         message = "the transport over Zenoh needs eclipse-zenoh: pip install 'dynamic-state-charts[zenoh]'"
         raise InputError(message, found="zenoh") from error
+    if config and not Path(config).is_file():  # Zenoh would wait for the end of a pipe
+        raise InputError(f"the settings of Zenoh are a file, and '{config}' is none", found=str(config))
     try:
         read = zenoh.Config.from_file(config) if config else zenoh.Config()
     except zenoh.ZError as error:
