@@ -301,7 +301,7 @@ def test_mistakes_are_explained(tmp_path):
             ({"connect": ["somewhere"]}, "'somewhere' is not an endpoint of Zenoh: write protocol, host and port"),
             ({"connect": ["tcp/robot"]}, "'tcp/robot' is not an endpoint"),
             ({"lease": 0}, "the lease is between 0.1 and 3600 seconds, not 0"),
-            ({"config": tmp_path / "none"}, "settings of Zenoh cannot be read: No such file"),
+            ({"config": tmp_path / "none"}, "settings of Zenoh are a file, and .* is none"),
             ({"config": broken}, "settings of Zenoh cannot be read: "),
             ({"config": wrong}, "unknown field `nonsense`"),
         ]
