@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -171,10 +171,15 @@ def _pairs(texts: list[str]) -> dict[str, Any]:
     """Return the values of texts `NAME=VALUE`, which are YAML."""
     from dsc.text.yaml import load_document
 
+    return {name: load_document(f"value: {value}", name).data["value"] for name, value in texts_by_name(texts).items()}
+
+
+def texts_by_name(texts: Iterable[str]) -> dict[str, str]:
+    """Return the values of texts `NAME=VALUE`; raise `InputError` for a text of another form."""
     found = {}
     for text in texts:
         name, sign, value = text.partition("=")
         if not (name and sign):
-            raise InputError(f"a value is written NAME=VALUE, not '{text}'", found=text)
-        found[name] = load_document(f"value: {value}", text).data["value"]
+            raise InputError(f"a parameter is written NAME=VALUE, not '{text}'", found=text)
+        found[name] = value
     return found

@@ -14,6 +14,7 @@ from dsc.components.component import Component
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Step
 from dsc.errors import ProgrammingError, SkillError
+from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock
@@ -85,9 +86,9 @@ class PlotComponent(Component):
         ended: list[Outcome] = []
 
         def receive(step: Step) -> None:
-            said = [Outcome(event.name, dict(event.attributes)) for event in step.emitted]
+            said = outcomes_of(step.emitted, step.outputs if step.state.finished else None)
             if step.state.finished:
-                ended.append(said.pop() if said and not step.outputs else Outcome(COMPLETED, dict(step.outputs)))
+                ended.append(said.pop())
             for outcome in said:
                 call.report(outcome)
 
@@ -98,6 +99,12 @@ class PlotComponent(Component):
         if not ended or end.problem is not None:
             raise SkillError(end.problem or "it did not reach its end")
         return ended[0]
+
+
+def outcomes_of(emitted: Iterable[Event], outputs: Mapping[str, Any] | None) -> list[Outcome]:
+    """Return the events that a plot has emitted as outcomes; with its outputs, the last one is the plot's end."""
+    said = [Outcome(event.name, dict(event.attributes)) for event in emitted]
+    return said if outputs is None or (said and not outputs) else [*said, Outcome(COMPLETED, dict(outputs))]
 
 
 def plot_signature(component: str, plot: ActionPlot, after_crash: AfterCrash) -> SkillSignature:

@@ -9,6 +9,7 @@ from dsc.errors import Finding
 from dsc.model.actions import Emit, Trigger, flat
 from dsc.model.states import AnyState, FinalState, State, SubmachineState
 from dsc.model.transitions import TransitionSource
+from dsc.validation.flow import skill_events
 from dsc.validation.subject import Subject
 
 
@@ -28,14 +29,11 @@ def review_outcomes(subject: Subject) -> Iterator[Finding]:
         yield subject.finding(("emits", event), "emitted-outcome", message, fix, found=event, level="warning")
 
 
-def _triggers(state: AnyState) -> list[Trigger]:
-    return [one for one in flat(state.entry) if isinstance(one, Trigger)] if isinstance(state, State) else []
-
-
 def _is_unknown(subject: Subject, state: AnyState) -> bool:
     if isinstance(state, SubmachineState) and state.use.startswith("?"):
         return True
-    return any(one.trigger not in (subject.skills or ()) for one in _triggers(state))
+    triggers = (one for one in (state.entry if isinstance(state, State) else ()) if isinstance(one, Trigger))
+    return any(one.trigger not in (subject.skills or ()) for one in triggers)
 
 
 def _events(subject: Subject, state: AnyState) -> Iterator[str]:
@@ -48,6 +46,4 @@ def _events(subject: Subject, state: AnyState) -> Iterator[str]:
     if isinstance(state, State):
         yield from (one.emit for one in flat((*state.entry, *state.exit, *state.on_break)) if isinstance(one, Emit))
         yield from outcomes_of(state, subject.library)
-        for one in _triggers(state):
-            outcomes = (subject.skills or {})[one.trigger].outcomes
-            yield from (one.names.get(event, event) for event in outcomes)
+        yield from skill_events(state, subject.skills)

@@ -226,15 +226,15 @@ def _traffic(subject: Subject) -> _Traffic:
         if isinstance(state, State):
             heard.update(state.on)
             received_at[path] = state.on.keys()
-            if events := _skill_events(state, subject.skills, "event"):
+            if events := skill_events(state, subject.skills, "event"):
                 activated[path] = events
-            if ends := {*outcomes_of(state, subject.library), *_skill_events(state, subject.skills)}:
+            if ends := {*outcomes_of(state, subject.library), *skill_events(state, subject.skills)}:
                 for place in subject.way_to(path):
                     inside[place] |= ends
     return _Traffic(anywhere, inside, heard, received_at, activated)
 
 
-def _skill_events(state: State, skills: Skills, pattern: str | None = None) -> set[str]:
+def skill_events(state: State, skills: Skills, pattern: str | None = None) -> set[str]:
     """Return the events of the skills that a state triggers, or only of those with a pattern."""
     triggers = [one for one in state.entry if isinstance(one, Trigger) and one.trigger in (skills or ())]
     return {

@@ -131,10 +131,6 @@ class RemoteComponent(Component):
         """The component's `life`, `reason`, `mode` and `needs`, from the host's last message."""
         return dict(self._condition.value)
 
-    async def disconnect(self) -> None:
-        """Release the address of this client; its component at the host continues."""
-        await self._endpoint.close()
-
     async def reach(self, name: str) -> Component:
         """Wait for a required component on the transport of this one."""
         while True:

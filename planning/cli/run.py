@@ -14,7 +14,7 @@ import typer
 
 from dsc.cli.logs import PROGRAMMING_ERROR, Quiet, Verbose, show_logs
 from dsc.cli.runs import NoOpen, Port
-from dsc.cli.wire import REALM, Connect, Realm, ZenohFile
+from dsc.cli.wire import REALM, Connect, Realm, ZenohFile, texts_by_name
 
 if TYPE_CHECKING:
     from dsc.components.component import Component
@@ -211,12 +211,7 @@ def _task(bundle: Bundle, goal: str | None, plot: str | None, given: list[str]) 
     from knowledge_base.errors import InputError
     from planning.robot.task import Task, own_task, plot_task
 
-    arguments: dict[str, str] = {}
-    for one in given:
-        name, sign, text = one.partition("=")
-        if not (name and sign):
-            raise InputError(f"a parameter is written NAME=VALUE, not '{one}'", found=one)
-        arguments[name.removeprefix("?")] = text
+    arguments = {name.removeprefix("?"): text for name, text in texts_by_name(given).items()}
     if goal is not None and (plot is not None or given):
         raise InputError("a run has a goal, or a plot with parameters: give --goal, or --plot and --with")
     if goal is not None:

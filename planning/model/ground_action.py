@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,7 +13,7 @@ from planning.model.quantities import Assignment, Numbers, NumericBound
 from planning.model.timeline import Act, Changes, TimelineEvent
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Collection, Iterable
 
 _NONE: Numbers = MappingProxyType({})
 
@@ -93,8 +92,7 @@ class GroundAction:
 
     def lacks(self, state: Collection[Fact], numbers: Numbers = _NONE) -> Fact | NumericBound | None:
         """Return the first fact or numeric condition of the precondition that does not hold, or `None`."""
-        missing = next((needed for needed in self.precondition if needed not in state), None)
-        return missing or next((bound for bound in self.bounds if not bound.holds(numbers)), None)
+        return missing_condition(self.precondition, self.bounds, state, numbers)
 
     def apply(self, state: Iterable[Fact]) -> frozenset[Fact]:
         """Return the state after the action."""
@@ -121,14 +119,21 @@ class GroundAction:
         span = self.span
         if span is None:
             return Act(timing, start)
-        lasting = partial(missing_condition, span.over_all, span.lasting_bounds)
+        lasting = partial(_missing, span.over_all, span.lasting_bounds)
         return Act(timing, start, lasting, _event(span.end, span.end_bounds, span.adds, span.deletes, span.assignments))
 
 
-def missing_condition(needed: tuple[Fact, ...], bounds: tuple[NumericBound, ...], state: GroundState) -> str | None:
-    """Return the first fact or bound that does not hold in a state, as text; `None` if all of them hold."""
-    lacks: Iterator[Fact | NumericBound] = (one for one in needed if one not in state.facts)
-    return next(map(str, chain(lacks, (one for one in bounds if not one.holds(state.numbers)))), None)
+def missing_condition(
+    needed: Iterable[Fact], bounds: Iterable[NumericBound], facts: Collection[Fact], numbers: Numbers
+) -> Fact | NumericBound | None:
+    """Return the first fact or bound that does not hold, or `None`."""
+    missing = next((one for one in needed if one not in facts), None)
+    return missing or next((one for one in bounds if not one.holds(numbers)), None)
+
+
+def _missing(needed: tuple[Fact, ...], bounds: tuple[NumericBound, ...], state: GroundState) -> str | None:
+    missing = missing_condition(needed, bounds, *state)
+    return None if missing is None else str(missing)
 
 
 def _event(
@@ -143,7 +148,7 @@ def _event(
     def changes(state: GroundState) -> Changes:
         return {**facts, **{one.fluent: one.result(state.numbers) for one in assignments}}
 
-    return TimelineEvent(partial(missing_condition, needed, bounds), changes)
+    return TimelineEvent(partial(_missing, needed, bounds), changes)
 
 
 def after(state: GroundState, changes: Changes) -> GroundState:

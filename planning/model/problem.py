@@ -130,10 +130,9 @@ class Problem:
                 state, numbers = action.apply(state), action.count(numbers)
             except ArithmeticError as error:
                 return f"the effect of {action.step} cannot be computed: {error}"
-        missing_goals = [wanted for wanted in self.goal if wanted not in state]
-        missing_bounds = [bound for bound in self.bounds if not bound.holds(numbers)]
-        if missing_goals or missing_bounds:
-            return f"goal fact {[*missing_goals, *missing_bounds][0]} does not hold at the end"
+        missing = missing_condition(self.goal, self.bounds, state, numbers)
+        if missing is not None:
+            return f"goal fact {missing} does not hold at the end"
         return self.taking(chosen)
 
     def taking(self, chosen: Iterable[int]) -> Plan:
@@ -163,7 +162,7 @@ class Problem:
             return f"an effect cannot be computed: {error}"
         if isinstance(state, Flaw):
             return f"{self.actions[chosen[state.act][0]].step} needs {state.why}"
-        missing = missing_condition(self.goal, self.bounds, state)
+        missing = missing_condition(self.goal, self.bounds, *state)
         if missing is not None:
             return f"goal fact {missing} does not hold at the end"
         steps = [(self.actions[index].step, act.timing) for (index, _, _), act in zip(chosen, acts, strict=True)]

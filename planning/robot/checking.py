@@ -50,7 +50,7 @@ from planning.robot.fact_names import sources_of, wrong_facts
 from planning.robot.simulation import Setup, Simulation
 from planning.robot.soundness import IMPLEMENTED, check_implementations, interfaces
 from planning.robot.targets import bundle_at
-from planning.robot.unused import never_true, unused_plots
+from planning.robot.unused import never_true, quoted_names, unused_plots
 
 READABLE = "readable"
 """The rule of findings about files and parts that cannot be read."""
@@ -235,9 +235,9 @@ class _Robot:
             found += () if world is None else _without_values(self._domain, world)
             found += review_types(skills or (), self._domain.schema)
             found += wrong_facts(files, self._domain.schema)
-            texts = [_text(file) for file in {*files, *(one for one in self._files if one.suffix == ".py")}]
-            found += unused_plots(self._plots, self._bundle.main, texts)
-            found += () if world is None else never_true(self._plots, self._domain, world, texts)
+            quoted = quoted_names(map(_text, {*files, *(one for one in self._files if one.suffix == ".py")}))
+            found += unused_plots(self._plots, self._bundle.main, quoted)
+            found += () if world is None else never_true(self._plots, self._domain, world, quoted)
         self._check_components()
         return found
 

@@ -14,7 +14,7 @@ from dsc.dynamic.steps import NO_PLAN_KINDS
 from dsc.errors import ProgrammingError, SkillError
 from dsc.events import GAVE_UP, NO_PLAN
 from dsc.outcomes import Outcome
-from dsc.sequencer.plot_skill import COMPLETED, plot_signature
+from dsc.sequencer.plot_skill import COMPLETED, outcomes_of, plot_signature
 from dsc.sequencer.run_end import RunEnd
 from dsc.skills import SkillSignature, check_arguments
 from knowledge_base.errors import UnknownNameError
@@ -92,8 +92,7 @@ def _outcome(end: RunEnd[Any], call: SkillCall[Any]) -> Outcome:
         raise ProgrammingError(end.programming_error)
     if end.problem is not None or not end.finished:
         raise SkillError(end.problem or "it did not reach its end")
-    said = [Outcome(event.name, dict(event.attributes)) for event in end.emitted]
-    last = said.pop() if said and not end.outputs else Outcome(COMPLETED, dict(end.outputs))
-    for outcome in said:
+    *earlier, last = outcomes_of(end.emitted, end.outputs)
+    for outcome in earlier:
         call.report(outcome)
     return last

@@ -19,7 +19,12 @@ _QUOTED = re.compile(r"[\"']([\w-]+)[\"']")
 _CONDITIONS = frozenset({"goal", "when"})
 
 
-def unused_plots(plots: Collection[ActionPlot], main: str | None, sources: Iterable[str]) -> Iterator[Finding]:
+def quoted_names(sources: Iterable[str]) -> frozenset[str]:
+    """Return the names in quotes in texts of Python files, which may be plots or predicates."""
+    return frozenset(_QUOTED.findall("\n".join(sources)))
+
+
+def unused_plots(plots: Collection[ActionPlot], main: str | None, quoted: Collection[str]) -> Iterator[Finding]:
     """Yield a warning for each candidate, a plot with `when`, that implements no action and is named nowhere else.
 
     A plot without `when` may be run by its name.
@@ -27,14 +32,13 @@ def unused_plots(plots: Collection[ActionPlot], main: str | None, sources: Itera
     Args:
         plots: the plots of the robot.
         main: the plot with which a run begins.
-        sources: texts of Python files, which may name a plot.
+        quoted: the names in Python files, see `quoted_names`.
     """
     words = {plot.name: {text for _, text in _texts(plot.to_form())} for plot in plots}
-    elsewhere = set(_QUOTED.findall("\n".join(sources)))
     for plot in plots:
         others = set[str]().union(*(found for name, found in words.items() if name != plot.name))
         is_candidate = plot.when is not None and plot.implements is None
-        if is_candidate and plot.name not in {main, *elsewhere, *others}:
+        if is_candidate and plot.name not in {main, *quoted, *others}:
             message = f"nothing chooses the plot '{plot.name}', which has a condition `when`"
             error = SchemaError(message, place=plot.place(("plot",)), found=plot.name)
             fix = "name it under `dynamic`, or say which planning action it `implements`"
@@ -42,7 +46,7 @@ def unused_plots(plots: Collection[ActionPlot], main: str | None, sources: Itera
 
 
 def never_true(
-    plots: Collection[ActionPlot], domain: PlanningDomain, world: View, sources: Iterable[str]
+    plots: Collection[ActionPlot], domain: PlanningDomain, world: View, quoted: Collection[str]
 ) -> Iterator[Finding]:
     """Yield a warning for each predicate that a plot or action reads and that no part of the robot makes true.
 
@@ -50,9 +54,9 @@ def never_true(
         plots: the plots of the robot.
         domain: the planning domain.
         world: the initial knowledge.
-        sources: texts of Python files, whose strings may be predicates.
+        quoted: the names in Python files, see `quoted_names`.
     """
-    changed = {one.predicate for one in world.facts()} | set(_QUOTED.findall("\n".join(sources)))
+    changed = {one.predicate for one in world.facts()}.union(quoted)
     read = dict[str, str]()
     for plot in plots:
         for key, text in _texts(plot.to_form()):
