@@ -209,7 +209,7 @@ class RemoteComponent(Component):
         while True:
             if self._is_gone:
                 began = -math.inf  # the former program has sent the known condition
-            left = SILENCE - min(self._condition.age, loop.time() - began)
+            left = 0.0 if self._is_gone else SILENCE - min(self._condition.age, loop.time() - began)
             self._presence_changed.clear()
             if left > RESOLUTION:
                 if self._is_silent:
