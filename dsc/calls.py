@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Generic, Never, Protocol, cast
@@ -16,6 +16,8 @@ from knowledge_base.facts import Delta
 
 OBSERVED = "(observed)"
 """The event of a report by `SkillCall.observe`; no event of a chart can have this name."""
+RECORDED = "(recorded)"
+"""The event of a report by `SkillCall.record`, with the attribute `lines`."""
 
 
 class Clock(Protocol):
@@ -100,6 +102,10 @@ class SkillCall(Generic[Reported_contra]):
     def observe(self, observed: Delta) -> None:
         """Report observed facts immediately, before the outcome and without an event for the chart."""
         self.report(cast(Any, Outcome(OBSERVED, observed=observed)))
+
+    def record(self, lines: Sequence[str]) -> None:
+        """Report records of a run inside the skill, as lines of a trace file, for the trace of the caller."""
+        self.report(cast(Any, Outcome(RECORDED, {"lines": [*lines]})))
 
     @property
     def remaining(self) -> float:

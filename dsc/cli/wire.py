@@ -36,7 +36,7 @@ FAILED = 1
 
 def ps_command(realm: Realm = REALM, connect: Connect = None, zenoh: ZenohFile = None, as_json: AsJson = False) -> None:
     """List the components that programs host, with their state."""
-    found = _with_transport(_describe, realm, connect, zenoh)
+    found = with_transport(_describe, realm, connect, zenoh)
     if as_json:
         print_line(found)
         return
@@ -85,7 +85,7 @@ def call_command(
         return await remote.diagnose() if diagnose else _hull(remote)
 
     try:
-        found = _with_transport(act, realm, connect, zenoh)
+        found = with_transport(act, realm, connect, zenoh)
     except (SkillError, ProgrammingError) as error:
         typer.echo(f"{what}: {error}", err=True)
         raise typer.Exit(FAILED) from None
@@ -97,9 +97,10 @@ def call_command(
         typer.echo(dump(found).rstrip())
 
 
-def _with_transport(
+def with_transport(
     act: Callable[[ZenohTransport], Awaitable[T]], realm: str, connect: list[str] | None, zenoh: Path | None
 ) -> T:
+    """Return the result of `act` with a transport of the realm; errors as for `dsc.wire.client_transport`."""
     import asyncio
 
     from dsc.wire.realm import client_transport
@@ -155,12 +156,18 @@ async def _execute(remote: RemoteComponent, skill: str, arguments: dict[str, Any
         signature.records,
     )
     clock, action = LoopClock(), f"{token_hex(6)}/call"
-    call: SkillCall[Any] = SkillCall(action, clock, lambda one: typer.echo(_form(one), err=True), clock.now() + within)
+    call: SkillCall[Any] = SkillCall(action, clock, _show_report, clock.now() + within)
     try:
         async with asyncio.timeout(within):
             return await remote.execute(skill, call, arguments)
     finally:
         await remote.forget(action)
+
+
+def _show_report(report: Outcome) -> None:
+    """Print a report on standard error; observations and records are for robots."""
+    if not report.event.startswith("("):
+        typer.echo(_form(report), err=True)
 
 
 def _form(outcome: Outcome) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-from collections.abc import Awaitable, Mapping
+from collections.abc import Awaitable, Iterable, Mapping
 from dataclasses import asdict
 from inspect import get_annotations
 from pathlib import Path
@@ -19,6 +19,7 @@ from dsc.components.ports import TAKES, EventActivations, messages, plain_method
 from dsc.components.streams import Push, Stream
 from dsc.components.turns import Turns
 from dsc.data_types import check_all, data_type
+from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signatures
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
@@ -212,6 +213,10 @@ class Component(ComponentHooks, RestartHooks):
     def domain_fragment(self) -> Path | str | None:
         """Return the component's part of the planning domain, see `ComponentHooks.domain`."""
         return type(self).domain
+
+    def plots(self) -> Iterable[ActionPlot]:
+        """Return the plots that the component brings for other plots; their names begin with the component's name."""
+        return ()
 
     def skills(self) -> dict[str, SkillSignature]:
         """Return the signatures of all decorated methods, by skill name."""

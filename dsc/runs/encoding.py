@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
+from dsc.calls import RECORDED
 from dsc.engine.machine_state import NOTHING, FrameState
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import NO_ATTRIBUTES, Event
@@ -118,7 +119,9 @@ def message_form(message: Message, short: Shortener) -> Form:
                 form["conflated"] = message.conflated
             if message.activated:
                 form["activated"] = True
-            return form | {"attributes": short(outcome.attributes), "observed": delta_form(outcome.observed)}
+            # the trace has the records of a report about an inner run
+            attributes = {} if outcome.event == RECORDED else short(outcome.attributes)
+            return form | {"attributes": attributes, "observed": delta_form(outcome.observed)}
         case TimerMessage():
             return {"timer": _plain(message.timer)}
         case LateMessage():

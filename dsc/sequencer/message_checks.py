@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from dsc.calls import OBSERVED
+from dsc.calls import OBSERVED, RECORDED
 from dsc.components.component import Component
 from dsc.components.hooks import is_own, running_task
 from dsc.data_types import WORDS, Records, check_all, data_type, objects_in
@@ -101,6 +101,10 @@ def arguments_for(start: Start, signature: SkillSignature) -> dict[str, Any]:
     return arguments
 
 
+_REPORTS: Mapping[str, Declared] = {OBSERVED: NO_ATTRIBUTES, RECORDED: {"lines": "list of text"}}
+"""Attributes of the reports that only knowledge and trace receive."""
+
+
 def _conforming(outcome: object, signature: SkillSignature) -> Outcome:
     outcomes = signature.outcomes
     if not isinstance(outcome, Outcome):
@@ -109,7 +113,7 @@ def _conforming(outcome: object, signature: SkillSignature) -> Outcome:
     if not isinstance(event, str):
         raise InputError(f"it ended with the event {shown(event)}, which is not text")
     event = str.__str__(event)  # a subclass, e.g. an `Enum`, may compare differently
-    declared = NO_ATTRIBUTES if event == OBSERVED else outcomes.get(event)
+    declared = _REPORTS.get(event, outcomes.get(event))
     if declared is None:
         raise UnknownNameError(f"it ended with '{event}', which it does not declare", found=event, valid=outcomes)
     if not isinstance(attributes, Mapping):

@@ -18,6 +18,7 @@ from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.relay import Relay
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import AfterCrash, SkillSignature, check_arguments
 from knowledge_base.errors import UnknownNameError
@@ -64,6 +65,10 @@ class PlotComponent(Component):
         """Return a signature for each plot, by name."""
         return dict(self._signatures)
 
+    def plots(self) -> list[ActionPlot]:
+        """Return a plot around each skill, as `plot_around` makes it."""
+        return [plot_around(one) for one in self._signatures.values()]
+
     async def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         """Run the plot to its end, and return its outcome; events that it emits earlier become reports.
 
@@ -92,8 +97,13 @@ class PlotComponent(Component):
             for outcome in said:
                 call.report(outcome)
 
+        relay = Relay(call)
+        sequencer.trace.listen(relay)
         sequencer.listen(receive)
-        end = await sequencer.run(skill_name, arguments)
+        try:
+            end = await sequencer.run(skill_name, arguments)
+        finally:
+            relay.flush()
         if end.programming_error is not None:
             raise ProgrammingError(end.programming_error)
         if not ended or end.problem is not None:
@@ -105,6 +115,40 @@ def outcomes_of(emitted: Iterable[Event], outputs: Mapping[str, Any] | None) -> 
     """Return the events that a plot has emitted as outcomes; with its outputs, the last one is the plot's end."""
     said = [Outcome(event.name, dict(event.attributes)) for event in emitted]
     return said if outputs is None or (said and not outputs) else [*said, Outcome(COMPLETED, dict(outputs))]
+
+
+def plot_around(skill: SkillSignature, implements: str | None = None) -> ActionPlot:
+    """Return the plot `COMPONENT.PLOT` with which other plots use a plot of a component like their own (S2.6).
+
+    It has the parameters, outcomes and outputs of the skill's plot.
+
+    Args:
+        skill: the signature of the skill that runs the plot.
+        implements: the planning action that the plot executes.
+    """
+    outputs = skill.outcomes[COMPLETED]
+    completed = {"to": "over", "assign": {name: f"?event.{name}" for name in outputs}}
+    ways: dict[str, Any] = {COMPLETED: completed}
+    others = {event: attributes for event, attributes in skill.outcomes.items() if event != COMPLETED}
+    for event, attributes in others.items():
+        ways[event] = {"to": "ended", "emit": event, "with": {name: f"?event.{name}" for name in attributes}}
+    given = {"with": {name: f"?{name}" for name in skill.parameters}}
+    form = {
+        "plot": f"{skill.component}.{skill.name}",
+        "parameters": {
+            name: {"type": type_, **({"default": skill.defaults[name]} if name in skill.defaults else {})}
+            for name, type_ in skill.parameters.items()
+        },
+        "outputs": {name: {"type": type_} for name, type_ in outputs.items()},
+        "emits": others,
+        "implements": implements,
+        "states": {
+            "there": {"entry": {"trigger": f"{skill.component}.{skill.name}", **given}, "on": ways},
+            "over": {"final": True},
+            **({"ended": {"final": True}} if others else {}),
+        },
+    }
+    return ActionPlot.model_validate({key: value for key, value in form.items() if value})
 
 
 def plot_signature(component: str, plot: ActionPlot, after_crash: AfterCrash) -> SkillSignature:

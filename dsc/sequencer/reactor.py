@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from dsc.calls import OBSERVED
+from dsc.calls import OBSERVED, RECORDED
 from dsc.components.hooks import contained, programming_error
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
@@ -116,10 +116,13 @@ class Reactor:
         for setting in kept.settings:
             self._set_default(setting)
         self.caused_by = {one.what.action_id: one.cause for one in kept.pending if isinstance(one.what, Start)}
+        states = {}
         for one in kept.pending:
             if isinstance(one.what, Start) and not one.cancelled:
                 self.tracer.begun(one.what)
-        self.tracer.known_plots.update(record.data["hash"] for record in kept.records if record.type == "plot")
+                if found := kept.state.state_of(one.what.activation):
+                    states[one.what.action_id] = found[0]
+        self.tracer.restore(kept.records, states)
 
     @property
     def finished(self) -> bool:
@@ -248,6 +251,10 @@ class Reactor:
             self._apply(outcome.observed, start.component)
             return None
         self.trace.cause = self.caused_by.get(start.action_id)
+        if outcome.event == RECORDED:
+            if found := self.machine.state.state_of(start.activation):
+                self.tracer.relay(start, found[0], outcome.attributes.get("lines", ()))
+            return None
         if message.final:
             self.tracer.answered(start)
             if message.continues:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from dsc.engine import steps
 from dsc.engine.machine_state import FrameState
 from dsc.events import Event
 from dsc.messages import ParameterMessage
-from dsc.trace import Trace
+from dsc.sequencer.relay import InnerRun
+from dsc.trace import Record, Trace
 from knowledge_base.exchange import delta_form, schema_form, world_form
 from knowledge_base.facts import Change
 from knowledge_base.store import KnowledgeBase
@@ -27,6 +28,7 @@ class StepTracer:
         self.known_plots: set[str] = set()
         self._frames: dict[str, FrameState] = {}
         self._active: dict[int, dict[str, str]] = {}  # skills by activation and action id
+        self._inner: dict[str, InnerRun] = {}  # by action id
 
     def world(self, knowledge: KnowledgeBase, **names: str) -> None:
         """Record the world at the start and `names`, unless the trace has no listener; later records are changes."""
@@ -62,6 +64,39 @@ class StepTracer:
     def answered(self, start: steps.Start) -> None:
         """Register the end of a skill, after which the skill cannot be cancelled."""
         self._active.get(start.activation, {}).pop(start.action_id, None)
+        if self._inner:
+            self._leave(start.action_id)
+
+    def relay(self, start: steps.Start, state: str, lines: Iterable[str]) -> None:
+        """Record what a plot that runs as a skill has recorded, below the path of the state that has started it."""
+        if self._trace.heard:
+            inner = self._inner.get(start.action_id) or self._begin_inner(start.action_id, state)
+            for line in lines:
+                inner.receive(line, self._trace, self.known_plots)
+
+    def _begin_inner(self, action: str, state: str) -> InnerRun:
+        shown = not any(one.at == state and one.is_shown for one in self._inner.values())
+        begun = self._inner[action] = InnerRun(action, state, self._trace.cause, shown=shown)
+        return begun
+
+    def _leave(self, action: str) -> None:
+        """Record that the states of an inner run are left, since its skill has ended or is cancelled."""
+        if inner := self._inner.pop(action, None):
+            inner.leave(self._trace)
+
+    def restore(self, records: Iterable[Record], states: Mapping[str, str]) -> None:
+        """Restore what the records of an interrupted run have said.
+
+        Args:
+            records: the records.
+            states: paths of the states whose skills are pending, by action id.
+        """
+        for record in records:
+            if record.type == "plot":
+                self.known_plots.add(record.data["hash"])
+            elif record.type == "step" and (of := record.data.get("of", "")) in states:
+                inner = self._inner.get(of) or self._begin_inner(of, states[of])
+                inner.note(record.type, record.data)
 
     def step(self, step: steps.Step) -> int | None:
         """Record a macrostep that has microsteps; return the number of the record, or `None` without microsteps.
@@ -71,6 +106,10 @@ class StepTracer:
         if not step.microsteps:
             return None
         said: dict[str, Any] = {}
+        for output in step.output if self._inner else ():
+            if isinstance(output, steps.Cancel):
+                for action in self._active.get(output.activation, ()):
+                    self._leave(action)
         if self._trace.heard:  # the texts of plots and microsteps take long to create
             self._plots(step)
             said["microsteps"] = [_micro(micro) for micro in step.microsteps]

@@ -153,6 +153,7 @@ class Host:
             "concurrent": self._component.concurrent,
             "parameters": parameters_form(self._component.configuration),
             "domain": _domain_of(self._component),
+            "plots": [plot.to_form() for plot in self._component.plots()],
             "condition": self._condition.newest,
         }
 

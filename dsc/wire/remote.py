@@ -22,6 +22,7 @@ from dsc.components.declarations import Parameter
 from dsc.components.life_cycle import Life
 from dsc.components.parameters import Configuration, Parameters, parameters_of
 from dsc.errors import NoAnswerError, PreemptedError, ProgrammingError, RefusedError
+from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
 from dsc.skills import SkillSignature
 from dsc.wire.endpoint import AGAIN, RESOLUTION, WITHIN, Endpoint, Transport
@@ -53,6 +54,7 @@ class RemoteComponent(Component):
         self._condition = Subscription(endpoint, name, CONDITION, self._changed)
         self._heart = Heartbeat(endpoint, lambda: [name], _ignore, root=True)
         self._domain: str | None = None
+        self._plots: tuple[ActionPlot, ...] = ()
         self._values_there: dict[str, Any] = {}
         self._profile: dict[str, Any] | None = None  # values of this program's profile; `None` before the first start
         self._is_silent = False
@@ -99,6 +101,7 @@ class RemoteComponent(Component):
             if said["domain"] is not None:
                 require_text(said["domain"], "the part of the planning domain")
                 remote._domain = said["domain"]
+            remote._plots = tuple([ActionPlot.model_validate(form) for form in said["plots"]])
             remote._condition.take(said["condition"])
         except Exception as error:
             await endpoint.close()
@@ -117,6 +120,10 @@ class RemoteComponent(Component):
     def domain_fragment(self) -> str | None:
         """Return the text of the component's part of the planning domain at its host."""
         return self._domain
+
+    def plots(self) -> tuple[ActionPlot, ...]:
+        """Return the plots that the component brings at its host."""
+        return self._plots
 
     def skills(self) -> dict[str, SkillSignature]:
         """Return the signatures at the time of the connection."""

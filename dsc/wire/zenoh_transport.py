@@ -26,6 +26,7 @@ from knowledge_base.errors import InputError, described
 
 if TYPE_CHECKING:
     import zenoh
+    from zenoh.handlers import Callback
 
 _LOG = run_logger(__package__)
 
@@ -101,7 +102,7 @@ class ZenohTransport:
         self._publishers: dict[str, zenoh.Publisher] = {}  # by address, the last used one at the end
         self._presence = Presence()
         self._observer: zenoh.Subscriber[None] | None = None  # of the tokens, since the first watch
-        self._session.declare_subscriber(f"{self._realm}/all", lambda sample: self._receive(BROADCAST, sample))
+        self._session.declare_subscriber(f"{self._realm}/all", _direct(lambda one: self._receive(BROADCAST, one)))
 
     def attach(self, address: str, receive: Receive) -> None:
         """Pass frames for the address to `receive`; raise `InputError` if this transport has attached the address."""
@@ -109,7 +110,9 @@ class ZenohTransport:
         self._loop = asyncio.get_running_loop()
         self._attached[address] = _Attached(
             receive,
-            self._session.declare_subscriber(self._key("to", address), lambda sample: self._receive(address, sample)),
+            self._session.declare_subscriber(
+                self._key("to", address), _direct(lambda one: self._receive(address, one))
+            ),
             self._session.liveliness().declare_token(f"{self._key('alive', address)}/{self._id}"),
         )
 
@@ -131,7 +134,7 @@ class ZenohTransport:
         self._loop = asyncio.get_running_loop()
         if self._observer is None:
             tokens = f"{self._realm}/alive/*/*"
-            self._observer = self._session.liveliness().declare_subscriber(tokens, self._observe, history=True)
+            self._observer = self._session.liveliness().declare_subscriber(tokens, _direct(self._observe), history=True)
         return self._presence.watch(address, changed)
 
     async def addresses(self) -> set[str]:
@@ -207,6 +210,16 @@ class ZenohTransport:
 
     def _key(self, kind: str, address: str) -> str:
         return f"{self._realm}/{kind}/{_chunk(address)}"
+
+
+def _direct(receive: Callable[[zenoh.Sample], None]) -> Callback[zenoh.Sample]:
+    """Return a callback that Zenoh calls in its own threads.
+
+    Without this, Zenoh starts a thread for each subscriber, which delays frames and outlasts a program without `close`.
+    """
+    from zenoh.handlers import Callback  # noqa: PLC0415  an extra
+
+    return Callback(receive, indirect=False)
 
 
 _DEFAULTS = {

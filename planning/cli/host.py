@@ -13,6 +13,7 @@ from knowledge_base.errors import InputError, UnknownNameError
 if TYPE_CHECKING:
     from dsc.components.component import Component
     from dsc.wire.host import Host
+    from dsc.wire.service_manager import ServiceManager
     from dsc.wire.zenoh_transport import ZenohTransport
     from planning.robot.bundles import Bundle
 
@@ -25,9 +26,16 @@ def host_command(
     plots: Annotated[
         str | None, typer.Option("--plots", metavar="NAME", help="Host the robot's plots instead, as this component.")
     ] = None,
+    private: Annotated[
+        bool, typer.Option("--private", help="With --plots, keep the planning domain and the knowledge inside.")
+    ] = False,
     replace: Annotated[
         bool,
         typer.Option("--replace", help="Take over from a program that hosts the same components, e.g. one that hangs."),
+    ] = False,
+    supervised: Annotated[
+        bool,
+        typer.Option("--supervised", help="Start the program again when it crashes or hangs, with growing delays."),
     ] = False,
     seed: Annotated[int | None, typer.Option(help="Seed of the simulation's faults.")] = None,
     faults: Annotated[float | None, typer.Option(min=0.0, max=1.0, help="Chance of a fault per skill call.")] = None,
@@ -50,7 +58,11 @@ def host_command(
     from planning.robot.targets import bundle_at
 
     show_logs(verbose, quiet=quiet)
+    if private and plots is None:
+        raise InputError("a program hosts components, which are never private, or plots: give --plots")
     bundle = bundle_at(target)
+    if supervised:
+        raise typer.Exit(_supervise())
 
     async def main() -> None:
         with host_transport(realm, listen or (), connect or (), zenoh) as transport:
@@ -59,10 +71,20 @@ def host_command(
             elif only:
                 raise InputError("a program hosts components, or plots: give --only, or --plots")
             else:
-                components = [await _robot(bundle, plots, seed, faults, transport)]
+                components = [await _robot(bundle, plots, seed, faults, transport, private=private)]
             await _host(components, transport, replace=replace)
 
     asyncio.run(main())
+
+
+def _supervise() -> int:
+    """Run this command as a program that is started again, and return its exit status."""
+    import sys
+
+    from planning.cli.supervision import Supervisor
+
+    command = [one for one in sys.argv if one != "--supervised"]
+    return Supervisor([sys.executable, *command], lambda line: typer.echo(line, err=True)).run()
 
 
 def _devices(bundle: Bundle, only: list[str], seed: int | None, faults: float | None) -> list[Component]:
@@ -79,7 +101,7 @@ def _devices(bundle: Bundle, only: list[str], seed: int | None, faults: float | 
 
 
 async def _robot(
-    bundle: Bundle, name: str, seed: int | None, faults: float | None, transport: ZenohTransport
+    bundle: Bundle, name: str, seed: int | None, faults: float | None, transport: ZenohTransport, *, private: bool
 ) -> Component:
     """Return the robot of a bundle as a component of that name."""
     from dsc.wire.realm import connect_all
@@ -87,7 +109,8 @@ async def _robot(
     from planning.robot.robot_component import RobotComponent
 
     remote = await connect_all(bundle.remote, transport)
-    return RobotComponent(name, deploy(bundle, seed=seed, faults=faults, clock="real", remote=remote))
+    robot = deploy(bundle, seed=seed, faults=faults, clock="real", remote=remote)
+    return RobotComponent(name, robot, private=private)
 
 
 async def _host(components: list[Component], transport: ZenohTransport, *, replace: bool) -> None:
@@ -99,6 +122,7 @@ async def _host(components: list[Component], transport: ZenohTransport, *, repla
     from dsc.sequencer.clock import LoopClock
     from dsc.wire.host import Host
     from dsc.wire.realm import SOON, hosted_names
+    from dsc.wire.service_manager import READY, ServiceManager
 
     taken = [] if replace else await hosted_names(transport, SOON)
     for one in components:
@@ -113,14 +137,25 @@ async def _host(components: list[Component], transport: ZenohTransport, *, repla
     for number in (signal.SIGINT, signal.SIGTERM):
         with suppress(NotImplementedError):  # Windows
             loop.add_signal_handler(number, ended.set)
-    waiting = [loop.create_task(ended.wait()), loop.create_task(_all_replaced(hosts))]
+    manager = ServiceManager()
+    manager.notify(READY)
+    waiting = [loop.create_task(one) for one in (ended.wait(), _all_replaced(hosts), _until_alone(manager))]
     await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
     for task in waiting:
         task.cancel()
     for host in hosts:
         await host.close()
-    if not ended.is_set():
+    if not ended.is_set() and all(host.replaced.is_set() for host in hosts):
         raise InputError("later hosts have taken over all components")
+
+
+async def _until_alone(manager: ServiceManager) -> None:
+    """Send signs of life until the supervisor has ended; without a supervisor, wait."""
+    import asyncio
+
+    if manager.address is None:
+        await asyncio.Event().wait()
+    await manager.watch()
 
 
 async def _all_replaced(hosts: list[Host]) -> None:

@@ -24,7 +24,7 @@ from dsc.text.profiles import Profile
 from dsc.validation.subject import addressed_by
 from knowledge_base.errors import InputError, Place, UnknownNameError, described, tolerated
 from knowledge_base.facts import Delta
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.language.checking.inputs import require, shown
 from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
 from planning.execution.search import Foresight
 from planning.execution.shipped_plots import shipped_plots
@@ -106,6 +106,12 @@ class Bundle:
     def __post_init__(self) -> None:
         if isinstance(self.failures, str):
             raise InputError(f"failures are a set of outcomes, not the text '{self.failures}'")
+        if isinstance(self.remote, str):
+            raise InputError(f"remote is a tuple of names: remote=('{self.remote}',)", found=self.remote)
+        for plot in self.plots:
+            require(
+                plot, ActionPlot, "the plots of a bundle are ActionPlots, as load_plot and load_library return them"
+            )
 
     @classmethod
     def in_folder(cls, folder: Path | str, *, name: str | None = None, **parts: Unpack[BundleParts]) -> Bundle:
@@ -336,6 +342,20 @@ def shipped_by(components: Iterable[Component]) -> list[DomainText]:
     """
     fragments = dict.fromkeys((component.domain_fragment(), type(component).__name__) for component in components)
     return [_read(domain, owner) for domain, owner in fragments if domain is not None]
+
+
+def with_plots_of(library: Library, components: Iterable[Component]) -> Library:
+    """Return the library with the plots of components; they implement the actions that no other plot implements."""
+    brought = [plot for component in components for plot in component.plots()]
+    if not brought:
+        return library
+    plots = [
+        plot.model_copy(update={"implements": None})
+        if plot.implements is not None and library.implementing(plot.implements)
+        else plot
+        for plot in brought
+    ]
+    return Library([*library, *plots], library.conversions.values())
 
 
 def _loaded(point: EntryPoint) -> Bundle:

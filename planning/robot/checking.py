@@ -45,8 +45,9 @@ from planning.problem.construction import check_goal
 from planning.problem.derived import derivation
 from planning.problem.relevance import numeric_constructs
 from planning.robot.bringup import begin, simulated
-from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of, shipped_by
+from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of, shipped_by, with_plots_of
 from planning.robot.fact_names import sources_of, wrong_facts
+from planning.robot.finding_order import in_order
 from planning.robot.simulation import Setup, Simulation
 from planning.robot.soundness import IMPLEMENTED, check_implementations, interfaces
 from planning.robot.targets import bundle_at
@@ -66,11 +67,16 @@ _DEFINES_PROBLEM = re.compile(r"\(\s*define\s*\(\s*problem\b", re.IGNORECASE)
 _DEFINES_DOMAIN = re.compile(r"\(\s*define\s*\(\s*domain\b", re.IGNORECASE)
 
 
-def check_project(target: str) -> list[Finding]:
+def check_project(target: str, remote: Sequence[Component] = ()) -> list[Finding]:
     """Return all findings about a target: a project folder, a Python file, a plot file, a bundle's name, MODULE:NAME.
 
     A mistake prevents no other check: a file that cannot be read is one finding, and the other files are checked. In a
     folder, the files that no bundle uses are checked too.
+
+    Args:
+        target: the target.
+        remote: the components of `Bundle.remote`, which other programs host. Without them, a name that nothing in the
+            target declares is only a warning, unless it resembles a known name.
     """
     path = Path(target)
     if path.is_dir() and not _has_robot(path) and (projects := _projects(path)):
@@ -78,23 +84,36 @@ def check_project(target: str) -> list[Finding]:
         error = InputError("the folder is not a project, but contains projects", place=Place(str(path)))
         return [Finding(error, READABLE, names)]
     if path.is_file() and path.suffix != ".py":
-        return _sorted(without_ignored(_profile_findings(path) if _is_profile(path) else _files([path]), [path]))
+        return in_order(without_ignored(_profile_findings(path) if _is_profile(path) else _files([path]), [path]))
     with collecting() as errors:
         bundle = _bundle(target) if not path.is_dir() or _has_robot(path) else None
         unread = any(str(one.place.source).endswith(".pddl") for one in errors if one.place is not None)
         whole = bundle is not None and (bundle.domain is not None or not unread)
         files = list(_sources(path)) if path.is_dir() else []
-        robot = None if bundle is None else _Robot(bundle, files, whole=whole)
+        robot = None if bundle is None else _Robot(bundle, files, whole=whole, remote=remote)
         findings = [] if robot is None else robot.findings()
         if robot is not None and not errors and all(one.level == "warning" for one in findings):
             findings += robot.pointless()
     findings += [Finding(error, READABLE) for error in errors]
+    if bundle is not None and bundle.remote and not remote:
+        findings = [_perhaps_remote(one, bundle) for one in findings]
     if path.is_dir():
         read = {Path(one.place.source or "").resolve() for one in findings if one.place is not None}
         if bundle is not None:
             read |= {Path(_source(plot) or "").resolve() for plot in bundle.plots}
         findings += _files(file for file in files if file.resolve() not in read)
-    return _sorted(without_ignored(findings, files))
+    return in_order(without_ignored(findings, files))
+
+
+def _perhaps_remote(finding: Finding, bundle: Bundle) -> Finding:
+    """Return a finding as a warning if it concerns a name that a component of another program may declare."""
+    error = finding.error
+    if not isinstance(error, UnknownNameError) or error.nearest is not None or error.found in bundle.remote:
+        return finding
+    hosts = " or ".join(f"'{name}'" for name in bundle.remote)
+    return replace(
+        finding, fix=f"unless {hosts} declares it: `dsc check --hosts` asks the running programs", level="warning"
+    )
 
 
 def _profile_findings(file: Path) -> list[Finding]:
@@ -141,25 +160,6 @@ def _source(plot: ActionPlot) -> str | None:
     return None if place is None else place.source
 
 
-def _sorted(findings: Sequence[Finding]) -> list[Finding]:
-    """Return the findings without repetition, in the order of their places."""
-    for one in findings:
-        one.error.place = _seen_from_here(one.error.place)
-    unique = {(str(one.place), one.error.message): one for one in findings}
-    places = {key: one.place or Place() for key, one in unique.items()}
-    return [unique[key] for key in sorted(unique, key=lambda key: (
-        places[key].source or "~", places[key].line or 0, places[key].column or 0, key[1],
-    ))]  # fmt: skip
-
-
-def _seen_from_here(place: Place | None) -> Place | None:
-    """Return a place with the path of its file relative to the present folder, if the file is inside it."""
-    here = Path.cwd()
-    if place is None or place.source is None or not Path(place.source).is_relative_to(here):
-        return place
-    return replace(place, source=str(Path(place.source).relative_to(here)))
-
-
 # -- a robot -------------------------------------------------------------------------------------------------
 
 
@@ -170,10 +170,14 @@ class _Robot:
         bundle: the bundle.
         files: the sources of the project; empty without a project.
         whole: whether its domain could be read, so that plots and skills can be compared with it.
+        remote: the components that other programs host; empty if they are unknown.
     """
 
-    def __init__(self, bundle: Bundle, files: Sequence[Path] = (), *, whole: bool = True) -> None:
+    def __init__(
+        self, bundle: Bundle, files: Sequence[Path] = (), *, whole: bool = True, remote: Sequence[Component] = ()
+    ) -> None:
         self._bundle = bundle
+        self._remote = remote
         self._files = files
         self._whole = whole
         self._bundles: tuple[Bundle, ...] = (bundle,)
@@ -195,7 +199,7 @@ class _Robot:
                 self._simulation = simulated(self._bundle, Setup(profile=profile))
                 with contained(f"the components of '{self._bundle.name}'", (InputError,)):
                     own = () if self._simulation is None else self._simulation.components()
-                    found = [*components_of(self._bundles), *own]
+                    found = [*components_of(self._bundles), *own, *self._remote]
                 if not all(isinstance(one, Component) for one in found):
                     require_instances(found)
                 for one in found:
@@ -242,10 +246,15 @@ class _Robot:
         return found
 
     def _skills(self) -> list[SkillSignature] | None:
-        if self._components is None or self._bundle.remote:  # the skills of other programs are unknown
+        if self._components is None or self._lacks_remote:  # the skills of other programs are unknown
             return None
         own = [skill for component in self._components for skill in component.skills().values()]
         return [*own, *signatures(PlanningComponent, PlanningComponent.name).values()]
+
+    @property
+    def _lacks_remote(self) -> bool:
+        """Whether components of other programs are unknown."""
+        return bool(self._bundle.remote) and not self._remote
 
     def _exclusive(self) -> frozenset[str]:
         """Return the skills of the components that execute one skill at a time, as `component.skill`."""
@@ -257,7 +266,7 @@ class _Robot:
         )
 
     def _interfaces(self) -> dict[str, Interface] | None:
-        return None if self._components is None or self._bundle.remote else interfaces(self._components)
+        return None if self._components is None or self._lacks_remote else interfaces(self._components)
 
     def _world(self, schema: Schema) -> KnowledgeBase | None:
         """Return the initial knowledge, or `None` if it has a mistake."""
@@ -345,7 +354,8 @@ class _Robot:
         return None, None
 
     def _library(self) -> Library:
-        return Library([*self._plots, *shipped_plots()], conversions_of(self._bundles))
+        own = Library([*self._plots, *shipped_plots()], conversions_of(self._bundles))
+        return with_plots_of(own, self._remote)
 
     def _check_main(self, main: str) -> None:
         plots = {plot.name: plot for plot in self._plots}

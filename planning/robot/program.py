@@ -36,7 +36,16 @@ from planning.execution.planning_component import PlanningComponent
 from planning.execution.search import Foresight
 from planning.execution.shipped_plots import shipped_plots
 from planning.model.domain import PlanningDomain
-from planning.robot.bundles import Bundle, components_of, conversions_of, domain_of, gathered, plots_of, shipped_by
+from planning.robot.bundles import (
+    Bundle,
+    components_of,
+    conversions_of,
+    domain_of,
+    gathered,
+    plots_of,
+    shipped_by,
+    with_plots_of,
+)
 from planning.robot.run import Run
 from planning.robot.simulation import Simulation
 from planning.robot.soundness import interfaces, require_parts, require_sound
@@ -101,6 +110,7 @@ class RobotProgram:
         for plot in shipped_plots():
             if plot.name not in self.library:
                 self.library.add(plot)
+        self.library = with_plots_of(self.library, self.components)
         self.clock = clock
         self._own_planners: dict[bool, CachingPlanner] = {}
         self._planner = planner

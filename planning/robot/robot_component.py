@@ -12,20 +12,29 @@ from dsc.components.component import Component
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.steps import NO_PLAN_KINDS
 from dsc.errors import ProgrammingError, SkillError
-from dsc.events import GAVE_UP, NO_PLAN
+from dsc.events import GAVE_UP, NO_PLAN, RESERVED
+from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
-from dsc.sequencer.plot_skill import COMPLETED, outcomes_of, plot_signature
+from dsc.sequencer.plot_skill import COMPLETED, outcomes_of, plot_around, plot_signature
+from dsc.sequencer.relay import Relay
 from dsc.sequencer.run_end import RunEnd
+from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import SkillSignature, check_arguments
+from dsc.trace import Record
 from knowledge_base.errors import UnknownNameError
+from knowledge_base.exchange import delta_of
 from planning.execution.shipped_plots import shipped_plots
 from planning.robot.robot import Robot
+from planning.robot.sharing import plots_of_actions, shared_domain, shared_knowledge, shared_part
 
 _REASON = {"reason": "text"}
 GOAL_SKILL = SkillSignature(
     "", ACHIEVE, {"goal": "text"}, {}, {COMPLETED: {}, NO_PLAN: {**_REASON, "kind": NO_PLAN_KINDS}, GAVE_UP: _REASON}
 )
 """The skill with which another program gives a robot a goal."""
+SHARE = "share_knowledge"
+SHARE_SKILL = SkillSignature("", SHARE, {}, {}, {COMPLETED: {}}, after_crash="repeat")
+"""The skill with which a robot shares what it knows; later it shares what it learns while it executes a skill."""
 
 
 class RobotComponent(Component):
@@ -34,20 +43,34 @@ class RobotComponent(Component):
     The robot itself decides what a dynamic state becomes, on its own knowledge. The skill `achieve` plans
     for a goal. Several skills may be executed at a time; they share the robot's components.
 
+    Unless it is private, the component brings the robot's planning domain, and a skill for each planning action, whose
+    candidates the robot chooses. So another robot can plan with these actions. The trace of the other robot has the
+    states and decisions of this one. Its knowledge receives what this one learns during a skill, and everything by the
+    skill `share_knowledge`.
+
     Args:
         name: the component's name in charts.
         robot: the robot; the component closes it.
+        private: whether the robot keeps its domain and knowledge to itself.
     """
 
     concurrent = True
 
-    def __init__(self, name: str, robot: Robot) -> None:
+    def __init__(self, name: str, robot: Robot, *, private: bool = False) -> None:
         super().__init__(name)
         self._robot = robot
+        self._shared = None if private else shared_domain(name, robot.domain)
+        executing = {} if self._shared is None else plots_of_actions(robot)
         shipped = {plot.name for plot in shipped_plots()}
         plots = [plot for plot in robot.library if plot.name not in shipped and not plot.generated]
         own = {plot.name: plot_signature(name, plot, "sense") for plot in plots} | {ACHIEVE: GOAL_SKILL}
+        if self._shared is not None:
+            own[SHARE] = SHARE_SKILL
         self._signatures = {key: replace(one, component=name, unlimited=True) for key, one in own.items()}
+        self._plots = [
+            plot_around(one, executing.get(key))
+            for key, one in self._signatures.items() if RESERVED.isdisjoint(one.outcomes)
+        ]  # fmt: skip
 
     async def stop(self) -> None:
         """End the runs of the robot, and close it."""
@@ -55,8 +78,16 @@ class RobotComponent(Component):
             await run.cancel("its host ends")
         self._robot.close()
 
+    def domain_fragment(self) -> str | None:
+        """Return the robot's planning domain; `None` if the robot is private."""
+        return self._shared
+
+    def plots(self) -> list[ActionPlot]:
+        """Return the plots `NAME.PLOT`, with which other plots use those of the robot."""
+        return list(self._plots)
+
     def skills(self) -> dict[str, SkillSignature]:
-        """Return the signatures of the plots, and of `achieve`."""
+        """Return the signatures of the plots, of `achieve` and of `share_knowledge`."""
         return dict(self._signatures)
 
     async def execute(self, skill_name: str, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
@@ -74,15 +105,30 @@ class RobotComponent(Component):
             message = f"component '{self.name}' has no skill '{skill_name}'"
             raise UnknownNameError(message, found=skill_name, valid=self._signatures)
         check_arguments(self._signatures[skill_name], arguments)
+        if skill_name == SHARE:
+            return Outcome(COMPLETED, observed=shared_knowledge(self._robot))
+        relay = Relay(call)
+
+        def listen(record: Record) -> None:
+            if record.type == "knowledge" and self._shared is not None:
+                relay.flush()
+                call.observe(shared_part(delta_of(dict(record.data)), self._robot))
+            relay(record)
+
+        def prepare(sequencer: Sequencer) -> None:
+            sequencer.trace.listen(listen)
+
         if skill_name == ACHIEVE:
-            run = self._robot.start(str(arguments["goal"]))
+            run = self._robot.start(str(arguments["goal"]), prepare=prepare)
         else:
-            run = self._robot.start(skill_name, arguments)
+            run = self._robot.start(skill_name, arguments, prepare=prepare)
         try:
             end = await asyncio.shield(run.task)
         except asyncio.CancelledError:
             await run.cancel("its caller has cancelled it")
             raise
+        finally:
+            relay.flush()
         return _outcome(end, call)
 
 

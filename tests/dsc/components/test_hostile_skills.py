@@ -182,7 +182,8 @@ def raising(make):
 
 
 def answers(ran):
-    return [event for event in ran.of_type("event") if event["name"] in {"ok", "programming_error", "timed_out"}]
+    names = {"ok", "programming_error", "timed_out"}
+    return [event for event in ran.of_type("event") if event["name"] in names and "of" not in event]
 
 
 PLACE = re.compile(r" \(\S+:[0-9]+\)$")

@@ -19,6 +19,7 @@ pytest.importorskip("zenoh")
 
 DSC = Path(sys.executable).with_name("dsc")
 CELL = Path(__file__).parents[2] / "support" / "cell"
+BOXES = [f"box{n}" for n in range(1, 6)]
 CYCLES = int(os.environ.get("CYCLES", "2"))
 
 
@@ -44,6 +45,12 @@ class Cell:
         line = started.stdout.readline()
         assert line.startswith("hosting"), line + started.stdout.read()
         return started
+
+    def host_robot(self):
+        """Host the arm and the robot, in two programs; the endpoint is then that of the robot."""
+        self.host()
+        device, self.endpoint = self.endpoint, free_endpoint()
+        return self.host("--plots", "tidier", "--connect", device, target="cell.py")
 
     def said(self, *arguments, status=0):
         """Run a command to its end, and return its text."""
@@ -113,15 +120,67 @@ def test_a_later_host_takes_over_and_the_world_refuses_the_former_one(cell):
 
 
 def test_a_robot_is_a_component_of_another_program_with_a_device_of_a_third_one(cell):
-    cell.host()
-    device, cell.endpoint = cell.endpoint, free_endpoint()
-    cell.host("--plots", "tidier", "--connect", device, target="cell.py")
+    cell.host_robot()
     assert cell.said("call", "tidier.tidy") == "{event: completed}\n"
-    assert sorted(one["box"] for one in cell.lines() if one["what"] == "moved") == [f"box{n}" for n in range(1, 6)]
+    assert sorted(one["box"] for one in cell.lines() if one["what"] == "moved") == BOXES
     assert cell.said("call", "tidier.achieve", "goal=(on-table box1)") == "{event: completed}\n"
     assert "no predicate 'in-table'; did you mean 'on-table'" in cell.said(
         "call", "tidier.achieve", "goal=(in-table box1)", status=1
     )
+
+
+def child_of(process):
+    """Return the number of the only program that a process has started."""
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline and not (found := children.read_text().split()):
+        time.sleep(0.01)
+    return int(found[0])
+
+
+def is_running(number):
+    """Return whether a process runs; one that has ended may wait for its parent."""
+    try:
+        return Path(f"/proc/{number}/stat").read_text().split(")")[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="reads /proc")
+def test_a_supervised_host_returns_after_a_crash_and_ends_with_its_supervisor(cell):
+    supervisor = cell.host("--supervised")
+    first = child_of(supervisor)
+    assert cell.said("call", "arm.look") == "{event: seen}\n"
+    os.kill(first, signal.SIGKILL)
+    assert "ended by SIGKILL; it starts again in 0.5 s" in supervisor.stdout.readline()
+    assert supervisor.stdout.readline().startswith("hosting arm")
+    second = child_of(supervisor)
+    assert second != first
+    assert cell.said("call", "arm.look") == "{event: seen}\n"
+    supervisor.kill()
+    supervisor.wait()
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline and is_running(second):
+        time.sleep(0.05)
+    assert not is_running(second)
+
+
+def test_a_robot_without_actions_plans_with_those_of_another_program(cell, tmp_path):
+    cell.host_robot()
+    trace = tmp_path / "run.jsonl"
+    cell.said("run", "cell.py:boss", "--trace", str(trace))
+    assert Counter(one["box"] for one in cell.lines() if one["what"] == "moved") == dict.fromkeys(BOXES, 1)
+    records = [json.loads(line) for line in trace.read_text().splitlines()[1:]]
+    entered = {path for one in records for micro in one.get("microsteps", ()) for path in micro["entered"]}
+    assert {f"work/execute/step_{n}/there/go" for n in range(1, 6)} <= entered
+
+
+def test_a_project_is_compared_with_the_hosted_components(cell):
+    alone = cell.program("check", "cell.py:boss").communicate(timeout=60)[0]
+    assert "there is no type 'box'" in alone
+    assert "unless 'tidier' declares it" in alone
+    cell.host_robot()
+    assert "no mistakes found" in cell.said("check", "cell.py:boss")
 
 
 @pytest.mark.parametrize("seed", range(CYCLES))

@@ -11,7 +11,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from dsc import Component, Outcome, SkillCall, SkillError, skill
+from dsc import Component, Outcome, SkillCall, SkillError, load_plot, skill
 from knowledge_base import Delta, fact
 from planning import Bundle
 
@@ -71,6 +71,14 @@ class Arm(Component):
 
 
 arm = Bundle("arm", components=lambda: [Arm()])
+
+boss = Bundle(
+    "boss",
+    remote=("tidier",),
+    plots=(load_plot(HERE / "boss" / "order.yaml"),),
+    main="order",
+    goal="(forall (?b - box) (on-table ?b))",
+)
 
 robot = Bundle.in_folder(
     HERE,

@@ -1,0 +1,77 @@
+"""The parts of a robot that another robot may use: its domain, its planning actions, and its knowledge (S2.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from dsc.model.plot import ActionPlot
+from dsc.run_log import run_logger
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Delta
+from planning.model.actions import PlanningAction
+from planning.model.domain import PlanningDomain
+from planning.robot.robot import Robot
+
+_LOG = run_logger(__package__)
+
+
+def shared_domain(name: str, domain: PlanningDomain) -> str | None:
+    """Return the domain of the robot of that name as PDDL; `None`, with a warning, if PDDL cannot express it."""
+    try:
+        return domain.to_pddl()
+    except InputError as error:
+        _LOG.warning("the robot '%s' keeps its domain to itself: %s", name, error)
+        return None
+
+
+def plots_of_actions(robot: Robot) -> dict[str, str]:
+    """Return the actions by the plots that execute them; add a plot for each action that has several candidates.
+
+    Such a plot chooses among the candidates on its entry. Its name is `ACTION` or `ACTION-choice`.
+    """
+    found = {}
+    for action in robot.domain.actions.values():
+        candidates = robot.library.implementing(action.name)
+        if len(candidates) == 1 and candidates[0].when is None:
+            found[candidates[0].name] = action.name
+        elif candidates:
+            name = action.name if action.name not in robot.library else f"{action.name}-choice"
+            robot.library.add(_choice(name, action, candidates))
+            found[name] = action.name
+    return found
+
+
+def _choice(name: str, action: PlanningAction, candidates: Sequence[ActionPlot]) -> ActionPlot:
+    """Return the plot that executes a planning action by one of its candidates."""
+    emits = {event: attributes for plot in candidates for event, attributes in plot.emits.items()}
+    ways: dict[str, Any] = {"done": "over"}
+    for event, attributes in emits.items():
+        ways[event] = {"to": "ended", "emit": event, "with": {name: f"?event.{name}" for name in attributes or ()}}
+    names = [one.name for one in action.parameters]
+    used = {"dynamic": [plot.name for plot in candidates], "with": {name: f"?{name}" for name in names}, "on": ways}
+    ended = {"ended": {"final": True}} if emits else {}
+    parameters = {name: candidates[0].parameters[name].type for name in names}
+    return ActionPlot.model_validate({
+        "plot": name, "parameters": parameters, "emits": emits,
+        "states": {"choose": used, "over": {"final": True}, **ended},
+    })  # fmt: skip
+
+
+def shared_knowledge(robot: Robot) -> Delta:
+    """Return all objects, facts and values that the robot's domain declares."""
+    known = robot.knowledge.snapshot()
+    return shared_part(Delta(known.nodes, added=tuple(known.facts), values=known.values), robot)
+
+
+def shared_part(change: Delta, robot: Robot) -> Delta:
+    """Return the part of a change that the robot's domain declares, with the types of all objects in it."""
+    schema, type_of = robot.domain.schema, robot.knowledge.type_of
+    added, removed = (
+        [one for one in facts if one.predicate in schema.predicates] for facts in (change.added, change.removed)
+    )
+    values = {one: value for one, value in change.values.items() if one.predicate in schema.functions}
+    named = [name for one in (*added, *values) for name in one.args if isinstance(name, str)]
+    nodes = {name: type_ for name in named if (type_ := type_of(name)) is not None}
+    nodes = {name: type_ for name, type_ in {**change.nodes, **nodes}.items() if type_ in schema.types}
+    return Delta(nodes, tuple(removed), tuple(added), values, change.removed_nodes)
