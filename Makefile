@@ -8,7 +8,7 @@ BENCH  := .venv-bench
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
+.PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
@@ -89,6 +89,9 @@ soak-suspensions: $(VENV)/.test   ## runs suspended at random moments and resume
 
 lively: $(VENV)/.test   ## robots in a world that changes every half second: is each needed step carried out once? (HOURS=H SEED=N)
 	$(BIN)/python tests/support/lively_world.py --hours $(or $(HOURS),1) --seed $(or $(SEED),0)
+
+soak-hosts: $(VENV)/.test   ## hosts of two robots and a device killed and stopped at random moments, and runs resumed: is nothing moved twice? (CYCLES=N)
+	CYCLES=$(or $(CYCLES),50) $(BIN)/python -m pytest -n 4 tests/planning/cli/test_host.py -k "twice or kept"
 
 test-wire: $(VENV)/.test   ## the whole suite of a transport over Zenoh, also over a bad network, in real time
 	WIRE=1 $(BIN)/python -m pytest -n 4 tests/dsc/wire/test_zenoh.py

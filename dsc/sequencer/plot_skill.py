@@ -136,7 +136,7 @@ def plot_around(skill: SkillSignature, implements: str | None = None) -> ActionP
     form = {
         "plot": f"{skill.component}.{skill.name}",
         "parameters": {
-            name: {"type": type_, **({"default": skill.defaults[name]} if name in skill.defaults else {})}
+            name: {"type": type_, **({} if skill.defaults.get(name) is None else {"default": skill.defaults[name]})}
             for name, type_ in skill.parameters.items()
         },
         "outputs": {name: {"type": type_} for name, type_ in outputs.items()},

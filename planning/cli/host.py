@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from dsc.wire.service_manager import ServiceManager
     from dsc.wire.zenoh_transport import ZenohTransport
     from planning.robot.bundles import Bundle
+    from planning.robot.robot import Robot
 
 
 def host_command(
@@ -67,12 +68,12 @@ def host_command(
     async def main() -> None:
         with host_transport(realm, listen or (), connect or (), zenoh) as transport:
             if plots is None:
-                components = _devices(bundle, only or [], seed, faults)
-            elif only:
+                await _host(_devices(bundle, only or [], seed, faults), transport, replace=replace)
+                return
+            if only:
                 raise InputError("a program hosts components, or plots: give --only, or --plots")
-            else:
-                components = [await _robot(bundle, plots, seed, faults, transport, private=private)]
-            await _host(components, transport, replace=replace)
+            with await _robot(bundle, seed, faults, transport) as robot:
+                await _host([_component(plots, robot, private=private)], transport, replace=replace)
 
     asyncio.run(main())
 
@@ -100,16 +101,18 @@ def _devices(bundle: Bundle, only: list[str], seed: int | None, faults: float | 
     return [one for name, one in found.items() if not only or name in only]
 
 
-async def _robot(
-    bundle: Bundle, name: str, seed: int | None, faults: float | None, transport: ZenohTransport, *, private: bool
-) -> Component:
-    """Return the robot of a bundle as a component of that name."""
+async def _robot(bundle: Bundle, seed: int | None, faults: float | None, transport: ZenohTransport) -> Robot:
+    """Return the robot of a bundle, connected to its remote components."""
     from dsc.wire.realm import connect_all
     from planning.robot.bringup import deploy
-    from planning.robot.robot_component import RobotComponent
 
     remote = await connect_all(bundle.remote, transport)
-    robot = deploy(bundle, seed=seed, faults=faults, clock="real", remote=remote)
+    return deploy(bundle, seed=seed, faults=faults, clock="real", remote=remote)
+
+
+def _component(name: str, robot: Robot, *, private: bool) -> Component:
+    from planning.robot.robot_component import RobotComponent
+
     return RobotComponent(name, robot, private=private)
 
 

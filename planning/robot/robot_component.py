@@ -9,6 +9,7 @@ from typing import Any
 
 from dsc.calls import SkillCall
 from dsc.components.component import Component
+from dsc.components.parameters import Configuration, parameters_of
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.steps import NO_PLAN_KINDS
 from dsc.errors import ProgrammingError, SkillError
@@ -23,9 +24,16 @@ from dsc.skills import SkillSignature, check_arguments
 from dsc.trace import Record
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.exchange import delta_of
-from planning.execution.shipped_plots import shipped_plots
 from planning.robot.robot import Robot
-from planning.robot.sharing import plots_of_actions, shared_domain, shared_knowledge, shared_part
+from planning.robot.run import Run
+from planning.robot.sharing import (
+    defaults_of,
+    own_plots,
+    plots_of_actions,
+    shared_domain,
+    shared_knowledge,
+    shared_part,
+)
 
 _REASON = {"reason": "text"}
 GOAL_SKILL = SkillSignature(
@@ -48,9 +56,12 @@ class RobotComponent(Component):
     states and decisions of this one. Its knowledge receives what this one learns during a skill, and everything by the
     skill `share_knowledge`.
 
+    The defaults of the plots are the component's parameters, e.g. `fetch.speed`. A diagnosis has the runs with their
+    active states.
+
     Args:
         name: the component's name in charts.
-        robot: the robot; the component closes it.
+        robot: the robot, which the caller closes after the component has stopped.
         private: whether the robot keeps its domain and knowledge to itself.
     """
 
@@ -59,24 +70,39 @@ class RobotComponent(Component):
     def __init__(self, name: str, robot: Robot, *, private: bool = False) -> None:
         super().__init__(name)
         self._robot = robot
+        plots = own_plots(robot.library)
+        self.configuration = Configuration(name, parameters_of(defaults_of(plots), ()))
+        self.parameters = self.configuration.parameters
         self._shared = None if private else shared_domain(name, robot.domain)
         executing = {} if self._shared is None else plots_of_actions(robot)
-        shipped = {plot.name for plot in shipped_plots()}
-        plots = [plot for plot in robot.library if plot.name not in shipped and not plot.generated]
-        own = {plot.name: plot_signature(name, plot, "sense") for plot in plots} | {ACHIEVE: GOAL_SKILL}
+        own = {plot.name: plot_signature(name, plot, "sense") for plot in own_plots(robot.library)}
+        own[ACHIEVE] = GOAL_SKILL
         if self._shared is not None:
             own[SHARE] = SHARE_SKILL
-        self._signatures = {key: replace(one, component=name, unlimited=True) for key, one in own.items()}
+        self._signatures = {key: _in_hull(name, one) for key, one in own.items()}
         self._plots = [
             plot_around(one, executing.get(key))
             for key, one in self._signatures.items() if RESERVED.isdisjoint(one.outcomes)
         ]  # fmt: skip
 
     async def stop(self) -> None:
-        """End the runs of the robot, and close it."""
+        """End the runs of the robot."""
         for run in self._robot.runs:
             await run.cancel("its host ends")
-        self._robot.close()
+
+    async def configure(self, parameter: str, value: object) -> None:
+        """Set the default of a plot's parameter, also for later entries in present runs; raise as `Component`."""
+        plot, _, name = parameter.rpartition(".")
+        if parameter in self.configuration.declared:
+            new = self.configuration.declared[parameter].default if value is None else value
+            self._robot.library = self._robot.library.with_default(plot, name, new, "operator")
+        await super().configure(parameter, value)
+        for run in self._robot.runs:
+            run.set_parameter(plot, name, self.parameters[parameter])
+
+    async def diagnose(self) -> dict[str, Any]:
+        """Return the status, with the active states of each run."""
+        return {**await super().diagnose(), "runs": [_run_form(run) for run in self._robot.runs]}
 
     def domain_fragment(self) -> str | None:
         """Return the robot's planning domain; `None` if the robot is private."""
@@ -107,6 +133,7 @@ class RobotComponent(Component):
         check_arguments(self._signatures[skill_name], arguments)
         if skill_name == SHARE:
             return Outcome(COMPLETED, observed=shared_knowledge(self._robot))
+        given = {key: value for key, value in arguments.items() if value is not None}  # the others have their defaults
         relay = Relay(call)
 
         def listen(record: Record) -> None:
@@ -121,7 +148,7 @@ class RobotComponent(Component):
         if skill_name == ACHIEVE:
             run = self._robot.start(str(arguments["goal"]), prepare=prepare)
         else:
-            run = self._robot.start(skill_name, arguments, prepare=prepare)
+            run = self._robot.start(skill_name, given, prepare=prepare)
         try:
             end = await asyncio.shield(run.task)
         except asyncio.CancelledError:
@@ -130,6 +157,20 @@ class RobotComponent(Component):
         finally:
             relay.flush()
         return _outcome(end, call)
+
+
+def _in_hull(name: str, skill: SkillSignature) -> SkillSignature:
+    """Return the signature of a plot in the hull of the component, where the present defaults are unknown."""
+    optional = {key: f"optional {str(skill.parameters[key]).removeprefix('optional ')}" for key in skill.defaults}
+    parameters = {**skill.parameters, **optional}
+    return replace(skill, component=name, parameters=parameters, defaults=dict.fromkeys(optional), unlimited=True)
+
+
+def _run_form(run: Run[Any]) -> dict[str, Any]:
+    """Return the state of a run as plain data, for a diagnosis."""
+    state = run.state
+    skills = [{"skill": one.skill, "since": one.since, "waits_for": one.waits_for} for one in state.waiting]
+    return {"run": run.id, "time": state.time, "active": list(state.active), "skills": skills}
 
 
 def _outcome(end: RunEnd[Any], call: SkillCall[Any]) -> Outcome:

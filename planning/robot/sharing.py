@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from dsc.components.declarations import Parameter, Type
+from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
+from dsc.model.ranges import may_change
 from dsc.run_log import run_logger
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
+from knowledge_base.language.syntax.expression import Constant
+from planning.execution.shipped_plots import shipped_plots
 from planning.model.actions import PlanningAction
 from planning.model.domain import PlanningDomain
 from planning.robot.robot import Robot
 
 _LOG = run_logger(__package__)
+_TYPES: Mapping[str, Type] = {"number": "number", "boolean": "boolean"}
 
 
 def shared_domain(name: str, domain: PlanningDomain) -> str | None:
@@ -23,6 +29,25 @@ def shared_domain(name: str, domain: PlanningDomain) -> str | None:
     except InputError as error:
         _LOG.warning("the robot '%s' keeps its domain to itself: %s", name, error)
         return None
+
+
+def own_plots(library: Library) -> list[ActionPlot]:
+    """Return the plots of a library without those that each robot has, and without plans."""
+    shipped = {plot.name for plot in shipped_plots()}
+    return [plot for plot in library if plot.name not in shipped and not plot.generated]
+
+
+def defaults_of(plots: Iterable[ActionPlot]) -> dict[str, Parameter]:
+    """Return the defaults of plots that an operator may change, as parameters `PLOT.PARAMETER` (S1.22)."""
+    found = {}
+    for plot in plots:
+        for name, one in plot.parameters.items():
+            default = one.default.value if isinstance(one.default, Constant) else None
+            if isinstance(default, str | int | float) and may_change("operator", one.changed_by):
+                found[f"{plot.name}.{name}"] = Parameter(
+                    _TYPES.get(one.range.type, "text"), one.range.whole, default, one.least, one.most, one.among
+                )
+    return found
 
 
 def plots_of_actions(robot: Robot) -> dict[str, str]:

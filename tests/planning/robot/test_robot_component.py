@@ -13,6 +13,7 @@ from dsc.testing import LossyTransport
 from dsc.trace import Record
 from dsc.wire import Host, RemoteComponent
 from knowledge_base import Delta, KnowledgeBase, fact
+from knowledge_base.errors import InputError, UnknownNameError
 from planning import PlanningDomain, Robot
 from planning.robot.robot_component import RobotComponent
 
@@ -242,6 +243,58 @@ def test_a_failure_of_the_other_robot_is_one_of_the_step_and_leads_to_a_new_plan
     failed = [record.data for record in records if record.type == "event" and record.data["name"] == "skill_error"]
     assert {one["source"] for one in failed} == {"base.drive", "helper.drive"}
     assert all("the motor is hot" in one["attributes"]["reason"] for one in failed)
+
+
+DRIVES = """
+    plot: tour
+    parameters: {slowly: {type: boolean, default: false, changed_by: operator}, rounds: {type: integer, default: 1, least: 1, most: 3}}
+    states:
+      go: {entry: {trigger: base.drive, with: {start: hall, to: lab, slowly: ?slowly}}, on: {arrived: over}}
+      over: {final: true}
+"""
+
+
+def test_defaults_of_plots_are_parameters_in_the_hull():
+    base = Base()
+
+    async def main():
+        helper = carrier(base)
+        helper.library.add(parse_plot(DRIVES))
+        transport = LossyTransport(seed=4, loss=0.05, double=0.05, delay=0.02)
+        host = Host(RobotComponent("helper", helper), transport, LoopClock())
+        remote = await RemoteComponent.connect("helper", transport)
+        assert dict(remote.parameters) == {"tour.slowly": False, "tour.rounds": 1}
+        await remote.configure("tour.slowly", True)
+        with pytest.raises(InputError, match="from 1 to 3"):
+            await remote.configure("tour.rounds", 4)
+        with pytest.raises(UnknownNameError, match=r"tour\.rounds"):
+            await remote.configure("tour.round", 2)
+        order = "{plot: order, states: {go: {use: helper.tour, on: {done: e}}, e: {final: true}}}"
+        boss = told(remote, plots=[parse_plot(order)])
+        run = boss.start("order")
+        await asyncio.sleep(5.0)
+        (running,) = (await remote.diagnose())["runs"]
+        assert running["active"] == ["go"]
+        assert [one["skill"] for one in running["skills"]] == ["base.drive"]
+        assert (await run).finished
+        await remote.configure("tour.slowly", None)
+        assert (await boss.start("order")).finished
+        await host.close()
+
+    run_simulated(main())
+    assert [slowly for *_, slowly in base.did] == [True, False]
+
+
+def test_a_component_that_starts_again_runs_its_plots():
+    async def main():
+        helper = carrier(Base())
+        component = RobotComponent("helper", helper)
+        boss = told(component)
+        assert (await boss.start("(robot-at lab)")).reached
+        await component.life.restart()
+        return await boss.start("(robot-at hall)")
+
+    assert run_simulated(main()).reached
 
 
 def test_a_cancelled_skill_ends_the_run_of_the_other_robot():
