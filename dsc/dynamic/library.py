@@ -155,12 +155,14 @@ class Library:
         if len(self._made) > MOST_EXPECTED:
             del self._made[next(iter(self._made))]
 
-    def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
-        """Return the compiled plot for data in the written form; equal data share their tables.
+    def bind(self, form: Mapping[str, Any] | str) -> CompiledPlot:
+        """Return the compiled plot for data in the written form, or of this name; equal data share their tables.
 
         Raises:
-            InputError: the data are not a plot, or the plot refers to unknown plots.
+            InputError: the data are not a plot, or the plot refers to unknown plots, or no plot has this name.
         """
+        if isinstance(form, str):
+            return self.compiled(form)
         if not isinstance(form, Mapping):  # the value of a variable may have any type
             raise InputError(f"the value to be bound is not a plot: {form!r}")
         key = json.dumps(form)  # keys stay unsorted, because the order of states is part of a plot

@@ -109,7 +109,7 @@ class Chart(Protocol):
         """Return the compiled plot of that name; raise `UnknownNameError` if there is none."""
         ...
 
-    def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
+    def bind(self, form: Mapping[str, Any] | str) -> CompiledPlot:
         """Compile a plot given as data, e.g. one made from a plan; raise `InputError` for data that are not a plot."""
         ...
 

@@ -35,13 +35,15 @@ class CheckedPlots:
         """Return the compiled plot of that name; raise `UnknownNameError` if there is none."""
         return self._library.compiled(name)
 
-    def bind(self, form: Mapping[str, Any]) -> CompiledPlot:
-        """Return the compiled plot for data in the written form.
+    def bind(self, form: Mapping[str, Any] | str) -> CompiledPlot:
+        """Return the compiled plot for data in the written form, or the library's plot of this name.
 
         Raises:
-            InputError: the data are not a plot, or the plot does not pass the validator.
+            InputError: the data are not a plot, or the plot does not pass the validator, or no plot has this name.
         """
         compiled = self._library.bind(form)
+        if isinstance(form, str):
+            return compiled
         if not compiled.plot.generated and compiled not in self._accepted:
             plot = ActionPlot.model_validate(form)
             raise_findings(validate_plot(plot, self._library, self._schema, self._skills))

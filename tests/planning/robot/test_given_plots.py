@@ -77,3 +77,44 @@ def test_a_command_to_a_missing_component_fails_at_once(command):
     made = f"{{entry: [{command}, {{trigger: arm.go}}], on: {{went: e, skill_error: e}}}}"
     end = robot.run("p", {"plan": given(made)})
     assert end.finished, end.problem
+
+
+NAMED = """
+    plot: p
+    parameters: {which: {type: plot, default: walk}, far: {type: number, default: 2}}
+    outputs: {went: {type: number, initial: 0}}
+    emits: {failed: {reason: text}}
+    states:
+      run: {use: ?which, with: {far: ?far}, on: {done: {to: e, assign: {went: ?event.went}}, error: {to: e, emit: failed, with: {reason: ?event.reason}}}}
+      e: {final: true}
+"""
+WALK = """
+    plot: walk
+    parameters: {far: number}
+    outputs: {went: {type: number, initial: 0}}
+    states: {s: {entry: {trigger: arm.go, with: {to: ?far}}, on: {went: {to: e, assign: {went: ?event.far}}}}, e: {final: true}}
+"""
+RUN = WALK.replace("plot: walk", "plot: run").replace("with: {to: ?far}", "with: {to: (* 2 ?far)}")
+LOSES = "{plot: loses, parameters: {far: number}, emits: {lost: {}}, states: {s: {always: e}, e: {final: true, emit: lost}}}"
+
+
+@pytest.mark.parametrize(
+    ("which", "went", "said"),
+    [
+        ("walk", 2, None),
+        ("run", 4, None),
+        (None, 2, None),
+        ("wolk", 0, "did you mean 'walk'"),
+        ("loses", 0, "does not handle 'lost'"),
+        ("stays", 0, "has no parameter 'far'"),
+    ],
+)
+def test_the_value_may_be_the_name_of_a_plot_which_the_state_becomes_when_it_is_entered(tmp_path, which, went, said):
+    store = tmp_path / "run.kb"
+    plots = [plot(text) for text in (NAMED, WALK, RUN, LOSES, "{plot: stays, states: {e: {final: true}}}")]
+    with Robot("(define (domain d))", plots, [Arm()], clock="simulated", store=store) as robot:
+        end = robot.run("p", {} if which is None else {"which": which})
+    assert end.finished, end.problem
+    assert end.outputs == {"went": went}
+    assert [said in one.attributes["reason"] for one in end.emitted] == [True] * (said is not None)
+    assert replay(store).divergence is None

@@ -245,6 +245,27 @@ def test_a_failure_of_the_other_robot_is_one_of_the_step_and_leads_to_a_new_plan
     assert all("the motor is hot" in one["attributes"]["reason"] for one in failed)
 
 
+@pytest.mark.parametrize("which", ["helper", "other"])
+def test_a_state_becomes_the_plot_of_the_robot_that_its_parameter_names(which):
+    order = """
+        plot: order
+        parameters: {how: plot}
+        states:
+          go: {use: ?how, with: {from: hall, to: lab}, on: {done: over}}
+          over: {final: true}
+    """
+    bases = {"helper": Base(), "other": Base()}
+
+    async def main():
+        robots = [RobotComponent(name, carrier(base)) for name, base in bases.items()]
+        boss = Robot("(define (domain nothing))", [parse_plot(order)], robots)
+        boss.knowledge.apply(WORLD, "test")
+        return await boss.start("order", {"how": f"{which}.drive"})
+
+    assert run_simulated(main()).finished
+    assert [name for name, base in bases.items() if base.did] == [which]
+
+
 DRIVES = """
     plot: tour
     parameters: {slowly: {type: boolean, default: false, changed_by: operator}, rounds: {type: integer, default: 1, least: 1, most: 3}}
