@@ -85,6 +85,11 @@ class RobotComponent(Component):
             for key, one in self._signatures.items() if RESERVED.isdisjoint(one.outcomes)
         ]  # fmt: skip
 
+    async def start(self) -> None:
+        """Apply the parameters, which the profile of a client may have set."""
+        for parameter, value in self.parameters.items():
+            self._set_default(parameter, value)
+
     async def stop(self) -> None:
         """End the runs of the robot."""
         for run in self._robot.runs:
@@ -92,13 +97,16 @@ class RobotComponent(Component):
 
     async def configure(self, parameter: str, value: object) -> None:
         """Set the default of a plot's parameter, also for later entries in present runs; raise as `Component`."""
-        plot, _, name = parameter.rpartition(".")
-        if parameter in self.configuration.declared:
-            new = self.configuration.declared[parameter].default if value is None else value
-            self._robot.library = self._robot.library.with_default(plot, name, new, "operator")
+        declared = self.configuration.declared
+        if parameter in declared:
+            self._set_default(parameter, declared[parameter].default if value is None else value)
         await super().configure(parameter, value)
+
+    def _set_default(self, parameter: str, value: object) -> None:
+        plot, _, name = parameter.rpartition(".")
+        self._robot.library = self._robot.library.with_default(plot, name, value, "operator")
         for run in self._robot.runs:
-            run.set_parameter(plot, name, self.parameters[parameter])
+            run.set_parameter(plot, name, value)
 
     async def diagnose(self) -> dict[str, Any]:
         """Return the status, with the active states of each run."""

@@ -8,8 +8,10 @@ import pytest
 
 from dsc import Component, Outcome, SkillCall, parse_plot, skill
 from dsc.errors import SkillError
+from dsc.profiles import configure
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.testing import LossyTransport
+from dsc.text.profiles import parse_profile
 from dsc.trace import Record
 from dsc.wire import Host, RemoteComponent
 from knowledge_base import Delta, KnowledgeBase, fact
@@ -304,6 +306,25 @@ def test_defaults_of_plots_are_parameters_in_the_hull():
 
     run_simulated(main())
     assert [slowly for *_, slowly in base.did] == [True, False]
+
+
+def test_a_profile_of_the_client_sets_the_defaults_at_the_host():
+    base = Base()
+
+    async def main():
+        helper = carrier(base)
+        helper.library.add(parse_plot(DRIVES))
+        transport = LossyTransport(seed=5)
+        host = Host(RobotComponent("helper", helper), transport, LoopClock())
+        remote = await RemoteComponent.connect("helper", transport)
+        profile = parse_profile("{profile: slow, components: {helper: {tour.slowly: true}}}")
+        configure([remote], profile)
+        order = "{plot: order, states: {go: {use: helper.tour, on: {done: e}}, e: {final: true}}}"
+        assert (await told(remote, plots=[parse_plot(order)]).start("order")).finished
+        await host.close()
+
+    run_simulated(main())
+    assert base.did == [("drive", "hall", "lab", True)]
 
 
 def test_a_component_that_starts_again_runs_its_plots():
