@@ -27,6 +27,7 @@ from knowledge_base.exchange import delta_of
 from planning.robot.robot import Robot
 from planning.robot.run import Run
 from planning.robot.sharing import (
+    confirmed_effects,
     defaults_of,
     own_plots,
     plots_of_actions,
@@ -74,14 +75,14 @@ class RobotComponent(Component):
         self.configuration = Configuration(name, parameters_of(defaults_of(plots), ()))
         self.parameters = self.configuration.parameters
         self._shared = None if private else shared_domain(name, robot.domain)
-        executing = {} if self._shared is None else plots_of_actions(robot)
+        self._actions = {} if self._shared is None else plots_of_actions(robot)
         own = {plot.name: plot_signature(name, plot, "sense") for plot in own_plots(robot.library)}
         own[ACHIEVE] = GOAL_SKILL
         if self._shared is not None:
             own[SHARE] = SHARE_SKILL
         self._signatures = {key: _in_hull(name, one) for key, one in own.items()}
         self._plots = [
-            plot_around(one, executing.get(key))
+            plot_around(one, self._actions.get(key))
             for key, one in self._signatures.items() if RESERVED.isdisjoint(one.outcomes)
         ]  # fmt: skip
 
@@ -164,7 +165,11 @@ class RobotComponent(Component):
             raise
         finally:
             relay.flush()
-        return _outcome(end, call)
+        outcome = _outcome(end, call)
+        if outcome.event != COMPLETED or skill_name not in self._actions:
+            return outcome
+        confirmed = confirmed_effects(self._actions[skill_name], given, self._robot)
+        return Outcome(COMPLETED, outcome.attributes, confirmed)
 
 
 def _in_hull(name: str, skill: SkillSignature) -> SkillSignature:

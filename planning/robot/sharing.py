@@ -16,6 +16,7 @@ from knowledge_base.language.syntax.expression import Constant
 from planning.execution.shipped_plots import shipped_plots
 from planning.model.actions import PlanningAction
 from planning.model.domain import PlanningDomain
+from planning.model.plan import PlanStep
 from planning.robot.robot import Robot
 
 _LOG = run_logger(__package__)
@@ -81,6 +82,23 @@ def _choice(name: str, action: PlanningAction, candidates: Sequence[ActionPlot])
         "plot": name, "parameters": parameters, "emits": emits,
         "states": {"choose": used, "over": {"final": True}, **ended},
     })  # fmt: skip
+
+
+def confirmed_effects(action: str, arguments: Mapping[str, Any], robot: Robot) -> Delta:
+    """Return the effects of an executed action that the robot's knowledge confirms.
+
+    Another robot may have missed them, e.g. if the robot knew them before this execution.
+    """
+    knowledge, parameters = robot.knowledge, robot.domain.actions[action].parameters
+    step = PlanStep(action, tuple([str(arguments[one.name]) for one in parameters]))
+    effects = robot.domain.effects(step, knowledge)
+    values = knowledge.values() if effects.values else {}
+    true = Delta(
+        added=tuple([one for one in effects.added if knowledge.holds(one.predicate, one.args)]),
+        removed=tuple([one for one in effects.removed if not knowledge.holds(one.predicate, one.args)]),
+        values={one: values[one] for one in effects.values if one in values},
+    )
+    return shared_part(true, robot)
 
 
 def shared_knowledge(robot: Robot) -> Delta:

@@ -199,6 +199,26 @@ def test_outcomes_of_the_other_plot_are_events_of_the_state():
     assert [(one.name, dict(one.attributes)) for one in end.emitted] == [("refused", {"item": "piano"})]
 
 
+def test_an_effect_that_the_other_robot_knew_before_is_confirmed():
+    class Still(Base):
+        @skill
+        async def carry(self, call: SkillCall, item: str, start: str, to: str) -> Carried | TooHeavy:
+            return Carried()  # it is there already, and the robot knows it
+
+    async def main():
+        helper = carrier(Still())
+        there = Delta(
+            added=(fact("item-at", "cup", "lab"), fact("robot-at", "lab")), removed=(fact("robot-at", "hall"),)
+        )
+        helper.knowledge.apply(there.then(Delta(removed=(fact("item-at", "cup", "hall"),))), "test")
+        boss = told(RobotComponent("helper", helper))
+        return await boss.start("(item-at cup lab)"), boss
+
+    end, boss = run_simulated(main())
+    assert end.reached, end.reason
+    assert boss.knowledge.ask("(and (item-at cup lab) (robot-at lab) (not (item-at cup hall)) (not (robot-at hall)))")
+
+
 def test_objects_that_the_other_robot_finds_become_known():
     class Finder(Base):
         @skill
