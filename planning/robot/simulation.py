@@ -168,7 +168,7 @@ class SceneWriter:
 
     def __call__(self, record: Record) -> None:
         """Write the scene after a record that may have changed it."""
-        if record.type not in {"plot", "event"}:
+        if record.type not in {"plot", "event", "knowledge"}:
             return
         scene = scene_of(self._world)
         if scene is not None and scene != self._drawn:

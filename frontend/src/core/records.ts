@@ -98,6 +98,8 @@ export interface Thing {
   readonly width?: number;
   readonly depth?: number;
   readonly in?: string;
+  readonly to_x?: number;
+  readonly to_y?: number;
 }
 
 export interface SceneRec extends Rec {

@@ -59,7 +59,7 @@ const explanationFields = fields({ text: optional(text), detail: optional(text),
 const candidate = fields({ plot: text, reason: optional(text), condition: explanation, score: optional(scalar) });
 const thing = fields({
   id: text, shape: optional(text), x: optional(number), y: optional(number), label: optional(text), width: optional(number),
-  depth: optional(number), in: optional(text),
+  depth: optional(number), in: optional(text), to_x: optional(number), to_y: optional(number),
 });
 const micro = fields({
   event: optional(text), taken: list(fields({ from: text, on: text, to: optional(text) })), exited: texts, entered: texts,

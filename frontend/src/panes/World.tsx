@@ -39,10 +39,10 @@ function driving(busy: ReadonlySet<string>, things: readonly Thing[]): Thing | n
 }
 
 const Scene = memo(function Scene({ things, busy, moving }: { things: readonly Thing[]; busy: ReadonlySet<string>; moving: Thing | null }) {
-  const left = Math.min(...things.map((t) => t.x - (t.width ?? 0.3) / 2)) - MARGIN;
+  const left = Math.min(...things.map((t) => Math.min(t.x, t.to_x ?? t.x) - (t.width ?? 0.3) / 2)) - MARGIN;
   const right = Math.max(...things.map(rightOf)) + MARGIN;
-  const low = Math.min(...things.map((t) => t.y - (t.depth ?? 0.3) / 2)) - MARGIN - 0.3;
-  const high = Math.max(...things.map((t) => t.y + (t.depth ?? 0.3) / 2)) + MARGIN + (things.some((t) => t.width === undefined) ? 0.35 : 0.1);
+  const low = Math.min(...things.map((t) => Math.min(t.y, t.to_y ?? t.y) - (t.depth ?? 0.3) / 2)) - MARGIN - 0.3;
+  const high = Math.max(...things.map((t) => Math.max(t.y, t.to_y ?? t.y) + (t.depth ?? 0.3) / 2)) + MARGIN + (things.some((t) => t.width === undefined) ? 0.35 : 0.1);
   const depths = nesting(things);
   const order = [...things].sort((a, b) => rank(a) - rank(b) || (depths.get(a.id) ?? 0) - (depths.get(b.id) ?? 0));
   const robot = things.find((thing) => thing.shape === "robot");
@@ -79,6 +79,7 @@ const Scene = memo(function Scene({ things, busy, moving }: { things: readonly T
 
 /** With room for its label: that of an item leans to the right, that of a place begins at its left. */
 function rightOf(thing: Thing): number {
+  if (thing.to_x !== undefined) return Math.max(thing.x, thing.to_x) + 0.15;
   if (thing.width === undefined) return thing.x + 0.25 + (thing.in === undefined ? thing.label.length * 0.05 : 0);
   return Math.max(thing.x + thing.width / 2, thing.x - thing.width / 2 + thing.label.length * 0.12);
 }
@@ -136,6 +137,15 @@ function Shape({ thing }: { thing: Thing }) {
       </>
     );
   }
+  if (thing.to_x !== undefined && thing.to_y !== undefined) {
+    return (
+      <>
+        <line className="body" x1={0} y1={0} x2={thing.to_x - thing.x} y2={thing.y - thing.to_y} />
+        <circle className="joint" r={0.025} />
+      </>
+    );
+  }
+  if (shape === "tool") return <circle className="body" r={0.04} />;
   if (shape.includes("crisp")) return <circle className="body" r={0.105} />;
   if (shape === "cup") {
     return (
@@ -149,7 +159,7 @@ function Shape({ thing }: { thing: Thing }) {
 }
 
 function Label({ thing, quiet, stacked, count }: { thing: Thing; quiet: boolean; stacked: boolean; count: number }) {
-  if (quiet) return null;
+  if (quiet || thing.to_x !== undefined || thing.shape === "tool") return null; // joints are too close for labels
   const left = -(thing.width ?? 0) / 2;
   if (thing.shape === "operator") return <text className="place" x={left} y={-0.32}>{thing.label}</text>; // who comes stands below
   if (count > 0) return <text className="place" x={left} y={(thing.depth ?? 0) / 2 + 0.26}>{`${thing.label}: ${count}`}</text>;

@@ -1,0 +1,3 @@
+from domains.waving.bringup import DeskArm as DeskArm
+from domains.waving.bringup import HumanoidArm as HumanoidArm
+from domains.waving.bringup import bundle as bundle
