@@ -7,12 +7,14 @@ import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from domains.butler import Scenario as ButlerScenario
 from domains.clean_up_table import Scenario
 from dsc import load_library, load_plot, parse_plot
 from dsc.drawing import draw
@@ -37,8 +39,11 @@ def test_python_on_a_page_runs_from_top_to_bottom(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_yaml_on_a_page_is_a_plot_a_profile_or_a_scenario(page):
+    readers: dict[str, Callable[..., object]] = {
+        "plot": parse_plot, "profile": parse_profile, "says": ButlerScenario.parse,
+    }  # fmt: skip
     for block in blocks(page, "yaml"):
-        read = {"plot": parse_plot, "profile": parse_profile}.get(block.partition(":")[0], Scenario.parse)
+        read = readers.get(block.partition(":")[0], Scenario.parse)
         read(block, str(page))
 
 

@@ -61,7 +61,7 @@ class Chain:
 
         Cyclic coordinate descent: each joint in turn points the tool at the target, from the last joint to the first.
         """
-        angles = {joint.name: _bounded(start[joint.name], limits[joint.name]) for joint in self.joints}
+        angles = {joint.name: _bound(start[joint.name], limits[joint.name]) for joint in self.joints}
         for _ in range(_MOST_TURNS):
             if math.dist(self.points(angles)[-1], tool) < _NEAR:
                 return angles
@@ -69,7 +69,7 @@ class Chain:
                 points = self.points(angles)
                 turn = _direction(points[index], tool) - _direction(points[index], points[-1])
                 wanted = angles[joint.name] + (turn + 180.0) % 360.0 - 180.0
-                angles[joint.name] = _bounded(wanted, limits[joint.name])
+                angles[joint.name] = _bound(wanted, limits[joint.name])
         return None
 
 
@@ -77,6 +77,6 @@ def _direction(start: Point, end: Point) -> float:
     return math.degrees(math.atan2(end[1] - start[1], end[0] - start[0]))
 
 
-def _bounded(angle: float, limits: tuple[float, float]) -> float:
+def _bound(angle: float, limits: tuple[float, float]) -> float:
     least, most = limits
     return min(max(angle, least), most)
