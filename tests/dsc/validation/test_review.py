@@ -312,7 +312,10 @@ def test_rules_and_handlers_that_would_make_too_many_transitions_are_refused():
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
 def test_nothing_is_said_about_shipped_plots(file):
     made = load_plot(file)
-    assert review_plot(made, Neighbours().of(file, made)[0]) == []
+    library = Neighbours().of(file, made)[0]
+    for needed in (ROOT / "domains" / "arm_skills" / "plots").glob("*.yaml"):  # a bundle that other bundles need
+        library.add(load_plot(needed))
+    assert review_plot(made, library) == []
 
 
 def test_nothing_is_said_about_plots_in_the_docs():
