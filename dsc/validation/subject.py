@@ -161,7 +161,9 @@ class Subject:
     def unknown_plot(self, path: Path, name: str) -> Finding:
         """Return the finding about a reference to a missing plot."""
         valid = {other.name for other in self.library}
-        return self.finding(path, "known-plot", f"there is no plot '{name}'", found=name, valid=valid)
+        owner, dot, _ = name.partition(".")
+        fix = f"the component '{owner}' brings it, and is not deployed here" if dot else ""
+        return self.finding(path, "known-plot", f"there is no plot '{name}'", fix, found=name, valid=valid)
 
 
 def addressed_by(plot: ActionPlot) -> frozenset[str]:

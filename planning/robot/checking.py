@@ -95,8 +95,8 @@ def check_project(target: str, remote: Sequence[Component] = ()) -> list[Finding
         if robot is not None and not errors and all(one.level == "warning" for one in findings):
             findings += robot.pointless()
     findings += [Finding(error, READABLE) for error in errors]
-    if bundle is not None and bundle.remote and not remote:
-        findings = [_perhaps_remote(one, bundle) for one in findings]
+    if bundle is not None and bundle.remote:
+        findings = [_perhaps_remote(one, bundle, asked=bool(remote)) for one in findings]
     if path.is_dir():
         read = {Path(one.place.source or "").resolve() for one in findings if one.place is not None}
         if bundle is not None:
@@ -105,11 +105,17 @@ def check_project(target: str, remote: Sequence[Component] = ()) -> list[Finding
     return in_order(without_ignored(findings, files))
 
 
-def _perhaps_remote(finding: Finding, bundle: Bundle) -> Finding:
-    """Return a finding as a warning if it concerns a name that a component of another program may declare."""
+def _perhaps_remote(finding: Finding, bundle: Bundle, *, asked: bool) -> Finding:
+    """Return a finding as a warning if it concerns a name that a component of another program may declare.
+
+    If these components were `asked`, only their objects are unknown.
+    """
     error = finding.error
     if not isinstance(error, UnknownNameError) or error.nearest is not None or error.found in bundle.remote:
         return finding
+    if asked:
+        learnt = error.message.startswith("there is no object")
+        return replace(finding, fix="unless the robot learns of it", level="warning") if learnt else finding
     hosts = " or ".join(f"'{name}'" for name in bundle.remote)
     return replace(
         finding, fix=f"unless {hosts} declares it: `dsc check --hosts` asks the running programs", level="warning"
@@ -241,7 +247,8 @@ class _Robot:
             found += wrong_facts(files, self._domain.schema)
             quoted = quoted_names(map(_text, {*files, *(one for one in self._files if one.suffix == ".py")}))
             found += unused_plots(self._plots, self._bundle.main, quoted)
-            found += () if world is None else never_true(self._plots, self._domain, world, quoted)
+            if world is not None and not self._bundle.remote:  # else other programs may make a fact true
+                found += never_true(self._plots, self._domain, world, quoted)
         self._check_components()
         return found
 

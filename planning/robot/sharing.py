@@ -12,6 +12,7 @@ from dsc.model.ranges import may_change
 from dsc.run_log import run_logger
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.syntax.expression import Constant
 from planning.execution.shipped_plots import shipped_plots
 from planning.model.actions import PlanningAction
@@ -59,7 +60,8 @@ def plots_of_actions(robot: Robot) -> dict[str, str]:
     found = {}
     for action in robot.domain.actions.values():
         candidates = robot.library.implementing(action.name)
-        if len(candidates) == 1 and candidates[0].when is None:
+        whole = all({one.name for one in action.parameters} <= plot.parameters.keys() for plot in candidates)
+        if len(candidates) == 1 and whole and candidates[0].when is None:
             found[candidates[0].name] = action.name
         elif candidates:
             name = action.name if action.name not in robot.library else f"{action.name}-choice"
@@ -74,10 +76,12 @@ def _choice(name: str, action: PlanningAction, candidates: Sequence[ActionPlot])
     ways: dict[str, Any] = {"done": "over"}
     for event, attributes in emits.items():
         ways[event] = {"to": "ended", "emit": event, "with": {name: f"?event.{name}" for name in attributes or ()}}
+    taken = {name: one.type for plot in candidates for name, one in plot.parameters.items()}
     names = [one.name for one in action.parameters]
-    used = {"dynamic": [plot.name for plot in candidates], "with": {name: f"?{name}" for name in names}, "on": ways}
+    given = {name: f"?{name}" for name in names if name in taken}
+    used = {"dynamic": [plot.name for plot in candidates], "with": given, "on": ways}
     ended = {"ended": {"final": True}} if emits else {}
-    parameters = {name: candidates[0].parameters[name].type for name in names}
+    parameters = {one.name: taken.get(one.name) or (one.types or (ROOT_TYPE,))[0] for one in action.parameters}
     return ActionPlot.model_validate({
         "plot": name, "parameters": parameters, "emits": emits,
         "states": {"choose": used, "over": {"final": True}, **ended},

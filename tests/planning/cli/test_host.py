@@ -25,6 +25,23 @@ BOXES = [f"box{n}" for n in range(1, 6)]
 CYCLES = int(os.environ.get("CYCLES", "1"))
 
 
+BOSS = """
+from dsc import parse_plot
+from planning import Bundle
+
+order = parse_plot('''
+plot: order
+emits: {failed: {}}
+states:
+  learn: {use: cleaner.share_knowledge, on: {done: go}}
+  go: {goal: (robot-at sink), on: {done: over, no_plan: no, gave_up: no}}
+  over: {final: true}
+  no: {final: true, emit: failed}
+''')
+robot = Bundle("boss", remote=("cleaner",), plots=(order,), main="order", goal="(robot-at sink)")
+"""
+
+
 class Cell:
     """The programs of the cell, in a realm of their own."""
 
@@ -111,6 +128,17 @@ def test_a_run_waits_for_its_components_and_uses_them(cell):
 
 def test_a_component_that_nobody_hosts_is_named(cell):
     assert "no program hosts the component 'arm'" in cell.said("run", "cell.py", status=2)
+
+
+def test_a_ready_world_is_planned_with_by_a_robot_of_a_few_lines(cell, tmp_path):
+    robot = tmp_path / "boss.py"
+    robot.write_text(BOSS)
+    host = cell.program("host", "clean-up-table", "--plots", "cleaner", "--listen", cell.endpoint)
+    assert host.stdout.readline().startswith("hosting cleaner")
+    assert "there is no object 'sink'" in cell.said("check", str(robot))
+    said = cell.said("run", str(robot))
+    assert "(drive operator sink)" in said
+    assert "Goal reached" in said
 
 
 def test_a_later_host_takes_over_and_the_world_refuses_the_former_one(cell):
