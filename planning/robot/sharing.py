@@ -95,7 +95,10 @@ def confirmed_effects(action: str, arguments: Mapping[str, Any], robot: Robot) -
     """
     knowledge, parameters = robot.knowledge, robot.domain.actions[action].parameters
     step = PlanStep(action, tuple([str(arguments[one.name]) for one in parameters]))
-    effects = robot.domain.effects(step, knowledge)
+    try:
+        effects = robot.domain.effects(step, knowledge)
+    except InputError:  # e.g. the robot does not know a number that the action increases
+        return Delta()
     values = knowledge.values() if effects.values else {}
     true = Delta(
         added=tuple([one for one in effects.added if knowledge.holds(one.predicate, one.args)]),

@@ -219,6 +219,27 @@ def test_an_effect_that_the_other_robot_knew_before_is_confirmed():
     assert boss.knowledge.ask("(and (item-at cup lab) (robot-at lab) (not (item-at cup hall)) (not (robot-at hall)))")
 
 
+@pytest.mark.parametrize(("known", "count"), [(None, None), (3.0, 3.0)])
+def test_a_number_that_an_action_changes_is_confirmed_if_the_robot_knows_it(known, count):
+    text = """
+        (define (domain counting) (:predicates (done)) (:functions (count) - number)
+          (:action work :effect (and (done) (increase (count) 1))))
+    """
+    plot = "{plot: work, implements: work, effects: assumed, states: {s: {final: true}}}"
+
+    async def main():
+        domain = PlanningDomain.parse(text)
+        knowledge = KnowledgeBase(domain.schema)
+        values = {} if known is None else {fact("count"): known}
+        knowledge.apply(Delta(added=(fact("done"),), values=values), "test")
+        helper = RobotComponent("helper", Robot(domain, [parse_plot(plot)], [], knowledge))
+        call = SkillCall("a1", LoopClock(), lambda _: None)
+        return await helper.execute("work", call, {})
+
+    observed = run_simulated(main()).observed
+    assert dict(observed.values) == ({} if count is None else {fact("count"): count})
+
+
 def test_objects_that_the_other_robot_finds_become_known():
     class Finder(Base):
         @skill
