@@ -365,9 +365,9 @@ def _print(report: Report, *, as_json: bool) -> None:
 def robot_knowledge(source: Path) -> KnowledgeBase | None:
     """Return the initial knowledge of a robot, for `dsc kb`; `None` if the source is not a target.
 
-    A scenario (YAML) belongs to the only installed robot whose simulation reads scenarios. The text `TARGET@SCENARIO`
-    names both.
+    A scenario (YAML) belongs to the first installed robot that can read it. The text `TARGET@SCENARIO` names both.
     """
+    from knowledge_base.errors import InputError
     from planning.robot.bringup import deploy
     from planning.robot.bundles import installed
     from planning.robot.targets import bundle_at
@@ -375,9 +375,18 @@ def robot_knowledge(source: Path) -> KnowledgeBase | None:
     target, _, scenario = str(source).partition("@")
     if source.suffix in {".yaml", ".yml"} and not scenario:
         able = [one for one in installed().values() if one.simulation and one.simulation.reads_scenarios]
-        if len(able) != 1:
+        errors = []
+        for one in able:
+            try:
+                return deploy(one, scenario=source).knowledge
+            except InputError as error:
+                errors.append(error)
+        if not errors:
             return None
-        return deploy(able[0], scenario=source).knowledge
+        if len(errors) == 1:
+            raise errors[0]
+        reasons = "; ".join(f"{one.name}: {error}" for one, error in zip(able, errors, strict=True))
+        raise InputError(f"the scenario fits no installed robot; name one as ROBOT@{source.name} ({reasons})")
     if source.is_file() and source.suffix != ".py":
         return None
     if not (scenario or source.is_dir() or source.suffix == ".py" or ":" in target or target in installed()):

@@ -22,7 +22,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.world.schema import Schema
 
 ROOT = Path(__file__).parents[3]
-FILES = sorted([*ROOT.glob("domains/*/plots/*.yaml"), *ROOT.glob("planning/plots/*.yaml")])
+FILES = sorted([*ROOT.glob("domains/clean_up_table/plots/*.yaml"), *ROOT.glob("planning/plots/*.yaml")])
 TEXTS = [file.read_text() for file in FILES]
 LIBRARY = [load_plot(file) for file in FILES]
 SCHEMA = Schema.from_pddl(ROOT / "domains" / "clean_up_table" / "domain.pddl")

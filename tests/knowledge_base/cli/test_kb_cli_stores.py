@@ -171,6 +171,13 @@ def test_a_scenario_is_what_the_robot_knows_at_its_start(tmp_path) -> None:
     scenario = tmp_path / "two.yaml"
     scenario.write_text("table: {cups: 2}\nrobot_at: sink\n", encoding="utf-8")
     assert json.loads(run("query", str(scenario), "(robot-at ?p)", "--json"))["answers"] == [{"p": "sink"}]
+    scenario.write_text("says: [follow me]\n", encoding="utf-8")
+    assert json.loads(run("query", str(scenario), "(robot-at ?p)", "--json"))["answers"] == [{"p": "hall"}]
+    scenario.write_text("table: {cups: many}\n", encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"ROBOT@two\.yaml \(butler: .*; clean-up-table: .*two\.yaml:1:9: a whole number"
+    ):
+        run("query", str(scenario), "(robot-at ?p)")
 
 
 def test_parameters_are_written_with_an_equals_sign(store) -> None:
