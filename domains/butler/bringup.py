@@ -8,10 +8,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from domains.butler.components import Base, Gripper, Mapper, PathPlanner, Tracks
-from domains.butler.flat import DOORS, FURNITURE, HOME, ROOMS, Flat
+from domains.butler.components import Base, Butler
+from domains.butler.flat import DOORS, FURNITURE, HOME, ROOMS, Flat, spots
 from domains.butler.scenario import Scenario
 from domains.butler.speech import Fetch, Speech, command, from_list, from_prompt
+from domains.fetch_skills.bringup import NAME as FETCH_SKILLS
+from domains.fetch_skills.hand import Hand
+from domains.fetch_skills.platform import Mapper, PathPlanner
 from dsc.components.component import Component
 from dsc.sequencer.run_end import RunEnd
 from knowledge_base.facts import Delta, fact
@@ -32,6 +35,8 @@ class ButlerFlat(Simulation):
     """
 
     reads_scenarios = True
+    turning = 0.0
+    """Seconds of a turn on the spot."""
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
@@ -44,12 +49,12 @@ class ButlerFlat(Simulation):
         """Return the components of the butler."""
         says = self.scenario.says
         speech = Speech(from_prompt(sys.stdin) if says == "prompt" else from_list(says), self.said.append)
-        return [speech, Mapper(), PathPlanner(self.flat), Base(self.flat, self.fault), Gripper(self.flat, self.fault)]
+        butler = Butler(self.flat, self.fault, self.turning)
+        return [speech, Mapper(), PathPlanner(butler), Base(butler, self.flat, self.fault), Hand(butler)]
 
     def knowledge(self) -> Delta:
         """Return the places with their coordinates (S4.14), and the items as they were last seen."""
-        spots = {**{name: room.middle for name, room in ROOMS.items()}, **FURNITURE}
-        values = {fact(axis, name): at[n] for name, at in spots.items() for n, axis in enumerate("xy")}
+        values = {fact(axis, name): at[n] for name, at in spots().items() for n, axis in enumerate("xy")}
         nodes = {**dict.fromkeys(ROOMS, "room"), **dict.fromkeys(FURNITURE, "furniture")}
         nodes |= dict.fromkeys(self.flat.items, "item")
         items = tuple([fact("item-at", item, place) for item, place in self.flat.items.items()])
@@ -82,11 +87,9 @@ class ButlerFlat(Simulation):
 
 
 class ButlerOnTracks(ButlerFlat):
-    """The same flat with a robot on tracks."""
+    """The same flat with a robot on tracks, which turns on the spot before each line."""
 
-    def components(self) -> Iterable[Component]:
-        """Return the components of the robot on tracks."""
-        return [Tracks(self.flat, self.fault) if isinstance(one, Base) else one for one in super().components()]
+    turning = 4.0
 
 
 def bundle() -> Bundle:
@@ -95,6 +98,7 @@ def bundle() -> Bundle:
         FOLDER,
         name=NAME,
         about="obey spoken commands in a flat: go to a room or an object, follow, fetch",
+        needs=(FETCH_SKILLS,),
         main="serve",
         simulation=ButlerFlat,
         robots={"on_wheels": ButlerFlat, "on_tracks": ButlerOnTracks},

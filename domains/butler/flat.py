@@ -46,12 +46,17 @@ ITEMS = {"juice": "fridge", "book": "shelf", "cup": "table"}
 HOME = "hall"
 
 
+def spots() -> dict[str, Point]:
+    """Return the position of each location: the middle of a room, or a piece of furniture."""
+    return {**{name: room.middle for name, room in ROOMS.items()}, **FURNITURE}
+
+
 class Flat:
     """The state of the flat.
 
     Attributes:
         robot: position of the robot in metres.
-        items: the place of each item: furniture, `robot` or `person`.
+        items: the place of each item: a location, `robot` or `person`.
         closed: doors that are closed, by their rooms.
         person: the person who walks through the flat, and the places where this person stops.
     """
@@ -106,7 +111,7 @@ class Flat:
             things.append({"id": name, "shape": "room", "x": x, "y": y, "label": name, **size})
         for name, (x, y) in FURNITURE.items():
             things.append({"id": name, "shape": "furniture", "x": x, "y": y, "label": name, "width": 0.7, "depth": 0.4})
-        at = {**FURNITURE, "robot": self.robot, "person": self.person}
+        at = {**spots(), "robot": self.robot, "person": self.person}
         for name, place in self.items.items():
             inside = {"in": "robot"} if place == "robot" else {}
             things.append({"id": name, "shape": "item", "x": at[place][0], "y": at[place][1], "label": name, **inside})

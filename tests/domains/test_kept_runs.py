@@ -209,7 +209,10 @@ def test_the_command_ends_an_unfinished_run(whole, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["run"], "a run needs a robot, or a store to --resume; valid: arm-skills, butler, clean-up-table, waving"),
+        (
+            ["run"],
+            "a run needs a robot, or a store to --resume; valid: arm-skills, butler, clean-up-table, fetch-skills, waving",
+        ),
         (
             ["run", "--resume", "x.kb", "--seed", "1"],
             "--resume continues a run as it began, without --seed",

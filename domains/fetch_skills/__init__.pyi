@@ -1,0 +1,9 @@
+from domains.fetch_skills.bringup import bundle as bundle
+from domains.fetch_skills.drivers import HandDriver as HandDriver
+from domains.fetch_skills.drivers import PathFinder as PathFinder
+from domains.fetch_skills.drivers import PlatformDriver as PlatformDriver
+from domains.fetch_skills.drivers import Point as Point
+from domains.fetch_skills.hand import Hand as Hand
+from domains.fetch_skills.platform import Mapper as Mapper
+from domains.fetch_skills.platform import PathPlanner as PathPlanner
+from domains.fetch_skills.platform import Platform as Platform
