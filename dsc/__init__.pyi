@@ -5,6 +5,11 @@ from dsc.calls import SkillCall as SkillCall
 from dsc.calls import Status as Status
 from dsc.chance import uniform as uniform
 from dsc.components.assembly import component_of as component_of
+from dsc.components.clients import EventClient as EventClient
+from dsc.components.clients import ParameterClient as ParameterClient
+from dsc.components.clients import QueryClient as QueryClient
+from dsc.components.clients import SendClient as SendClient
+from dsc.components.clients import StateClient as StateClient
 from dsc.components.component import ALWAYS as ALWAYS
 from dsc.components.component import Component as Component
 from dsc.components.life_cycle import Life as Life
@@ -20,6 +25,7 @@ from dsc.conversions import conversion as conversion
 from dsc.dynamic.library import Library as Library
 from dsc.engine.machine import Machine as Machine
 from dsc.errors import ChangedError as ChangedError
+from dsc.errors import NotWiredError as NotWiredError
 from dsc.errors import PlotError as PlotError
 from dsc.errors import ProgrammingError as ProgrammingError
 from dsc.errors import RunawayError as RunawayError

@@ -79,6 +79,10 @@ class NoAnswerError(SkillError):
     """No answer arrived in time: the other endpoint has ended, is late, or is unreachable."""
 
 
+class NotWiredError(SkillError):
+    """A required port has no provider, or its wire was cut during a call."""
+
+
 class RefusedError(SkillError):
     """The other endpoint could not execute a call; the message has its reason."""
 

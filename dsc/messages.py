@@ -67,6 +67,19 @@ class ParameterMessage:
 
 
 @dataclass(frozen=True, slots=True)
+class WireMessage:
+    """An operator's wire of a required port.
+
+    Attributes:
+        port: the required port, as `component.port`.
+        to: the provided port, as `component.port`, or a component; `None` cuts the wire.
+    """
+
+    port: str
+    to: str | None
+
+
+@dataclass(frozen=True, slots=True)
 class LateMessage:
     """A message from outside that was scheduled; `number` distinguishes it from other scheduled messages."""
 
@@ -74,9 +87,9 @@ class LateMessage:
     number: int
 
 
-FromOutside = Event | KnowledgeMessage | ParameterMessage
+FromOutside = Event | KnowledgeMessage | ParameterMessage | WireMessage
 """Messages from outside of the run."""
-Message = SkillMessage | TimerMessage | KnowledgeMessage | ParameterMessage | LateMessage | SendLater | Event
+Message = SkillMessage | TimerMessage | FromOutside | LateMessage | SendLater
 """Messages that the sequencer handles; a `SendLater` is the chart's own delayed event."""
 Told = SetParameter | SwitchMode | SendMessage
 """Commands to components without an answer: parameters, modes and messages."""

@@ -6,21 +6,22 @@ from collections.abc import Iterable
 
 from dsc.components.component import Component
 from dsc.components.declarations import known
+from dsc.components.wiring import choose_sources
 from dsc.model.ranges import refuse_change
 from dsc.text.profiles import Profile, unknown_in
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Value
 
 
 def configure(components: Iterable[Component], profile: Profile | None = None) -> None:
-    """Set the components' parameters to the values of the profile.
+    """Set the components' parameters to the values of the profile, and the sources of their required ports.
 
     Args:
         components: the components of one robot; each instance has separate values.
         profile: the settings. A parameter that they omit has its default, or the value that the program has set.
 
     Raises:
-        UnknownNameError: a component or parameter of the profile does not exist.
+        UnknownNameError: a component, parameter or required port of the profile does not exist.
         SchemaError: a value has another type, is out of range, or may not be set by a profile. The error is also raised
             if a relation between parameters is violated, or a parameter has no value. The message has the place and the
             range.
@@ -33,6 +34,12 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
     values = {name: _configured(component, profile) for name, component in by_name.items()}
     for name, component in by_name.items():
         component.configuration.replace(values[name])
+    if profile is not None:
+        try:
+            choose_sources(by_name.values(), profile.wiring)
+        except UnknownNameError as error:
+            error.place = profile.place(("wiring", str(error.found)))
+            raise
 
 
 def _configured(component: Component, profile: Profile | None) -> dict[str, Value]:

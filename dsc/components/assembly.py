@@ -15,7 +15,6 @@ from dsc.components.hooks import contained
 from dsc.components.life_cycle import NEUTRAL, LifeCycle
 from dsc.components.parameters import Configuration, Parameters
 from dsc.components.ports import EventActivations
-from dsc.components.streams import Push, Stream, require_fitting
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
 from knowledge_base.language.checking.inputs import require_several, shown
@@ -152,7 +151,7 @@ _OF_EVERY_COMPONENT = {
     "life": LifeCycle,
     "activations": EventActivations,
     "pushes": dict,
-    "streams": dict,
+    "requirements": dict,
 }
 
 
@@ -242,8 +241,10 @@ def require_deployed(components: Collection[Component], besides: Iterable[str] =
     for component in components:
         if type(component).reach is not Component.reach:  # the component may find required components elsewhere
             continue
-        for needed in (*component.needed(), *(name for names in component.needs.values() for name in names)):
-            if needed not in deployed:
+        declared = [name for names in component.needs.values() for name in names]
+        in_use = component.needed() if type(component).needed is not Component.needed else ()
+        for needed in (*in_use, *declared):
+            if needed not in deployed and needed not in component.requirements:
                 message = f"component '{component.name}' needs a component '{needed}', and there is none"
                 place = place_of(type(component))
                 raise UnknownNameError(message, found=needed, valid=deployed - {component.name}, place=place)
@@ -251,61 +252,3 @@ def require_deployed(components: Collection[Component], besides: Iterable[str] =
 
 _EXAMPLE_OF_MODES = "modes = ('scanning',) or modes = {'scanning': ('parked',), 'parked': ()}"
 _EXAMPLE = "needs = {'scanning': ('power',)}"
-
-
-class Wiring:
-    """Connections between the streams and push ports of deployed components, also of those deployed late.
-
-    Raises:
-        UnknownNameError: a stream requires a port, or a value of a port, that the publisher lacks.
-        SchemaError: a value has another type than in the stream.
-    """
-
-    def __init__(self, components: Mapping[str, Component]) -> None:
-        self._components = components
-        self._connected: dict[Stream, Push] = {}
-        self._connect()
-
-    def deployed(self, component: Component) -> None:
-        """Connect a newly deployed component, which may replace another one."""
-        self._disconnect(component.name)
-        self._connect()
-
-    def close(self) -> None:
-        """Disconnect all streams."""
-        self._disconnect()
-
-    def _disconnect(self, publisher: str | None = None) -> None:
-        for stream in [one for one in self._connected if publisher in {None, one.publisher}]:
-            self._connected.pop(stream).leave(stream.receive)
-
-    def _connect(self) -> None:
-        for stream in [stream for component in self._components.values() for stream in component.streams.values()]:
-            publisher = self._components.get(stream.publisher)
-            if publisher is not None and stream not in self._connected:
-                self._connected[stream] = port = _port_for(stream, publisher)
-                port.listen(stream.receive)
-
-
-def require_wired(components: Iterable[Component]) -> None:
-    """Raise an error unless the components have the push ports that their streams require.
-
-    Raises:
-        UnknownNameError: there is no such component, port or value.
-        SchemaError: a value has another type than in the stream.
-    """
-    deployed = {component.name: component for component in components}
-    for component in deployed.values():
-        for stream in component.streams.values():
-            if stream.publisher not in deployed:
-                message = f"component '{component.name}' takes '{stream.source}', and there is no such component"
-                raise UnknownNameError(message, found=stream.publisher, valid=deployed)
-            _port_for(stream, deployed[stream.publisher])
-
-
-def _port_for(stream: Stream, publisher: Component) -> Push:
-    if stream.port not in publisher.pushes:
-        message = f"component '{publisher.name}' has no push port '{stream.port}'"
-        raise UnknownNameError(message, found=stream.port, valid=publisher.pushes)
-    require_fitting(stream.source, stream.values, publisher.pushes[stream.port].values)
-    return publisher.pushes[stream.port]

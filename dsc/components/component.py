@@ -16,7 +16,9 @@ from dsc.components.interface import Interface
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
 from dsc.components.parameters import Configuration, Parameters
 from dsc.components.ports import TAKES, EventActivations, messages, plain_methods
-from dsc.components.streams import Push, Stream
+from dsc.components.requirement import Requirement
+from dsc.components.services import Service
+from dsc.components.streams import Push
 from dsc.components.turns import Turns
 from dsc.data_types import check_all, data_type
 from dsc.model.plot import ActionPlot
@@ -42,7 +44,8 @@ class ComponentHooks:
         device_errors: exceptions that report a failed device, e.g. `(OSError,)`: a skill that raises one ends with
             `skill_error`, and a hook leads to FatalError. Every other exception is a programming error.
         period: seconds between two calls of `step`; `None` without such steps.
-        needs: for each mode, a tuple of names of required components; the key `ALWAYS` applies in every mode.
+        needs: for each mode, a tuple of names of required components, or of the component's required ports, whose
+            providers it then needs; the key `ALWAYS` applies in every mode.
         parameters: the present values. A component declares its parameters by a subclass: `parameters: BaseParameters`;
             without one, any name is valid.
         life: the life cycle. When the device is lost, call `self.life.become(Life.FATAL_ERROR, "no power")`.
@@ -148,11 +151,13 @@ class Component(ComponentHooks, RestartHooks):
         activations: the activations of the component's events.
         parameter_class: the class in the annotation of `parameters`.
         pushes: the push ports, by name; see `dsc.components.streams`.
-        streams: the subscriptions to push ports of other components, by name.
+        requirements: the required ports, by name; see `dsc.components.clients` and `Stream`.
     """
 
     parameter_class: ClassVar[type[Parameters]] = Parameters
-    _ports: ClassVar[Mapping[str, Push | Stream]] = {}
+    _ports: ClassVar[Mapping[str, Push | Requirement]] = {}
+    _required: ClassVar[Mapping[str, Service]] = {}
+    _offered: ClassVar[Mapping[str, Service]] = {}
     _functions: Mapping[str, SkillBody] = {}  # skills that are functions, by name
 
     def __init_subclass__(cls, **named: Any) -> None:
@@ -167,7 +172,9 @@ class Component(ComponentHooks, RestartHooks):
             elif "parameters" in vars(cls):
                 cls.parameter_class = vars(cls)["parameters"]
                 raise SchemaError(f"`parameters` of {cls.__qualname__} is an annotation: `parameters: BaseParameters`")
-        cls._ports = {name: one for name, one in inspect.getmembers(cls) if isinstance(one, Push | Stream)}
+        cls._ports = {name: one for name, one in inspect.getmembers(cls) if isinstance(one, Push | Requirement)}
+        cls._required = {name: one.service for name, one in cls._ports.items() if isinstance(one, Requirement)}
+        cls._offered = {name: one.service for name, one in cls._ports.items() if isinstance(one, Push)}
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
@@ -177,14 +184,14 @@ class Component(ComponentHooks, RestartHooks):
         self.activations = EventActivations()
         self.turns = Turns()
         self.pushes: dict[str, Push] = {}
-        self.streams: dict[str, Stream] = {}
+        self.requirements: dict[str, Requirement] = {}
         for port, declared in self._ports.items():
             if isinstance(declared, Push):
                 self.pushes[port] = Push(declared.values, declared.period, f"{self.name}.{port}", self.life)
                 setattr(self, port, self.pushes[port])
             else:
-                self.streams[port] = Stream(declared.source, declared.values)
-                setattr(self, port, self.streams[port])
+                self.requirements[port] = declared.of(self.name, port)
+                setattr(self, port, self.requirements[port])
 
     @property
     def mode(self) -> str:
@@ -199,8 +206,23 @@ class Component(ComponentHooks, RestartHooks):
         """Begin to watch a device in another program before the first run, or end after the last run."""
 
     def needed(self) -> tuple[str, ...]:
-        """Return the names of required components in the present mode; override if needs depend on other values."""
-        return tuple(dict.fromkeys((*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))))
+        """Return the names of required components in the present mode; override if needs depend on other values.
+
+        The name of a required port stands for its provider.
+
+        Raises:
+            NotWiredError: a port without a source is not wired.
+        """
+        named = (*self.needs.get(ALWAYS, ()), *self.needs.get(self.mode, ()))
+        return tuple(dict.fromkeys(self._component_for(name) for name in named))
+
+    def _component_for(self, name: str) -> str:
+        port = self.requirements.get(name)
+        if port is None:
+            return name
+        if port.provider is None and port.source is not None:
+            return port.source.partition(".")[0]  # it may be deployed later
+        return port.require_wired().component.name
 
     async def reach(self, name: str) -> Component:  # noqa: ARG002
         """Wait for a required component that is not deployed in this process.
@@ -306,7 +328,13 @@ class Component(ComponentHooks, RestartHooks):
         """Return the parameters, modes and messages for the checks of charts before a run."""
         own = type(self).receive is Component.receive
         methods = plain_methods(type(self)) - plain_methods(Component)
-        return Interface(self.parameters.declared, self.modes, self._taken() if own else None, methods)
+        messages = self._taken() if own else None
+        return Interface(self.parameters.declared, self.modes, messages, methods, self._required, self._push_services())
+
+    def _push_services(self) -> Mapping[str, Service]:
+        if self.pushes.keys() == self._offered.keys():
+            return self._offered
+        return {name: port.service for name, port in self.pushes.items()}
 
     def update(self, event: str, *values: Any) -> None:
         """Pass new values to the test of each activation of the event; later activations begin with these values.
@@ -341,7 +369,9 @@ class Component(ComponentHooks, RestartHooks):
             "needs": list(self.needed()),
             "skills": sorted(self.skills()),
             "pushes": sorted(self.pushes),
-            "streams": {name: stream.source for name, stream in self.streams.items()},
+            "wires": {
+                name: None if port.provider is None else port.provider.name for name, port in self.requirements.items()
+            },
             "steps": asdict(self.life.steps),
         }
 

@@ -1,12 +1,13 @@
-"""Interface of a component besides its skills: what charts may set, switch and send, for the checks before a run."""
+"""Interface of a component: what charts may set, switch, send and wire, and its provided and required services."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from dsc.components.declarations import Parameter
 from dsc.components.life_cycle import NEUTRAL, Life
+from dsc.components.services import Service
 from dsc.skills import SkillSignature
 from knowledge_base.errors import UnknownNameError
 
@@ -20,18 +21,44 @@ class Interface:
         modes: the declared modes; empty permits any mode.
         messages: the parts of each message by the message's name; `None` permits any message.
         methods: the public methods that charts cannot use, as they have no decorator.
+        requires: the services of the required ports, by port.
+        pushes: the services of the push ports, by port.
     """
 
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     modes: Collection[str] = ()
     messages: Mapping[str, SkillSignature] | None = None
     methods: Collection[str] = ()
+    requires: Mapping[str, Service] = field(default_factory=dict)
+    pushes: Mapping[str, Service] = field(default_factory=dict)
 
     def require_mode(self, component: str, mode: str) -> None:
         """Raise `UnknownNameError` for a mode, or state of the life cycle, that charts cannot switch to."""
         if self.modes and mode not in (NEUTRAL, *self.modes, Life.INIT, Life.SHUTDOWN):
             valid = (NEUTRAL, *self.modes)
             raise UnknownNameError(f"component '{component}' has no mode '{mode}'", found=mode, valid=valid)
+
+    def require_port(self, component: str, port: str) -> Service:
+        """Return the service of a required port; raise `UnknownNameError` if the component requires no such port."""
+        if port not in self.requires:
+            message = f"component '{component}' requires no port '{port}'"
+            raise UnknownNameError(message, found=port, valid=self.requires)
+        return self.requires[port]
+
+    def services(self, skills: Iterable[SkillSignature]) -> Iterator[tuple[str, Service]]:
+        """Yield the provided services with their ports; parameters and modes have an empty port.
+
+        Args:
+            skills: the skills of the component, with its queries and events.
+        """
+        yield from self.pushes.items()
+        for skill in (*skills, *(self.messages or {}).values()):
+            if skill.pattern != "skill":
+                yield skill.name, _service_of(skill)
+        if self.parameters:
+            yield "", Service("parameters", {name: one.type for name, one in self.parameters.items()}, {})
+        if self.modes:
+            yield "", Service("modes", dict.fromkeys(self.modes), {})
 
     def remedy(self, decorator: str, component: str, method: str) -> str:
         """Return the advice to decorate a method that charts cannot use; empty if there is no such method."""
@@ -48,3 +75,16 @@ class Interface:
         if self.messages is not None and port not in self.messages:
             raise UnknownNameError(f"component '{component}' takes no '{port}'", found=port, valid=self.messages)
         return None if self.messages is None else self.messages[port]
+
+
+def _service_of(signature: SkillSignature) -> Service:
+    """Return the service of a query, an event or a message."""
+    gives = next(iter(signature.outcomes.values()), {})
+    defaults = frozenset(signature.defaults)
+    match signature.pattern:
+        case "query":
+            return Service("query", signature.parameters, gives, defaults)
+        case "event":
+            return Service("event", signature.parameters, gives, defaults)
+        case _:
+            return Service("send", signature.parameters, {}, defaults)

@@ -5,23 +5,23 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
 from dsc.components.frames import encoded
 from dsc.components.life_cycle import Life, LifeCycle
+from dsc.components.requirement import Provider, Requirement
+from dsc.components.services import Service, Values, declared_values
 from dsc.data_types import data_type
-from dsc.errors import NoAnswerError
+from dsc.errors import NoAnswerError, NotWiredError
 from dsc.loop_calls import LoopCalls
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
 
-Values = Mapping[str, str | None]
-"""Names of pushed values with types, see `dsc.data_types`; `None` accepts any plain data."""
 Receiver = Callable[[dict[str, Any], float], None]
 """Function that receives pushed values, as a separate copy, and their age: the seconds since their `put`."""
-_EXAMPLE = "{'metres': 'number'}"
 
 
 class Push:
@@ -44,7 +44,7 @@ class Push:
     def __init__(
         self, values: Values, period: float | None = None, name: str = "", life: LifeCycle | None = None
     ) -> None:
-        self.values = _checked(values, "a push port")
+        self.values = declared_values(values, "a push port")
         if period is not None and not (isinstance(period, int | float) and 0 < period < math.inf):
             raise InputError(f"the period of a push port is a positive number of seconds, not {shown(period)}")
         self.period = period
@@ -55,6 +55,11 @@ class Push:
         self._listeners: dict[Receiver, None] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._calls = LoopCalls()
+
+    @property
+    def service(self) -> Service:
+        """The service of the port."""
+        return Service("push", {}, self.values)
 
     def __getstate__(self) -> dict[str, object]:
         """Return the state for pickling, without listeners, which stay in this process."""
@@ -125,37 +130,61 @@ class Push:
         self._start_timer()
 
 
-class Stream:
-    """A component's subscription to a push port of another component, which must also be among its `needs`.
+class Stream(Requirement):
+    """A required push port: the newest values of another component's port.
+
+    A component that lists the name of the stream in its `needs` keeps the publisher active.
 
     Args:
-        source: the port, as `component.port`.
-        values: names and types of the required values.
+        values: names and types of the wanted values.
+        source: the publisher's port as `component.port`, unless the profile names another one.
+        period: the shortest time in seconds between two values; earlier values are replaced by newer ones (*push
+            timed*, with a period of the subscriber's choice).
+        timeout: seconds after which `next` without `within` ends with `NoAnswerError`.
+        keep: the number of values that wait for `take_kept`; the oldest are dropped. 0 keeps none.
+        optional: whether the component also works without a publisher.
 
     Attributes:
-        source: the port, as `component.port`.
-        values: names and types of the required values.
         value: the newest values; `None` before the first.
         problem: returns the known reason why no values arrive, or `None`.
 
     Raises:
-        InputError: the source is not `component.port`, or the values are not names with types.
+        InputError: the source is not `component.port`, the values are not names with types, or a number is invalid.
     """
 
-    def __init__(self, source: str, values: Values) -> None:
-        self.publisher, _, self.port = source.partition(".") if isinstance(source, str) else ("", "", "")
-        if not self.publisher or not self.port:
-            raise InputError(f"a stream comes from a port, as in 'laser.scan', not {shown(source)}")
-        self.source = source
-        self.values = _checked(values, "a stream")
+    what = "a stream"
+
+    def __init__(
+        self,
+        values: Values,
+        source: str | None = None,
+        *,
+        period: float | None = None,
+        timeout: float | None = None,
+        keep: int = 0,
+        optional: bool = False,
+    ) -> None:
+        super().__init__(Service("push", {}, declared_values(values, self.what)), source, optional=optional)
+        for name, seconds in (("period", period), ("timeout", timeout)):
+            if seconds is not None and not (isinstance(seconds, int | float) and 0 < seconds < math.inf):
+                raise InputError(f"the {name} of a stream is a positive number of seconds, not {shown(seconds)}")
+        self.period = period
+        self.timeout = timeout
+        self.keep = keep
         self.value: dict[str, Any] | None = None
         self.problem: Callable[[], str | None] = _no_problem
         self._at = -math.inf
         self._waiting: set[asyncio.Future[None]] = set()
+        self._kept: deque[dict[str, Any]] = deque(maxlen=keep)
+        self._taken = -math.inf  # loop time of the last value that was taken
+        self._held: tuple[dict[str, Any], float] | None = None  # a value that waits for the period, and its loop time
+        self._timer: asyncio.TimerHandle | None = None
 
     def __getstate__(self) -> dict[str, object]:
         """Return the state for pickling, without waiting tasks, which stay in this process."""
-        return {**self.__dict__, "_waiting": set(), "problem": _no_problem}
+        state = dict(super().__getstate__())
+        mine: dict[str, object] = {"_waiting": set(), "_kept": deque(maxlen=self.keep), "_timer": None, "_held": None}
+        return {**state, **mine, "problem": _no_problem}
 
     @property
     def age(self) -> float:
@@ -166,44 +195,81 @@ class Stream:
         """
         return _now() - self._at
 
-    async def next(self, within: float) -> dict[str, Any]:
-        """Wait for the next push and return its values; raise `NoAnswerError` after `within` seconds."""
+    async def next(self, within: float | None = None) -> dict[str, Any]:
+        """Wait for the next push and return its values.
+
+        Raises:
+            NoAnswerError: nothing has come after `within` seconds, or after `timeout`.
+            NotWiredError: the wire was cut.
+            InputError: neither `within` nor `timeout` is given.
+        """
+        seconds = self.timeout if within is None else within
+        if seconds is None:
+            raise InputError(f"`next` of '{self.name}' needs a time: next(within=1), or Stream(..., timeout=1)")
         coming: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._waiting.add(coming)
         try:
-            async with asyncio.timeout(within):
-                await coming
+            await asyncio.wait_for(coming, seconds)
         except TimeoutError:
             why = self.problem()
-            message = f"nothing has come from '{self.source}' within {within:g} s"
+            message = f"nothing has come from {self._origin()} within {seconds:g} s"
             raise NoAnswerError(f"{message}: {why}" if why else message) from None
         finally:
             self._waiting.discard(coming)
         assert self.value is not None  # noqa: S101
         return self.value
 
+    def take_kept(self) -> list[dict[str, Any]]:
+        """Return the values since the last call, the oldest first; at most `keep` values."""
+        kept = list(self._kept)
+        self._kept.clear()
+        return kept
+
     def receive(self, value: dict[str, Any], age: float) -> None:
         """Store pushed values that are `age` seconds old, and resume the tasks that wait for them."""
-        self.value = value
-        self._at = _now() - age
+        due = 0.0 if self.period is None else self._taken + self.period - _now()
+        if due <= 0:
+            self._take(value, _now() - age)
+            return
+        self._held = value, _now() - age
+        if self._timer is None:
+            self._timer = asyncio.get_running_loop().call_later(due, self._take_held)
+
+    def _take_held(self) -> None:
+        self._timer = None
+        if self._held is not None:
+            self._take(*self._held)
+
+    def _take(self, value: dict[str, Any], at: float) -> None:
+        self.value, self._at, self._taken, self._held = value, at, _now(), None
+        if self.keep:
+            self._kept.append(value)
         for coming in self._waiting:
             if not coming.done():
                 coming.set_result(None)
 
+    def connect(self, provider: Provider) -> None:
+        """Receive the values of a push port from now on."""
+        if self.provider != provider:
+            super().connect(provider)
+            provider.component.pushes[provider.port].listen(self.receive)
 
-def require_fitting(source: str, wanted: Values, offered: Values) -> None:
-    """Raise an error unless a port pushes the values of a stream.
+    def disconnect(self) -> None:
+        """Receive no values any longer; the newest ones stay known, and `next` ends with `NotWiredError`."""
+        provider = self.provider
+        super().disconnect()
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if provider is not None:
+            provider.component.pushes[provider.port].leave(self.receive)
+            for coming in self._waiting:
+                if not coming.done():
+                    coming.set_exception(NotWiredError(f"the wire of '{self.name}' to '{provider.name}' was cut"))
 
-    Raises:
-        UnknownNameError: the port lacks a value.
-        SchemaError: a value of the port has another type.
-    """
-    for name, kind in wanted.items():
-        if name not in offered:
-            raise UnknownNameError(f"'{source}' pushes no '{name}'", found=name, valid=offered)
-        if kind is not None and offered[name] != kind:
-            found = offered[name] or "plain data of any type"
-            raise SchemaError(f"'{source}' pushes '{name}' as {found}, and {kind} is wanted", found=name)
+    def _origin(self) -> str:
+        named = self.source if self.provider is None else self.provider.name
+        return f"'{self.name}', which is not wired" if named is None else f"'{named}'"
 
 
 def _now() -> float:
@@ -212,12 +278,3 @@ def _now() -> float:
 
 def _no_problem() -> None:
     """Return `None`: the publisher has not refused the subscription."""
-
-
-def _checked(values: object, what: str) -> Values:
-    if not isinstance(values, Mapping) or not all(
-        isinstance(name, str) and name.isidentifier() and (kind is None or isinstance(kind, str))
-        for name, kind in values.items()
-    ):
-        raise InputError(f"the values of {what} are names with types, as in {_EXAMPLE}, not {shown(values)}")
-    return {name: None if kind is None else str(data_type(kind)) for name, kind in values.items()}

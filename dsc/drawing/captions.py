@@ -20,6 +20,8 @@ from dsc.model.actions import (
     Switch,
     Tell,
     Trigger,
+    Unwire,
+    Wire,
     Withdraw,
 )
 from dsc.model.declarations import PlotParameter, PlotVariable
@@ -218,14 +220,6 @@ def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> st
             return ", ".join(f"{name} := {term_text(value)}" for name, value in values.items())
         case Tell(tell=effect):
             return f"tell {to_text(effect)}"
-        case Trigger(trigger=skill, arguments=arguments, within=within):
-            return f"{skill}{_values(arguments)}" + (f" within {within:g} s" if within is not None else "")
-        case Configure(set=parameter, to=value):
-            return f"{parameter} := {term_text(value)}"
-        case Send(send=port, arguments=arguments):
-            return f"{port}!{_values(arguments)}"
-        case Switch(switch=component, to=mode):
-            return f"{component} → {mode}"
         case Withdraw(withdraw=sent):
             return f"withdraw {to_text(sent)}"
         case Log(log=parts):
@@ -235,6 +229,24 @@ def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> st
             return f"if {to_text(condition)} {{{branches[0]}}} else {{{branches[1]}}}"
         case Block(block=inside):
             return f"{{{', '.join(map(action_text, inside))}}}"
+        case _:
+            return _command_text(action)
+
+
+def _command_text(action: ExternalAction) -> str:
+    match action:
+        case Trigger(trigger=skill, arguments=arguments, within=within):
+            return f"{skill}{_values(arguments)}" + (f" within {within:g} s" if within is not None else "")
+        case Configure(set=parameter, to=value):
+            return f"{parameter} := {term_text(value)}"
+        case Send(send=port, arguments=arguments):
+            return f"{port}!{_values(arguments)}"
+        case Switch(switch=component, to=mode):
+            return f"{component} → {mode}"
+        case Wire(wire=port, to=provider):
+            return f"{port} ⇠ {term_text(provider)}"
+        case Unwire(unwire=port):
+            return f"unwire {port}"
 
 
 def _values(arguments: Mapping[str, Term]) -> str:

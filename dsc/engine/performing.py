@@ -28,6 +28,8 @@ from dsc.model.actions import (
     Switch,
     Tell,
     Trigger,
+    Unwire,
+    Wire,
     Withdraw,
 )
 from dsc.model.data_forms import Values, is_literal, literal_value
@@ -180,6 +182,12 @@ class Performer:
                 return steps.SendMessage(component, port, self.values(frame, action.arguments), activation)
             case Switch():
                 return steps.SwitchMode(action.switch, action.to, activation)
+            case Wire():
+                component, port = action.wire.split(".")
+                return steps.SetWire(component, port, str(self.value(frame, action.to)), activation)
+            case Unwire():
+                component, port = action.unwire.split(".")
+                return steps.SetWire(component, port, None, activation)
 
     def _perform(self, frame: Frame, state: str, action: Internal) -> None:
         match action:

@@ -18,19 +18,14 @@ from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
 from dsc.engine.transition_selection import EntrySet, domain, left_by
 from dsc.events import DONE
 from dsc.model.actions import (
-    Assign,
     Block,
     Choose,
-    Configure,
     Emit,
     ExternalAction,
     Internal,
-    Log,
-    Send,
-    Switch,
-    Tell,
     Trigger,
-    Withdraw,
+    Unwire,
+    Wire,
 )
 from dsc.model.states import FinalState, HistoryState, State
 
@@ -47,7 +42,7 @@ class Exit:
     Attributes:
         node: the node to exit.
         actions: the exit actions of the node.
-        cancels: whether the node may have started skills or timers, which the exit cancels.
+        cancels: whether the node may have skills, timers or wires, which the exit ends.
     """
 
     node: StateNode
@@ -250,7 +245,7 @@ class _Work:
         exits = []
         for node in ordered:
             actions = node.exit if node.index in own else node.broken
-            cancels = node.timed or any(isinstance(action, Trigger) for action in node.entry)
+            cancels = node.timed or any(isinstance(action, Trigger | Wire | Unwire) for action in node.entry)
             exits.append(Exit(node, self._settled(actions), cancels))
             self.present.discard(node.index)
             self.waiting.discard(node.index)
@@ -296,7 +291,7 @@ class _Work:
                 return action.model_copy(update={"condition": settled, **branches})
             case Block(block=inside):
                 return action.model_copy(update={"block": self._settled(inside)})
-            case Assign() | Tell() | Emit() | Withdraw() | Log() | Trigger() | Configure() | Switch() | Send():
+            case _:
                 return action
 
     def _completed(self, node: StateNode) -> Iterator[int]:

@@ -84,6 +84,16 @@ class SendMessage:
 
 
 @dataclass(frozen=True, slots=True)
+class SetWire:
+    """Wire a required port of a component to a provider, or to none, until `activation` ends; 0 has no end."""
+
+    component: str
+    port: str
+    to: str | None
+    activation: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
 class StartTimer:
     """Send an event to an activation after `seconds`; `index` is the position among the state's timers of this event.
 
@@ -121,7 +131,7 @@ class Note:
     text: str
 
 
-Output = Start | Cancel | SetParameter | SwitchMode | SendMessage | StartTimer | SendLater | Revoke | Note
+Output = Start | Cancel | SetParameter | SwitchMode | SendMessage | SetWire | StartTimer | SendLater | Revoke | Note
 """One output of the machine: an external action, a timer, a delayed event or an entry for the trace."""
 
 

@@ -51,7 +51,23 @@ class Send(Frozen):
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
 
 
-ExternalAction = Trigger | Configure | Switch | Send
+class Wire(Frozen):
+    """Wire a component's required port to a provided one, until the state is left: `wire: map.scan`, `to: rear.scan`.
+
+    The provider is `component.port`, or a component whose only fitting port is meant (the *wiring* pattern, S1.18).
+    """
+
+    wire: str = Field(pattern=r"^[\w\-]+\.[\w\-]+$")
+    to: TermField
+
+
+class Unwire(Frozen):
+    """Cut the wire of a component's required port until the state is left; pending calls end (S1.18)."""
+
+    unwire: str = Field(pattern=r"^[\w\-]+\.[\w\-]+$")
+
+
+ExternalAction = Trigger | Configure | Switch | Send | Wire | Unwire
 """The external actions, which reach components, as a union of types."""
 
 
@@ -144,14 +160,14 @@ def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalActio
                 yield from flat((*then, *otherwise))
             case Block(block=inside):
                 yield from flat(inside)
-            case Assign() | Tell() | Emit() | Withdraw() | Log() | Trigger() | Configure() | Switch() | Send():
+            case _:
                 pass
 
 
 def component_of(action: ExternalAction | Internal) -> str | None:
     """Return the name of the component that an action reaches; `None` for an internal action."""
     match action:
-        case Trigger(trigger=port) | Configure(set=port) | Send(send=port):
+        case Trigger(trigger=port) | Configure(set=port) | Send(send=port) | Wire(wire=port) | Unwire(unwire=port):
             return port.partition(".")[0]
         case Switch(switch=name):
             return name

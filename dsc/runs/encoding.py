@@ -14,7 +14,7 @@ from typing import Any
 
 from dsc.calls import RECORDED
 from dsc.engine.machine_state import NOTHING, FrameState
-from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
+from dsc.engine.steps import SendLater, SendMessage, SetParameter, SetWire, Start, StartTimer, SwitchMode
 from dsc.events import NO_ATTRIBUTES, Event
 from dsc.messages import (
     FromOutside,
@@ -24,13 +24,14 @@ from dsc.messages import (
     ParameterMessage,
     SkillMessage,
     TimerMessage,
+    WireMessage,
 )
 from dsc.outcomes import Outcome
 from dsc.runs.tables import Form
 from dsc.skills import SkillSignature
 from knowledge_base.exchange import delta_form, delta_of
 
-Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode | SendMessage
+Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMode | SendMessage | SetWire
 """Pending items, which a restart needs.
 
 A parameter or mode is effective until it is set again. A message is pending until the component has received it.
@@ -110,7 +111,7 @@ def _full(value: Any, form: Callable[[str], Any]) -> Any:
 def message_form(message: Message, short: Shortener) -> Form:
     """Return a message as plain data; a skill's message refers to its action by the id."""
     match message:
-        case Event() | KnowledgeMessage() | ParameterMessage():
+        case Event() | KnowledgeMessage() | ParameterMessage() | WireMessage():
             return _outside_form(message, short)
         case SkillMessage():
             outcome = message.outcome
@@ -157,6 +158,8 @@ def _outside_form(message: FromOutside, short: Shortener) -> Form:
             return {"change": delta_form(message.delta), "author": message.author}
         case ParameterMessage():
             return {"set": _plain(message)}
+        case WireMessage():
+            return {"wire": _plain(message)}
 
 
 def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOutside:
@@ -165,6 +168,8 @@ def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOuts
             return KnowledgeMessage(delta_of(delta), author)
         case {"set": setting}:
             return ParameterMessage(**setting)
+        case {"wire": wire}:
+            return WireMessage(**wire)
         case _:
             return _event_of(form["event"], find)
 
@@ -185,7 +190,7 @@ def awaited_form(what: Awaited, short: Shortener) -> Form:
             return _plain(what) | {"value": short.short(what.value)}
         case SendMessage():
             return _plain(what) | {"arguments": short(what.arguments)}
-        case StartTimer() | SwitchMode():
+        case StartTimer() | SwitchMode() | SetWire():
             return _plain(what)
 
 
@@ -204,6 +209,8 @@ def awaited_of(  # noqa: PLR0911  a table by kind
             return StartTimer(**form)
         case "SwitchMode":
             return SwitchMode(**form)
+        case "SetWire":
+            return SetWire(**form)
         case "SendMessage":
             return SendMessage(**{**form, "arguments": full(form["arguments"], find)})
         case "LateMessage":

@@ -17,12 +17,22 @@ from dsc.engine.steps import (
     SendLater,
     SendMessage,
     SetParameter,
+    SetWire,
     Start,
     StartTimer,
     SwitchMode,
 )
 from dsc.events import Event
-from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage, Told
+from dsc.messages import (
+    KnowledgeMessage,
+    LateMessage,
+    Message,
+    ParameterMessage,
+    SkillMessage,
+    TimerMessage,
+    Told,
+    WireMessage,
+)
 from dsc.runs.encoding import Awaited, Shortener, awaited_form, events_form, frame_news
 from dsc.runs.kept import Kept
 from dsc.runs.tables import Form, SnapshotRow
@@ -142,7 +152,7 @@ class RunState:
     def take(self, message: Message) -> None:
         """Remove the pending item that the message ends, or count a report of it."""
         match message:
-            case Event() | KnowledgeMessage() | ParameterMessage():  # no pending item waits for them
+            case Event() | KnowledgeMessage() | ParameterMessage() | WireMessage():  # no pending item waits for them
                 pass
             case SkillMessage(start=start, final=False, conflated=conflated):
                 for place in self._places.get(_key(start), ()):
@@ -185,6 +195,9 @@ class RunState:
                     self.put(one, step, now, reactor.caused_by.get(one.action_id, 0))
                 case StartTimer() | SendLater():
                     self.put(one, step, now + one.seconds)
+                case SetWire():
+                    self._forget(_key(one))  # the state, or the operator, wires the port again
+                    self.put(one, step, now)
                 case SetParameter() | SwitchMode() | SendMessage():
                     self.put(one, step, now)
                 case Cancel():
@@ -237,7 +250,7 @@ class RunState:
             self._outbox[place] = what
             return
         self._places.setdefault(key, []).append(place)
-        if isinstance(what, Start | StartTimer):
+        if isinstance(what, Start | StartTimer | SetWire):
             self._activations.setdefault(what.activation, set()).add(key)
 
     def _cancel(self, key: _Key) -> None:
@@ -303,6 +316,8 @@ def _key(what: Awaited) -> _Key:
             name = f"{what.component} {what.parameter}"
         case SwitchMode():  # life cycle state and mode are effective together
             name = f"{what.component} {'life' if what.mode in (Life.INIT, Life.SHUTDOWN) else 'mode'}"
+        case SetWire():
+            name = f"{what.activation} {what.component} {what.port}"
         case SendMessage():  # each item separately
             name = f"{what.component} {what.port}"
     return type(what).__name__, name

@@ -12,15 +12,10 @@ from dsc.model.actions import (
     Assign,
     Block,
     Choose,
-    Configure,
     Emit,
     ExternalAction,
     Internal,
     Log,
-    Send,
-    Switch,
-    Tell,
-    Trigger,
     Withdraw,
 )
 from dsc.model.plot import ActionPlot, Scope, initial_of
@@ -259,7 +254,7 @@ def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -
                 _if(around, action)
             case Block():
                 raise NotExpressibleError("block", "only <onentry> and <onexit> are blocks")
-            case Tell() | Trigger() | Configure() | Switch() | Send():
+            case _:
                 raise NotExpressibleError(type(action).__name__.lower(), "SCXML knows no skills and no knowledge base")
 
 

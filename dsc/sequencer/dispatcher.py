@@ -15,11 +15,12 @@ from dataclasses import replace
 from typing import Any
 
 from dsc.calls import Clock, Ended, SkillCall, Status
-from dsc.components.assembly import Wiring, require_instances
+from dsc.components.assembly import require_instances
 from dsc.components.component import Component
 from dsc.components.hooks import abandon, active_component, bug_in, cancel_once, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.turns import Claim, Turns
+from dsc.components.wiring import Wiring
 from dsc.dynamic.library import Library
 from dsc.engine import steps
 from dsc.errors import UncertainActionError
@@ -95,7 +96,7 @@ class Dispatcher:
         self.outbox = Outbox(self._refused)
         self._lives = ComponentLives(self._components.values(), self._failed, self._recovered)
         self._undeployed = Undeployed(clock, post, self._refused, self._components.keys())
-        self._wiring = Wiring(self._components)
+        self._wiring = Wiring(self._components, self.activation.changed)
         self._faults: list[str] = []
         self._failures: dict[str, str] = {}  # reasons of the components that have failed and not recovered
         self._unreported: dict[str, list[str]] = {}  # reasons of failed components, which their skills may report
@@ -196,10 +197,18 @@ class Dispatcher:
                 self.timers.schedule(output, self._clock.now() + output.seconds)
             case steps.Revoke():
                 self.timers.revoke(output)
+            case steps.SetWire():
+                self._wire(output)
             case steps.SetParameter() | steps.SwitchMode() | steps.SendMessage():
                 self._send(output)
             case steps.Note():
                 pass  # the trace records notes
+
+    def _wire(self, wire: steps.SetWire) -> None:
+        try:
+            self._wiring.wire(f"{wire.component}.{wire.port}", wire.to, wire.activation)
+        except InputError as error:
+            self._refused(wire, error)
 
     def _send(self, told: Told) -> None:
         self.outbox.send(self.component(told.component), told)
@@ -500,7 +509,7 @@ class Dispatcher:
             return unconfigured
         return component.life.describe() + component.life.hook
 
-    def _refused(self, told: Told, error: Exception) -> None:
+    def _refused(self, told: Told | steps.SetWire, error: Exception) -> None:
         """Post an event for the state whose command has failed; at the end of the run, report the failure."""
         bug, failed = bug_in(error), f"{command(told)}: {reason_of(error)}"
         reason = " ".join((failed if bug is None else str(bug)).split())
@@ -558,9 +567,9 @@ class Dispatcher:
             _LOG.info("component '%s' could not forget the action '%s'", component.name, action_id)
 
     def _cancel(self, activation: int) -> None:
-        if self._undeployed:
-            self._undeployed.cancel(activation)
+        self._undeployed.cancel(activation)
         for running in tuple(self._running.values()):
             if running.start.activation == activation:
                 self.stop(running.start)
         self.timers.cancel(activation)
+        self._wiring.revert(activation)

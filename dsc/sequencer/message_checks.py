@@ -10,11 +10,12 @@ from typing import Any
 from dsc.calls import OBSERVED, RECORDED
 from dsc.components.component import Component
 from dsc.components.hooks import is_own, running_task
+from dsc.components.wiring import provider_for, required_port
 from dsc.data_types import WORDS, Records, check_all, data_type, objects_in
 from dsc.dynamic.library import Library
 from dsc.engine.steps import NO_CHANGE, Start
 from dsc.events import NO_ATTRIBUTES, PROGRAMMING_ERROR, RESERVED, SKILL_ERROR, TIMED_OUT, Event
-from dsc.messages import KnowledgeMessage, ParameterMessage, SkillMessage
+from dsc.messages import KnowledgeMessage, ParameterMessage, SkillMessage, WireMessage
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
 from dsc.run_log import run_logger
@@ -326,6 +327,22 @@ def checked_setting(
         raise UnknownNameError(f"there is no component or plot '{owner}'", found=owner, valid=valid)
     assert value is None or isinstance(value, str | int | float | bool)  # noqa: S101  # as every value of a range is
     return ParameterMessage(owner, name, value, of_plot=owner not in components)
+
+
+def checked_wire(port: str, to: str | None, components: Mapping[str, Component]) -> WireMessage:
+    """Return the message for an operator's wire.
+
+    Raises:
+        UnknownNameError: there is no such component or port.
+        InputError: the service does not fit.
+    """
+    require_text(port, "a required port")
+    if to is not None:
+        require_text(to, "a provided port")
+    owner, required = required_port(port, components)
+    if to is not None:
+        provider_for(required, owner, components, to)
+    return WireMessage(port, to)
 
 
 def checked_arguments(plot: ActionPlot, given: object, world: World, library: Library) -> Mapping[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any
 from dsc.components.component import Component
 from dsc.components.hooks import GRACE, contained, executes, reason_of
 from dsc.components.life_cycle import NEUTRAL, Life
-from dsc.engine.steps import SendMessage, SetParameter, Start, SwitchMode
+from dsc.engine.steps import SendMessage, SetParameter, SetWire, Start, SwitchMode
 from dsc.errors import ProgrammingError
 from dsc.messages import Told
 from dsc.run_log import run_logger
@@ -361,7 +361,7 @@ def failure(task: asyncio.Task[Any]) -> BaseException | None:
     return None if task.cancelled() else task.exception()
 
 
-def command(told: Told) -> str:
+def command(told: Told | SetWire) -> str:
     """Return a command as text, as it is in a plot."""
     match told:
         case SetParameter():
@@ -370,14 +370,18 @@ def command(told: Told) -> str:
             return f"switch {told.component} to '{told.mode}'"
         case SendMessage():
             return f"send {told.component}.{told.port}"
+        case SetWire(to=None):
+            return f"unwire {told.component}.{told.port}"
+        case SetWire():
+            return f"wire {told.component}.{told.port} to '{told.to}'"
 
 
-def port_of(told: Told) -> str:
+def port_of(told: Told | SetWire) -> str:
     """Return the port of a component that receives the command, as `arm.force`; the attribute `skill` of a failure."""
     match told:
         case SetParameter():
             return f"{told.component}.{told.parameter}"
         case SwitchMode():
             return f"{told.component}.switch"
-        case SendMessage():
+        case SendMessage() | SetWire():
             return f"{told.component}.{told.port}"

@@ -13,10 +13,29 @@ from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.machine_state import MachineState
-from dsc.engine.steps import NO_CHANGE, Cancel, Output, SendLater, SendMessage, SetParameter, Start, StartTimer, Step
+from dsc.engine.steps import (
+    NO_CHANGE,
+    Cancel,
+    Output,
+    SendLater,
+    SendMessage,
+    SetParameter,
+    SetWire,
+    Start,
+    StartTimer,
+    Step,
+)
 from dsc.errors import RunawayError
 from dsc.events import EVERY, PROGRAMMING_ERROR, RESERVED, SKILL_FAILURES, Event
-from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
+from dsc.messages import (
+    KnowledgeMessage,
+    LateMessage,
+    Message,
+    ParameterMessage,
+    SkillMessage,
+    TimerMessage,
+    WireMessage,
+)
 from dsc.runs.kept import Kept
 from dsc.sequencer.checked_plots import CheckedPlots
 from dsc.sequencer.phase_watch import PhaseWatch, described
@@ -166,6 +185,9 @@ class Reactor:
             said = message.message if isinstance(message, LateMessage) else message
             if isinstance(said, ParameterMessage) and not said.of_plot:
                 step = step._replace(output=(SetParameter(said.owner, said.name, said.value), *step.output))
+            elif isinstance(said, WireMessage):
+                component, _, port = said.port.partition(".")
+                step = step._replace(output=(SetWire(component, port, said.to), *step.output))
             in_vain = isinstance(message, TimerMessage) and step.state == before and _is_vain(step)
             if in_vain or self.in_vain:
                 self._note_periods(message, in_vain=in_vain)
@@ -221,6 +243,9 @@ class Reactor:
             if message.of_plot:
                 self._set_default(message)
                 self.trace.cause = self.tracer.set_default(message)
+            return None
+        if isinstance(message, WireMessage):
+            self.trace.cause = None
             return None
         if isinstance(message, TimerMessage):
             return self._due(message)

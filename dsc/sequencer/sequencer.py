@@ -15,7 +15,6 @@ from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output, Start
 from dsc.errors import ProgrammingError
-from dsc.events import Event
 from dsc.messages import FromOutside, KnowledgeMessage, LateMessage, Message, SkillMessage
 from dsc.run_log import logged_run
 from dsc.runs.kept import Kept
@@ -24,6 +23,7 @@ from dsc.sequencer import message_checks
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.inbox import Inbox, LivelockGuard
+from dsc.sequencer.outside_input import OutsideInput
 from dsc.sequencer.phase_watch import PhaseWatch
 from dsc.sequencer.reactor import Reactor, StepListener
 from dsc.sequencer.recovery import recover, require_components
@@ -40,7 +40,7 @@ _MOST_GROUPED = 100
 """Maximum number of macrosteps that share one commit."""
 
 
-class Sequencer:
+class Sequencer(OutsideInput):
     """Executor of one plot, from its start to its end.
 
     Args:
@@ -144,61 +144,6 @@ class Sequencer:
             "waiting": len(self._inbox.waiting),
             "knowledge_version": self.knowledge.version,
         }
-
-    def post(self, event: Event, *, after: float = 0.0) -> None:
-        """Post an event from outside, e.g. an operator's `stop`, from any thread.
-
-        Messages of one thread arrive in the order of their calls. A store keeps a delayed event from this call on, or
-        from the loop's next iteration on if another thread calls. It keeps an immediate event from its macrostep on.
-
-        Args:
-            event: the event's name and attributes.
-            after: seconds until the event arrives; until then, the run does not count as a deadlock.
-
-        Raises:
-            InputError: only the executive itself fires the event, e.g. `done`, or an attribute is not plain data. The
-                error is also raised if the plots that receive the event declare other attributes or types, or if the
-                run has ended.
-            UnknownNameError: no plot receives the event.
-            StoreError: the store cannot be written.
-        """
-        if self._over:
-            raise InputError("the run has ended and receives nothing")
-        self._hand_in(message_checks.checked_event(event, self.library, self.knowledge), after)
-
-    def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
-        """Post a change of knowledge from outside, from any thread.
-
-        Args:
-            delta: the change.
-            author: the change's author.
-            after: as for `post`.
-
-        Raises:
-            InputError: the change contradicts the schema; the knowledge is unchanged.
-            StoreError: the store cannot be written.
-        """
-        self._hand_in(message_checks.checked_change(delta, author, self.knowledge), after)
-
-    def set_parameter(self, owner: str, name: str, value: object, *, after: float = 0.0) -> None:
-        """Post an operator's setting of a parameter, from any thread.
-
-        A component receives the value before its next skill begins. A plot uses the value at later entries that set no
-        other value. A store keeps both kinds of settings.
-
-        Args:
-            owner: the component, or the plot, that has the parameter.
-            name: the parameter's name.
-            value: a value within the parameter's range; `None` resets a component's parameter.
-            after: as for `post`.
-
-        Raises:
-            UnknownNameError: there is no such component or plot, or it declares no such parameter.
-            InputError: the value is out of range or violates a relation, or operators may not set the parameter.
-            StoreError: the store cannot be written.
-        """
-        setting = message_checks.checked_setting(owner, name, value, self.dispatcher.components, self.library)
-        self._hand_in(setting, after)
 
     def stop(self, reason: str) -> None:
         """End the run with a problem, after its exit actions, from any thread; a run that has ended stays unchanged."""

@@ -184,6 +184,8 @@ class StepTracer:
                 self._trace.record("action", action="switch", component=component, mode=mode)
             case steps.SendMessage(component, port, arguments):
                 self._trace.record("action", action="send", port=f"{component}.{port}", arguments=dict(arguments))
+            case steps.SetWire(component, port, to):
+                self._trace.record("action", action="wire", port=f"{component}.{port}", to=to)
             case steps.Note(label, text):
                 self._trace.record("log", label=label, text=text)
             case steps.Start() | steps.Cancel() | steps.StartTimer() | steps.SendLater() | steps.Revoke():

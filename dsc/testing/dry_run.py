@@ -17,6 +17,7 @@ from dsc.engine.steps import (
     SendLater,
     SendMessage,
     SetParameter,
+    SetWire,
     Start,
     StartTimer,
     Step,
@@ -201,7 +202,7 @@ class DryRun:
             case Cancel(activation):
                 self.running = [start for start in self.running if start.activation != activation]
                 self._due = [due for due in self._due if due.activation != activation]
-            case SetParameter() | SwitchMode() | SendMessage() | Note():
+            case SetParameter() | SwitchMode() | SendMessage() | SetWire() | Note():
                 pass  # a dry run has no components
 
     def _ended(self, action_id: str) -> None:

@@ -25,7 +25,15 @@ from dsc.components.life_cycle import Life, LifeCycle
 from dsc.engine.steps import SendLater, Start, Step
 from dsc.errors import SkillError
 from dsc.events import Event
-from dsc.messages import KnowledgeMessage, LateMessage, Message, ParameterMessage, SkillMessage, TimerMessage
+from dsc.messages import (
+    KnowledgeMessage,
+    LateMessage,
+    Message,
+    ParameterMessage,
+    SkillMessage,
+    TimerMessage,
+    WireMessage,
+)
 from dsc.outcomes import Outcome
 from dsc.sequencer.sequencer import Sequencer
 from dsc.wire.endpoint import LocalTransport
@@ -300,7 +308,7 @@ def _source(message: Message) -> str:
             return f"author {message.author}"
         case TimerMessage() | SendLater():
             return "timers"
-        case ParameterMessage():
+        case ParameterMessage() | WireMessage():
             return "operator"
         case Event():
             return "outside"

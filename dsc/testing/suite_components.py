@@ -111,5 +111,5 @@ class Mapper(Component):
     """A component that subscribes to values."""
 
     name = "mapper"
-    scan = Stream("laser.scan", {"metres": "number"})
-    heat = Stream("laser.heat", {"celsius": "number"})
+    scan = Stream({"metres": "number"}, "laser.scan")
+    heat = Stream({"celsius": "number"}, "laser.heat")

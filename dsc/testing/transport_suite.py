@@ -21,10 +21,10 @@ from typing import Any
 import pytest
 
 from dsc.calls import SkillCall
-from dsc.components.assembly import Wiring
 from dsc.components.component import Component
 from dsc.components.life_cycle import Life
 from dsc.components.streams import Stream
+from dsc.components.wiring import Wiring
 from dsc.errors import NoAnswerError, NotAliveError, ProgrammingError, RefusedError
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
@@ -232,7 +232,7 @@ class TransportSuite:
     async def test_a_stream_of_something_else_is_refused_with_the_reason(self) -> None:
         """Case: the publisher lacks a value of the subscription."""
         transport, mapper = self.transport(), Mapper()
-        mapper.scan = mapper.streams["scan"] = Stream("laser.scan", {"meters": "number"})
+        mapper.scan = mapper.requirements["scan"] = Stream({"meters": "number"}, "laser.scan")
         hosts = [Host(one, transport, LoopClock()) for one in (Laser(), mapper)]
         with pytest.raises(NoAnswerError, match=r"'laser\.scan' pushes no 'meters'; did you mean 'metres'"):
             await mapper.scan.next(PATIENCE / 2)

@@ -25,6 +25,7 @@ class Profile(Written):
         robot: name of a robot in the world; without it, the world's default robot.
         components: values by component and parameter, within the range that the component's builder declares.
         plots: new defaults by plot and parameter; plots that use the plot may pass another value.
+        wiring: providers of required ports, both as `component.port`, see `dsc.components.wiring`.
     """
 
     name: str = Field(alias="profile", pattern=r"^[a-zA-Z_][\w\-]*$")
@@ -32,6 +33,7 @@ class Profile(Written):
     robot: str | None = None
     components: Settings = Field(default_factory=dict)
     plots: Settings = Field(default_factory=dict)
+    wiring: dict[str, str] = Field(default_factory=dict)
 
     @property
     def digest(self) -> str:

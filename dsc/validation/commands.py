@@ -1,4 +1,4 @@
-"""Checks of commands to components: `set`, `switch` and `send` name parameters, modes and messages that exist."""
+"""Checks of commands to components: they name parameters, modes, messages and ports that exist."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 from dsc.components.declarations import known
 from dsc.components.interface import Interface
+from dsc.components.services import named_service
 from dsc.errors import Finding
-from dsc.model.actions import Configure, ExternalAction, Internal, Send, Switch, Trigger, component_of
+from dsc.model.actions import Configure, ExternalAction, Internal, Send, Switch, Trigger, Unwire, Wire, component_of
 from dsc.model.plot import Path
 from dsc.model.ranges import Who, refuse_change
 from dsc.validation.subject import ALLOW, Subject
@@ -16,7 +17,7 @@ from knowledge_base.language.syntax.expression import Constant
 
 
 def check_commands(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about `set`, `send` and `switch` actions with unknown components or unknown names of these."""
+    """Yield findings about commands to unknown components, or with unknown names of parameters, modes or ports."""
     components = subject.components
     for path, action, who in subject.actions() if components is not None else ():
         name = None if isinstance(action, Trigger) else component_of(action)  # the check of skills covers triggers
@@ -44,8 +45,34 @@ def _command(
             except UnknownNameError as error:
                 fix = interface.remedy("takes", *port.split("."))
                 yield subject.caught(error, (*path, "send"), "component-message", fix)
+        case Unwire(unwire=port):
+            try:
+                interface.require_port(*port.split("."))
+            except UnknownNameError as error:
+                yield subject.caught(error, (*path, "unwire"), "component-wire")
+        case Wire():
+            yield from _wire(subject, action, path, interface)
         case _:
             pass
+
+
+def _wire(subject: Subject, action: Wire, path: Path, interface: Interface) -> Iterator[Finding]:
+    component, _, port = action.wire.partition(".")
+    try:
+        wanted = interface.require_port(component, port)
+    except UnknownNameError as error:
+        yield subject.caught(error, (*path, "wire"), "component-wire")
+        return
+    if isinstance(action.to, Constant):
+        skills = (subject.skills or {}).values()
+        offers = {
+            name: one.services([skill for skill in skills if skill.component == name])
+            for name, one in subject.interfaces.items()
+        }
+        try:
+            named_service(action.wire, wanted, str(action.to.value), offers)
+        except InputError as error:
+            yield subject.caught(error, (*path, "to"), "component-wire")
 
 
 def _setting(subject: Subject, action: Configure, path: Path, who: Who, interface: Interface) -> Iterator[Finding]:

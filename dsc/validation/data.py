@@ -200,11 +200,11 @@ class _Data:
                 yield from self._actions(otherwise, scope, (*path, "else"))
             case actions.Block(block=inside):
                 yield from self._actions(inside, scope, (*path, "block"))
-            case actions.Configure(to=value):
+            case actions.Configure(to=value) | actions.Wire(to=value):
                 yield from self._term(value, scope, (*path, "to"))
             case actions.Send(send=port, arguments=values):
                 yield from self._arguments(self._message(port), values, scope, path, "send")
-            case actions.Switch():
+            case actions.Switch() | actions.Unwire():
                 pass
             case actions.Trigger(trigger=skill, arguments=values):
                 yield from self._arguments(self._skills.get(skill), values, scope, path, "trigger")

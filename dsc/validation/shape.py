@@ -10,18 +10,12 @@ from dsc.engine.situation import asked_states
 from dsc.engine.tables import compile_plot
 from dsc.errors import Finding
 from dsc.model.actions import (
-    Assign,
     Block,
     Choose,
-    Configure,
     Emit,
     ExternalAction,
     Internal,
     Log,
-    Send,
-    Switch,
-    Tell,
-    Trigger,
     Withdraw,
     flat,
 )
@@ -253,5 +247,5 @@ def _is_foreign(action: ExternalAction | Internal) -> bool:
             return (delay, sent, into) != (None, None, None)
         case Block() | Choose() | Log() | Withdraw():
             return True
-        case Assign() | Tell() | Trigger() | Configure() | Switch() | Send():
+        case _:
             return False

@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsc.components.component import Component
-from dsc.components.streams import Push, Receiver, Values, require_fitting
+from dsc.components.services import Service, Values, require_fitting
+from dsc.components.streams import Push, Receiver, Stream
 from dsc.errors import NoAnswerError, RefusedError
 from dsc.wire.endpoint import Endpoint
 from knowledge_base.errors import InputError, described
@@ -68,7 +69,8 @@ class Publisher:
 
     async def _subscribe(self, sender: str, wanted: Values | None) -> dict[str, Any]:
         if self._values is not None and wanted is not None:
-            require_fitting(f"{self._endpoint.address}.{self._port}", wanted, self._values)
+            offered, name = Service("push", {}, self._values), f"{self._endpoint.address}.{self._port}"
+            require_fitting(name, Service("push", {}, wanted), offered)
         if len(self._subscribers) >= MOST_SUBSCRIBERS and sender not in self._subscribers:
             self._forget()
             if len(self._subscribers) >= MOST_SUBSCRIBERS:
@@ -180,8 +182,11 @@ class HostedStreams:
         for port, publisher in self._publishing:
             port.listen(publisher.put)
         self._tasks: list[asyncio.Task[None]] = []
-        for stream in component.streams.values():
-            subscription = Subscription(endpoint, stream.publisher, stream.port, stream.receive, stream.values)
+        for stream in component.requirements.values():
+            if not isinstance(stream, Stream) or stream.source is None:
+                continue
+            source, _, name = stream.source.partition(".")
+            subscription = Subscription(endpoint, source, name, stream.receive, stream.service.gives)
             stream.problem = lambda subscription=subscription: subscription.problem  # type: ignore[misc]
             self._tasks.append(asyncio.get_running_loop().create_task(subscription.run()))
 

@@ -10,6 +10,7 @@ from typing import Any
 from dsc.components.assembly import require_instances
 from dsc.components.component import Component
 from dsc.components.hooks import contained
+from dsc.components.wiring import choose_sources
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
 from dsc.profiles import configure
@@ -26,7 +27,7 @@ from knowledge_base.tracebacks import place_of, user_place
 from planning.engines.planner import Planner
 from planning.execution.shipped_plots import shipped_plots
 from planning.problem.construction import check_goal
-from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of
+from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of, wiring_of
 from planning.robot.program import Origin
 from planning.robot.robot import Robot, kind_of
 from planning.robot.simulation import Setup, Simulation
@@ -161,6 +162,7 @@ def _deployed(
     simulation = simulated(bundle, setup)
     try:
         components = [*_components(bundle, simulation), *remote]
+        choose_sources(components, wiring_of(gathered([bundle])))
         configure(components, setup.profile)
         robot = Robot(
             bundle.planning_domain, _library(bundle, setup.profile), components, None, planner,

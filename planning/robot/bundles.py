@@ -57,6 +57,7 @@ class BundleParts(TypedDict, total=False):
     profiles: Path | None
     conversions: tuple[Conversion[..., Any], ...]
     remote: tuple[str, ...]
+    wiring: Mapping[str, str]
 
 
 @dataclass(frozen=True, eq=False)  # without slots, for the cached properties
@@ -84,6 +85,7 @@ class Bundle:
         profiles: a folder of settings profiles (`*.yaml`), which `dsc run --profile` finds by name.
         conversions: the functions that terms of the plots may call, see `dsc.conversion`.
         remote: the names of components that other programs host (`dsc host`). A run connects to them, in real time.
+        wiring: the providers of required ports, both as `component.port`, unless a profile names others.
     """
 
     name: str
@@ -102,6 +104,7 @@ class Bundle:
     profiles: Path | None = None
     conversions: tuple[Conversion[..., Any], ...] = ()
     remote: tuple[str, ...] = ()
+    wiring: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if isinstance(self.failures, str):
@@ -306,6 +309,11 @@ def plots_of(bundles: Collection[Bundle]) -> list[ActionPlot]:
 def conversions_of(bundles: Iterable[Bundle]) -> list[Conversion[..., Any]]:
     """Return the conversions of the bundles, without repetitions."""
     return list(dict.fromkeys(one for bundle in bundles for one in bundle.conversions))
+
+
+def wiring_of(bundles: Iterable[Bundle]) -> dict[str, str]:
+    """Return the wiring of the bundles; a bundle replaces wires of the bundles that it needs."""
+    return {port: provider for bundle in bundles for port, provider in bundle.wiring.items()}
 
 
 def components_of(bundles: Collection[Bundle]) -> list[Component]:

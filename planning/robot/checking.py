@@ -8,10 +8,11 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from dsc.components.assembly import require_deployed, require_instances, require_whole, require_wired
+from dsc.components.assembly import require_deployed, require_instances, require_whole
 from dsc.components.component import Component
 from dsc.components.hooks import contained
 from dsc.components.interface import Interface
+from dsc.components.wiring import choose_sources, wiring_errors
 from dsc.dynamic.knowledge_situation import ACHIEVE, choose
 from dsc.dynamic.library import Library
 from dsc.errors import Finding, ProgrammingError
@@ -28,8 +29,7 @@ from dsc.validation.skill_types import review_types
 from knowledge_base.errors import InputError, Place, UnknownNameError, collecting, tolerated
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import holds
-from knowledge_base.language.syntax.effect import Form, parts_of_form
-from knowledge_base.language.syntax.expression import Call, Constant, Expression, free_variables
+from knowledge_base.language.syntax.expression import Constant, Expression, free_variables
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.pddl import read_problem
 from knowledge_base.pddl.domain_text import read_domain
@@ -45,9 +45,19 @@ from planning.problem.construction import check_goal
 from planning.problem.derived import derivation
 from planning.problem.relevance import numeric_constructs
 from planning.robot.bringup import begin, simulated
-from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of, shipped_by, with_plots_of
+from planning.robot.bundles import (
+    Bundle,
+    components_of,
+    conversions_of,
+    gathered,
+    plots_of,
+    shipped_by,
+    wiring_of,
+    with_plots_of,
+)
 from planning.robot.fact_names import sources_of, wrong_facts
 from planning.robot.finding_order import in_order
+from planning.robot.initial_values import missing_values
 from planning.robot.simulation import Setup, Simulation
 from planning.robot.soundness import IMPLEMENTED, check_implementations, interfaces
 from planning.robot.targets import bundle_at
@@ -242,7 +252,7 @@ class _Robot:
             found += without_consequences(check_implementations(library, self._domain), self._broken_files())
             self._check_task(world or KnowledgeBase(self._domain.schema))
             found += self._unplannable(self._domain)
-            found += () if world is None else _without_values(self._domain, world)
+            found += () if world is None else missing_values(self._domain, world)
             found += review_types(skills or (), self._domain.schema)
             found += wrong_facts(files, self._domain.schema)
             quoted = quoted_names(map(_text, {*files, *(one for one in self._files if one.suffix == ".py")}))
@@ -383,7 +393,10 @@ class _Robot:
             require_instances(self._components)
             require_deployed(self._components, [PlanningComponent.name])
         with tolerated():
-            require_wired(self._components)
+            choose_sources(self._components, wiring_of(self._bundles))
+        for _, error in () if self._lacks_remote else wiring_errors(self._components):
+            with tolerated():
+                raise error
         with tolerated():
             configure(self._components)
         for file in self._profiles():
@@ -413,10 +426,20 @@ class _Robot:
         with tolerated():
             made = self._made(profile)
             if made is not None:
+                choose_sources(made, wiring_of(self._bundles))
                 configure(made, profile)
+                self._check_wiring(made, profile)
         with tolerated():
             adapted(self._plots, profile)
             self._check_objects(profile)
+
+    def _check_wiring(self, components: Sequence[Component], profile: Profile) -> None:
+        """Raise an error for each wire of a profile that does not fit."""
+        for port, error in () if self._lacks_remote else wiring_errors(components):
+            if port.name in profile.wiring:
+                error.place = profile.place(("wiring", port.name))
+                with tolerated():
+                    raise error
 
     def _check_objects(self, profile: Profile) -> None:
         """Raise `InputError` for a value of a plot's parameter that is an unknown object, or one of another type."""
@@ -437,35 +460,6 @@ class _Robot:
 
 
 _EMPTY = "(define (domain bundles))"
-_MOST_LISTED = 3
-
-
-def _without_values(domain: PlanningDomain, world: KnowledgeBase) -> Iterator[Finding]:
-    """Yield a warning for each function that actions read and that has no initial value for some object.
-
-    Of a function with several parameters, e.g. distances, only the lack of all values is a warning.
-    """
-    forms = [form for action in domain.actions.values() for form in (action.precondition, action.effect)]
-    read = {call.function for form in forms for call in _calls(form)}
-    for name in sorted(read & domain.schema.functions.keys()):  # another finding reports an undeclared one
-        declared, known = domain.schema.functions[name], {one.args for one in world.values() if one.predicate == name}
-        if declared.result not in {None, "number"}:
-            continue
-        missing = [] if known else [f"({' '.join([name, *['…'] * declared.arity])})"]
-        if declared.arity == 1 and known:
-            things = (one for kind in declared.parameters[0].types or (ROOT_TYPE,) for one in world.objects(kind))
-            missing = [f"({name} {one})" for one in things if (one,) not in known]
-        if missing:
-            listed = ", ".join(missing[:_MOST_LISTED]) + (", …" if len(missing) > _MOST_LISTED else "")
-            error = InputError(f"no initial value of {listed}, which counts as 0", place=declared.place)
-            yield Finding(error, "initial-value", "set it in `values` of the initial knowledge", "warning")
-
-
-def _calls(form: Form) -> Iterator[Call]:
-    if isinstance(form, Call):
-        yield form
-    for part in parts_of_form(form):
-        yield from _calls(part)
 
 
 def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) -> list[Finding]:

@@ -10,8 +10,9 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Self
 
-from dsc.components.assembly import require_deployed, require_instances, require_wired
+from dsc.components.assembly import require_deployed, require_instances
 from dsc.components.component import Component
+from dsc.components.wiring import choose_sources, require_wired
 from dsc.conversions import Conversion
 from dsc.dynamic.library import Library
 from dsc.events import SKILL_FAILURES
@@ -44,6 +45,7 @@ from planning.robot.bundles import (
     gathered,
     plots_of,
     shipped_by,
+    wiring_of,
     with_plots_of,
 )
 from planning.robot.run import Run
@@ -92,10 +94,12 @@ class RobotProgram:
         failures: Collection[str] = (),
         origin: Origin | None = None,
         conversions: Iterable[Conversion[..., Any]] = (),
+        wiring: Mapping[str, str] | None = None,
     ) -> None:
         require_parts(knowledge, planner, foresight, store)
         self.components = require_instances(components)
         configure(self.components)
+        choose_sources(self.components, wiring or {})
         require_deployed(self.components, [PlanningComponent.name])
         require_wired(self.components)
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
@@ -155,6 +159,7 @@ class RobotProgram:
         found = gathered(bundles)
         how.setdefault("failures", frozenset[str]().union(*(bundle.failures for bundle in found)))
         how.setdefault("conversions", conversions_of(found))
+        how["wiring"] = {**wiring_of(found), **(how.get("wiring") or {})}
         return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
 
     @property

@@ -69,6 +69,7 @@ class Robot(RobotProgram):
         failures: further outcomes with which a plot does not reach its goal, see `failures`.
         origin: the deployed bundle; `None` for a robot that was not made by `deploy`.
         conversions: the functions that terms of the plots may call; a `Library` has its own.
+        wiring: the providers of required ports, both as `component.port`, see `dsc.components.wiring`.
 
     Attributes:
         clock: the kind of time; `None` for that of the event loop.

@@ -113,6 +113,10 @@ class Run(Generic[Outputs]):
         """Post an operator's setting of a parameter; errors as for `Sequencer.set_parameter`."""
         self._sequencer.set_parameter(owner, name, value, after=after)
 
+    def wire(self, port: str, to: str | None, *, after: float = 0.0) -> None:
+        """Wire a required port to another provider; errors as for `Sequencer.wire`."""
+        self._sequencer.wire(port, to, after=after)
+
     def cancel(self, reason: str) -> Self:
         """End the run after its exit actions; its end has the reason as its problem. `await` the returned run."""
         self._sequencer.stop(reason)

@@ -92,7 +92,11 @@ def require_sound(
     declared: Mapping[str, Interface],
 ) -> None:
     """Raise `PlotError` with the findings of the validator; a combination that passed before is not checked again."""
-    shared = [part for one in declared.values() for part in (one.parameters, one.modes, one.messages)]
+    shared = [
+        part
+        for one in declared.values()
+        for part in (one.parameters, one.modes, one.messages, one.requires, one.pushes)
+    ]
     parts = (domain, schema, *library, *skills, *declared, *shared)
     key = tuple(map(id, parts))
     if key in _sound:

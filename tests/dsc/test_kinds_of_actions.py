@@ -28,6 +28,8 @@ FORMS = {
     "trigger": {"trigger": "arm.grasp", "with": {"item": "cup"}},
     "set": {"set": "arm.approach", "to": "side"},
     "switch": {"switch": "arm", "to": "neutral"},
+    "wire": {"wire": "map.scan", "to": "rear.scan"},
+    "unwire": {"unwire": "map.scan"},
     "send": {"send": "arm.say", "with": {"text": "hello"}},
     "assign": {"assign": {"tries": 1}},
     "tell": {"tell": "(dirty cup)"},
@@ -109,6 +111,7 @@ def test_each_output_that_a_restart_needs_is_read_back():
         steps.SetParameter("arm", "approach", "side", 1),
         steps.SwitchMode("arm", "neutral", 1),
         steps.SendMessage("arm", "say", {"text": "hello"}, 1),
+        steps.SetWire("map", "scan", "rear.scan", 1),
     ]
     assert [type(one) for one in examples] == list(get_args(Awaited))
     for one in examples:

@@ -44,6 +44,8 @@ from dsc.model.actions import (
     Switch,
     Tell,
     Trigger,
+    Unwire,
+    Wire,
     Withdraw,
 )
 from dsc.model.states import State, SubmachineState
@@ -528,7 +530,7 @@ class Reference:
                     self._act(instance, inner)
             case Block(block=inside):
                 self._perform(instance, inside)
-            case Trigger() | Configure() | Send() | Withdraw() | Log():
+            case Trigger() | Configure() | Send() | Wire() | Unwire() | Withdraw() | Log():
                 pass  # nothing of a chart without components depends on them
 
     def _chooses(self, instance, action):

@@ -9,10 +9,10 @@ from typing import ClassVar
 import pytest
 from dsc_charts import plot
 
-from dsc.components.assembly import Wiring
 from dsc.components.component import ALWAYS, Component
 from dsc.components.life_cycle import Life
 from dsc.components.streams import Push, Stream
+from dsc.components.wiring import Wiring
 from dsc.dynamic.library import Library
 from dsc.errors import NoAnswerError
 from dsc.outcomes import Outcome
@@ -53,8 +53,8 @@ class Laser(Component):
 class Mapper(Component):
     name = "mapper"
     needs: ClassVar = {ALWAYS: ("laser",)}
-    scan = Stream("laser.scan", {"metres": "number"})
-    heat = Stream("laser.heat", {"celsius": "number"})
+    scan = Stream({"metres": "number"}, "laser.scan")
+    heat = Stream({"celsius": "number"}, "laser.heat")
 
     def __init__(self):
         super().__init__()
@@ -192,7 +192,7 @@ def test_what_is_pushed_has_its_types(values, said):
 def test_a_stream_has_a_port_that_fits(source, values, kind, said):
     class Other(Component):
         name = "other"
-        scan = Stream(source, values)
+        scan = Stream(values, source)
 
     with pytest.raises(kind) as refused:
         ran(Laser(), Mapper(), Other())
@@ -204,7 +204,10 @@ def test_ports_are_declared_rightly():
         lambda: Push(["metres"]),  # type: ignore[arg-type]
         lambda: Push({"a b": None}),
         lambda: Push({}, period=0),
-        lambda: Stream("laser", {}),
+        lambda: Stream({}, "laser."),
+        lambda: Stream({}, 3),  # type: ignore[arg-type]
+        lambda: Stream({}, period=0),
+        lambda: Stream({}, timeout=-1),
     ):
         with pytest.raises(InputError):
             wrong()
@@ -215,14 +218,14 @@ def test_each_component_has_ports_of_its_own():
     assert left.scan is not right.scan
     assert left.scan is left.pushes["scan"]
     assert asyncio.run(left.diagnose())["pushes"] == ["heat", "scan"]
-    assert asyncio.run(Mapper().diagnose())["streams"]["scan"] == "laser.scan"
+    assert asyncio.run(Mapper().diagnose())["wires"] == {"heat": None, "scan": None}
 
 
 def test_two_ports_of_one_name_are_told_apart_over_a_transport():
     class Fusion(Component):
         name = "fusion"
-        left = Stream("left.scan", {"metres": "number"})
-        right = Stream("right.scan", {"metres": "number"})
+        left = Stream({"metres": "number"}, "left.scan")
+        right = Stream({"metres": "number"}, "right.scan")
 
     async def main():
         transport, fusion = LocalTransport(), Fusion()

@@ -55,7 +55,7 @@ class Scanner(Component):
 
 class Reader(Component):
     name = "reader"
-    scan = Stream("scanner.push_scan", {"n": "number"})
+    scan = Stream({"n": "number"}, "scanner.push_scan")
     needs: ClassVar = {"": ("scanner",)}
 
     @skill

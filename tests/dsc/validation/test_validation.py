@@ -12,6 +12,7 @@ from finding_codes import codes_in
 from dsc.components.component import Component
 from dsc.components.declarations import Parameter
 from dsc.components.interface import Interface
+from dsc.components.services import Service
 from dsc.dynamic.library import Library
 from dsc.errors import PlotError
 from dsc.model.plot import ActionPlot
@@ -63,7 +64,10 @@ COMPONENTS = {
         {"pace": Parameter("number", default=1, least=0, most=2), "port": Parameter("text", changed_by="profile")},
         modes=("high", "low"),
         messages={},
+        requires={"height": Service("push", {}, {"metres": "number"})},
     ),
+    "ruler": Interface(pushes={"height": Service("push", {}, {"metres": "number"})}),
+    "scale": Interface(pushes={"weight": Service("push", {}, {"kilograms": "number"})}),
 }
 HELPERS = [
     plot("""
@@ -514,6 +518,10 @@ WRONG = [
     ("done-can-fire", S + "  a:\n    states: {b: {after: {seconds: 1, to: c}}, c: {after: {seconds: 1, to: b}}}\n    on: {done: e}\n" + E, 5, "'a' is never done: it has no final state", ""),
     ("declared-variable", "plot: p\nparameters: {n: {type: number, default: 1}}\nstates:\n  a:\n    on:\n      done: {to: e, assign: {n: 2}}\n" + E, 6, "'n' is a parameter, which the plot only reads", ""),
     ("component-mode", S + "  a:\n    entry:\n      switch: lift\n      to: hihg\n    on: {done: e}\n" + E, 6, "did you mean 'high'", ""),
+    ("component-wire", S + "  a:\n    entry:\n      wire: lift.hight\n      to: ruler.height\n    on: {done: e}\n" + E, 5, "did you mean 'height'", ""),
+    ("component-wire", S + "  a:\n    entry:\n      unwire: lift.hight\n    on: {done: e}\n" + E, 5, "did you mean 'height'", ""),
+    ("component-wire", S + "  a:\n    entry:\n      wire: lift.height\n      to: rular.height\n    on: {done: e}\n" + E, 6, "did you mean 'ruler'", ""),
+    ("component-wire", S + "  a:\n    entry:\n      wire: lift.height\n      to: scale.weight\n    on: {done: e}\n" + E, 6, "pushes no 'metres'", ""),
     ("component-message", S + "  a:\n    entry:\n      send: lift.lable\n    on: {done: e}\n" + E, 5, "takes no 'lable'", ""),
     # -- rules are transitions too
     (

@@ -41,7 +41,7 @@ class Step(Outcome):
 class Robot(Component):
     name = "robot"
     scan = Push({"metres": "number"})
-    other = Stream("peer.scan", {"metres": "number"})
+    other = Stream({"metres": "number"}, "peer.scan")
 
     @skill
     async def go(self, call: SkillCall[Step], steps=0) -> Ok:

@@ -691,11 +691,13 @@ def test_needs_that_nobody_can_fulfil_are_refused():
 def test_streams_that_have_no_port_are_refused():
     class Meter(Component):
         name = "meter"
-        level = Stream("lamps.level", {"lumen": "number"})
+        level = Stream({"lumen": "number"}, "lamps.level")
 
     with pytest.raises(InputError, match="component 'lamps' has no push port 'level'"):
         Robot(DOMAIN, [HOLDER], [Lamps(), Meter()], clock="simulated")
-    with pytest.raises(InputError, match=r"component 'meter' takes 'lamps\.level', and there is no such component"):
+    with pytest.raises(
+        InputError, match=r"port 'meter\.level' is wired to 'lamps\.level', and there is no such component"
+    ):
         Robot(DOMAIN, [HOLDER], [Meter()], clock="simulated")
 
 
