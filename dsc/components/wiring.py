@@ -130,6 +130,9 @@ class Wiring:
         components: the deployed components, by name.
         changed: receives the name of each component whose wires have changed.
 
+    Attributes:
+        changes: by required port, the wires of states and operators, the effective one last.
+
     Raises:
         UnknownNameError: the source of a port, or a value of it, does not exist.
         SchemaError: the service of a source does not fit.
@@ -144,7 +147,7 @@ class Wiring:
         self._components = components
         self._changed = changed
         self._joined: dict[Requirement, Component] = {}
-        self._changes: dict[str, list[tuple[int, str | None]]] = {}  # by port: activations, and what they wire it to
+        self.changes: dict[str, list[tuple[int, str | None]]] = {}  # activations, and providers
         self._connect_all()
 
     def deployed(self, component: Component) -> None:
@@ -171,16 +174,16 @@ class Wiring:
         owner, required = required_port(port, self._components)
         if to is not None:
             provider_for(required, owner, self._components, to)
-        changes = [one for one in self._changes.get(port, ()) if one[0] != activation]
+        changes = [one for one in self.changes.get(port, ()) if one[0] != activation]
         changes.insert(0 if activation == 0 else len(changes), (activation, to))
-        self._changes[port] = changes
+        self.changes[port] = changes
         self._connect(required, owner)
 
     def revert(self, activation: int) -> None:
         """End the wires of a state that is left: the ports have the wires of before."""
-        for port, changes in tuple(self._changes.items()):
+        for port, changes in tuple(self.changes.items()):
             if any(one == activation for one, _ in changes):
-                self._changes[port] = [one for one in changes if one[0] != activation]
+                self.changes[port] = [one for one in changes if one[0] != activation]
                 owner, required = required_port(port, self._components)
                 self._connect(required, owner)
 
@@ -200,7 +203,7 @@ class Wiring:
             self._joined[port] = owner
             port.join()
         before = port.provider
-        changes = self._changes.get(port.name)
+        changes = self.changes.get(port.name)
         chosen = changes[-1][1] if changes else None
         provider = None
         if not changes or chosen is not None:

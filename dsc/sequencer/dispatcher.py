@@ -2,8 +2,7 @@
 
 A skill is cancelled when the activation that started it ends (S0.15). Before a skill begins, its component has received
 all earlier parameters, modes and messages. All components have then received the parameters and modes of its macrostep.
-Unless the component is `concurrent`, its cancelled skills clean up first. Arguments and answers are encoded, so that
-chart and component share no object by accident.
+Unless the component is `concurrent`, its cancelled skills clean up first. Chart and component share no object.
 """
 
 from __future__ import annotations
@@ -423,10 +422,10 @@ class Dispatcher:
         endless = signature.unlimited or signature.pattern == "event"
         within = start.within or signature.within or (math.inf if endless else DEFAULT_WITHIN)
         since = self._clock.now() if interrupted is None else interrupted.asked
-        raises = component.device_errors
         running = RunningSkill(
-            start, signature, raises, within, since, self._clock, self._post, self._fault, self._observer
-        )
+            start, signature, component.device_errors, within, since,
+            self._clock, self._post, self._fault, self._observer,
+        )  # fmt: skip
         running.configuring = self.outbox.configuring
         if component.takes_turns(signature):
             running.claim, running.begun = Claim(component.turns, running, start.rank), False
@@ -572,4 +571,5 @@ class Dispatcher:
             if running.start.activation == activation:
                 self.stop(running.start)
         self.timers.cancel(activation)
-        self._wiring.revert(activation)
+        if self._wiring.changes:
+            self._wiring.revert(activation)

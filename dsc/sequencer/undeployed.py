@@ -110,6 +110,8 @@ class Undeployed:
 
     def cancel(self, activation: int) -> None:
         """Drop the skills of a state that was left."""
+        if not self._held:  # the common case
+            return
         self._drop(lambda one: isinstance(one, Start) and one.activation == activation)
 
     def release(self, component: str) -> Iterator[Held]:
