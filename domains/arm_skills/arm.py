@@ -102,6 +102,8 @@ class Arm(Component):
             default=0.0,
         )
         blocked = await self._driver.move(call, targets, seconds, lambda: call.observe(self._angles()))
+        if blocked is not None and blocked not in now:
+            raise UnknownNameError(f"the driver reports a joint '{blocked}'", found=blocked, valid=now)
         observed = self._angles()
         return Reached(observed=observed) if blocked is None else Blocked(joint=blocked, observed=observed)
 

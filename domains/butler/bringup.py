@@ -54,7 +54,7 @@ class ButlerFlat(Simulation):
 
     def knowledge(self) -> Delta:
         """Return the places with their coordinates (S4.14), and the items as they were last seen."""
-        values = {fact(axis, name): at[n] for name, at in spots().items() for n, axis in enumerate("xy")}
+        values = {fact("position", name): at for name, at in spots().items()}
         nodes = {**dict.fromkeys(ROOMS, "room"), **dict.fromkeys(FURNITURE, "furniture")}
         nodes |= dict.fromkeys(self.flat.items, "item")
         items = tuple([fact("item-at", item, place) for item, place in self.flat.items.items()])

@@ -5,7 +5,7 @@
     (robot-at ?l - location)
     (item-at ?i - item ?l - location)
     (holding ?i - item))
-  (:functions (x ?l - location) (y ?l - location) - number)
+  (:functions (position ?l - location) - geometry) ; x and y in metres
   (:action go
     :parameters (?from ?to - location)
     :precondition (robot-at ?from)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, Protocol
+from typing import Literal, Protocol, TypeVar
 
 from dsc.calls import SkillCall
+from knowledge_base.errors import InputError
+from knowledge_base.language.checking.inputs import shown
 
 Point = tuple[float, float]
 """A position in metres."""
 Avoidance = Literal["wide", "narrow"]
+_Driver = TypeVar("_Driver")
 
 
 class PlatformDriver(Protocol):
@@ -37,7 +40,10 @@ class PathFinder(Protocol):
     """The search of a path for the platform, e.g. on a map."""
 
     async def path(self, call: SkillCall, target: Point) -> Sequence[Point] | None:
-        """Return the stops from the present position to the target; `None` if no path leads there."""
+        """Return the stops from the present position to the target; `None` if no path leads there.
+
+        The present position and the target may be omitted.
+        """
         ...
 
 
@@ -62,3 +68,11 @@ class HandDriver(Protocol):
             SkillError: the device has failed.
         """
         ...
+
+
+def require_methods(driver: _Driver, kind: type[object]) -> _Driver:
+    """Return a driver; raise `InputError` if it lacks a method of its kind."""
+    missing = [name for name in vars(kind) if name[0] != "_" and not callable(getattr(driver, name, None))]
+    if missing:
+        raise InputError(f"{shown(driver)} is no {kind.__name__}: it has no method '{missing[0]}'", found=missing[0])
+    return driver

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from domains.fetch_skills.drivers import HandDriver
+from domains.fetch_skills.drivers import HandDriver, require_methods
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.outcomes import Outcome
@@ -41,7 +41,7 @@ class Hand(Component):
 
     def __init__(self, driver: HandDriver) -> None:
         super().__init__()
-        self._driver = driver
+        self._driver = require_methods(driver, HandDriver)
 
     @skill
     async def take(self, call: SkillCall, item: str, place: str) -> Taken | NotTaken:

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Annotated
 
-from domains.fetch_skills.drivers import Avoidance, PathFinder, PlatformDriver, Point
+from domains.fetch_skills.drivers import Avoidance, PathFinder, PlatformDriver, Point, require_methods
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.components.parameters import Parameters, parameter
 from dsc.errors import SkillError
 from dsc.outcomes import Outcome
 from dsc.skills import skill
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
+from knowledge_base.language.checking.inputs import shown
+
+Position = Annotated[list[float], "geometry"]
+"""Coordinates x and y in metres, from the knowledge base."""
 
 
 @dataclass
@@ -63,15 +69,19 @@ class PathPlanner(Component):
 
     def __init__(self, finder: PathFinder) -> None:
         super().__init__()
-        self._finder = finder
+        self._finder = require_methods(finder, PathFinder)
 
     @skill
-    async def find(self, call: SkillCall, x: float, y: float) -> PathFound | NoPath:
-        """Return the path to a point."""
+    async def find(self, call: SkillCall, target: Position) -> PathFound | NoPath:
+        """Return the path to a position."""
         if self.mode != "navigating":
             raise SkillError("the planner of paths is not in the mode 'navigating'")
-        path = await self._finder.path(call, (x, y))
-        return NoPath() if path is None else PathFound(path=[PathPoint(*stop) for stop in path])
+        end = target[0], target[1]
+        path = await self._finder.path(call, end)
+        if path is None:
+            return NoPath()
+        stops = [*path] if path and path[-1] == end else [*path, end]
+        return PathFound(path=[_path_point(stop) for stop in stops])
 
 
 class PlatformParameters(Parameters):
@@ -96,7 +106,7 @@ class Platform(Component):
 
     def __init__(self, driver: PlatformDriver) -> None:
         super().__init__()
-        self._driver = driver
+        self._driver = require_methods(driver, PlatformDriver)
 
     @skill
     async def follow_path(self, call: SkillCall, path: list[PathPoint], place: str) -> Arrived | Stuck:
@@ -104,9 +114,9 @@ class Platform(Component):
         return await self._drive(call, [(stop.x, stop.y) for stop in path], place)
 
     @skill
-    async def go_straight(self, call: SkillCall, x: float, y: float, place: str) -> Arrived | Stuck:
-        """Drive to a near point by collision avoidance alone, without a path."""
-        return await self._drive(call, [(x, y)], place)
+    async def go_straight(self, call: SkillCall, target: Position, place: str) -> Arrived | Stuck:
+        """Drive to a near position by collision avoidance alone, without a path."""
+        return await self._drive(call, [(target[0], target[1])], place)
 
     async def _drive(self, call: SkillCall, stops: Iterable[Point], place: str) -> Arrived | Stuck:
         speed = min(self.parameters.speed, self.parameters.fastest)
@@ -115,3 +125,12 @@ class Platform(Component):
             if reason is not None:
                 return Stuck(reason=reason)
         return Arrived(observed=Delta(added=(fact("robot-at", place),)))
+
+
+def _path_point(stop: object) -> PathPoint:
+    """Return a stop of a path; raise `InputError` for another object, e.g. the name of a place."""
+    match stop:
+        case (int() | float() as x, int() | float() as y):
+            return PathPoint(float(x), float(y))
+        case _:
+            raise InputError(f"the stops of a path are pairs (x, y) in metres, not {shown(stop)}")

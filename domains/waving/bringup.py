@@ -74,6 +74,7 @@ def bundle() -> Bundle:
         about="wave with any arm: one plot, two arms in a kinematic simulation",
         needs=(ARM_SKILLS,),
         main="wave",
+        failures=("did_not_wave",),
         simulation=DeskArm,
         robots={"desk_arm": DeskArm, "humanoid": HumanoidArm},
     )

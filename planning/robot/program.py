@@ -23,7 +23,7 @@ from dsc.runs.store import RunStore
 from dsc.sequencer.clock import ClockKind, LoopClock
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import signatures
-from dsc.text.profiles import Profile
+from dsc.text.profiles import Profile, adapted
 from dsc.trace import Listener, Trace
 from knowledge_base.errors import InputError, SchemaError, StoreError
 from knowledge_base.journal.file import Durability, located
@@ -142,6 +142,8 @@ class RobotProgram:
         bundles: Iterable[Bundle | str],
         plots: Iterable[ActionPlot] = (),
         components: Iterable[Component] = (),
+        *,
+        profile: Profile | None = None,
         **how: Any,
     ) -> Self:
         """Return a robot for bundles, the bundles that they need, and further plots and components.
@@ -150,6 +152,7 @@ class RobotProgram:
             bundles: each a `Bundle`, or the name of an installed bundle.
             plots: further plots.
             components: further components.
+            profile: the settings of components and plots, and the wiring.
             how: the keyword arguments of `Robot` (`knowledge`, `planner`, `store`, ...).
 
         Raises:
@@ -160,7 +163,11 @@ class RobotProgram:
         how.setdefault("failures", frozenset[str]().union(*(bundle.failures for bundle in found)))
         how.setdefault("conversions", conversions_of(found))
         how["wiring"] = {**wiring_of(found), **(how.get("wiring") or {})}
-        return cls(domain_of(found), [*plots_of(found), *plots], [*components_of(found), *components], **how)
+        parts = [*components_of(found), *components]
+        if profile is not None:
+            configure(parts, profile)
+            how["wiring"] |= profile.wiring
+        return cls(domain_of(found), adapted([*plots_of(found), *plots], profile), parts, **how)
 
     @property
     def name(self) -> str:

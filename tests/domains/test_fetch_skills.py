@@ -9,8 +9,8 @@ import pytest
 from domains.fetch_skills import Hand, Mapper, PathPlanner, Platform
 from dsc.calls import SkillCall
 from dsc.errors import SkillError
-from dsc.profiles import configure
 from dsc.text.profiles import Profile
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 from planning import Robot
 
@@ -62,12 +62,12 @@ class Cart:
 
 def robot_of(cart, **settings):
     components = [Platform(cart), Mapper(), PathPlanner(cart), Hand(cart)]
-    configure(components, Profile.model_validate({"profile": "cart", "components": settings}))
-    robot = Robot.of_bundles(["fetch-skills"], components=components, clock="simulated")
+    profile = Profile.model_validate({"profile": "cart", **settings})
+    robot = Robot.of_bundles(["fetch-skills"], components=components, profile=profile, clock="simulated")
     world = Delta(
         nodes={**dict.fromkeys(PLACES, "location"), "parcel": "item"},
         added=(fact("robot-at", "dock"), fact("item-at", "parcel", "shelf")),
-        values={fact(axis, name): at["xy".index(axis)] for name, at in PLACES.items() for axis in "xy"},
+        values={fact("position", name): at for name, at in PLACES.items()},
     )
     robot.knowledge.apply(world, author="test")
     return robot
@@ -92,7 +92,7 @@ def test_a_robot_that_is_never_there_says_so():
         ]
         brought = robot.run("bring", {"item": "parcel", "to": "desk"})
         assert not brought.reached
-        assert brought.emitted[-1].attributes == {"reason": "gave up"}
+        assert "(go dock shelf) has failed before" in brought.emitted[-1].attributes["reason"]
 
 
 def test_a_device_that_fails_is_a_skill_error_and_the_plan_goes_on():
@@ -107,14 +107,61 @@ def test_a_stuck_platform_is_at_no_place():
         assert robot.knowledge.query("(robot-at ?l)") == []
 
 
+def test_a_platform_that_stays_stuck_says_so_after_some_tries():
+    cart = Cart(*["drive"] * 1000)
+    with robot_of(cart) as robot:
+        end = robot.run("move_platform", {"place": "desk", "tries": 4})
+        assert end.emitted[-1].attributes == {"reason": "a box is in the way"}
+        assert len(cart.speeds) == 4
+        assert not robot.run("bring", {"item": "parcel", "to": "desk"}).reached
+
+
+@pytest.mark.parametrize("plot", ["move_platform", "move_straight"])
+def test_a_place_without_a_position_is_not_reached(plot):
+    cart = Cart()
+    with robot_of(cart) as robot:
+        robot.knowledge.apply(Delta(nodes={"lab": "location"}), author="test")
+        end = robot.run(plot, {"place": "lab"})
+        assert end.emitted[-1].attributes == {"reason": "the place has no position"}
+        assert not end.reached
+    assert cart.speeds == []
+
+
+def test_a_path_ends_at_its_target():
+    class Short(Cart):
+        async def path(self, call, target):
+            return []
+
+    cart = Short()
+    with robot_of(cart) as robot:
+        robot.run("move_platform", {"place": "desk"})
+    assert cart.at == PLACES["desk"]
+
+
+def test_a_path_of_names_is_refused_by_its_form():
+    class Named(Cart):
+        async def path(self, call, target):
+            return ["desk"]
+
+    with robot_of(Named()) as robot:
+        end = robot.run("move_platform", {"place": "desk"})
+    assert "the stops of a path are pairs (x, y) in metres, not 'desk'" in str(end.reason)
+
+
+@pytest.mark.parametrize(("part", "method"), [(Platform, "drive"), (PathPlanner, "path"), (Hand, "grasp")])
+def test_a_driver_without_a_method_is_refused(part, method):
+    with pytest.raises(InputError, match=f"it has no method '{method}'"):
+        part(object())
+
+
 def test_the_profile_limits_the_speed_that_plots_set():
     cart = Cart()
     with robot_of(cart) as robot:
         robot.run("move_platform", {"place": "desk"})
-    with robot_of(cart, base={"fastest": 0.3}) as robot:
+    with robot_of(cart, components={"base": {"fastest": 0.3}}, plots={"move_straight": {"speed": 0.1}}) as robot:
         robot.run("move_platform", {"place": "desk"})
         robot.run("move_straight", {"place": "dock"})
-    assert cart.speeds == [(0.6, "narrow"), (0.3, "narrow"), (0.3, "wide")]
+    assert cart.speeds == [(0.6, "narrow"), (0.3, "narrow"), (0.1, "wide")]
 
 
 def test_a_cancelled_drive_stops_the_platform():
