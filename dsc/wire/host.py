@@ -147,7 +147,13 @@ class Host:
     async def _hull(self, _: str, __: Any) -> dict[str, Any]:
         skills = [asdict(signature) for signature in self._component.skills().values()]
         pushes = {name: {"values": dict(port.values)} for name, port in self._component.pushes.items()}
+        interface = self._component.interface()
+        messages = None
+        if interface.messages is not None:
+            messages = {name: asdict(message) for name, message in interface.messages.items()}
         return {
+            "modes": [*interface.modes],
+            "messages": messages,
             "skills": skills,
             "pushes": pushes,
             "concurrent": self._component.concurrent,

@@ -14,11 +14,13 @@ import math
 import secrets
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from typing import Any
 
 from dsc.calls import Ended, SkillCall, Status
 from dsc.components.component import Component
 from dsc.components.declarations import Parameter
+from dsc.components.interface import Interface
 from dsc.components.life_cycle import Life
 from dsc.components.parameters import Configuration, Parameters, parameters_of
 from dsc.errors import NoAnswerError, PreemptedError, ProgrammingError, RefusedError
@@ -55,6 +57,7 @@ class RemoteComponent(Component):
         self._heart = Heartbeat(endpoint, lambda: [name], _ignore, root=True)
         self._domain: str | None = None
         self._plots: tuple[ActionPlot, ...] = ()
+        self._messages: Mapping[str, SkillSignature] | None = None
         self._values_there: dict[str, Any] = {}
         self._profile: dict[str, Any] | None = None  # values of this program's profile; `None` before the first start
         self._is_silent = False
@@ -98,6 +101,9 @@ class RemoteComponent(Component):
             for port, form in said["pushes"].items():
                 remote.pushes[port] = RemotePush(endpoint, name, port, form["values"])
             remote._take_parameters(said["parameters"])
+            remote.modes = tuple(said["modes"])  # type: ignore[misc]  # a class declares them; a client receives them
+            if said["messages"] is not None:
+                remote._messages = {name: SkillSignature(**form) for name, form in said["messages"].items()}
             if said["domain"] is not None:
                 require_text(said["domain"], "the part of the planning domain")
                 remote._domain = said["domain"]
@@ -124,6 +130,10 @@ class RemoteComponent(Component):
     def plots(self) -> tuple[ActionPlot, ...]:
         """Return the plots that the component brings at its host."""
         return self._plots
+
+    def interface(self) -> Interface:
+        """Return the parameters, modes, messages and push ports at the time of the connection."""
+        return replace(super().interface(), messages=self._messages)
 
     def skills(self) -> dict[str, SkillSignature]:
         """Return the signatures at the time of the connection."""

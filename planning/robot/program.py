@@ -163,11 +163,12 @@ class RobotProgram:
         how.setdefault("failures", frozenset[str]().union(*(bundle.failures for bundle in found)))
         how.setdefault("conversions", conversions_of(found))
         how["wiring"] = {**wiring_of(found), **(how.get("wiring") or {})}
+        known = adapted([*plots_of(found), *plots], profile)
         parts = [*components_of(found), *components]
         if profile is not None:
             configure(parts, profile)
             how["wiring"] |= profile.wiring
-        return cls(domain_of(found), adapted([*plots_of(found), *plots], profile), parts, **how)
+        return cls(domain_of(found), known, parts, **how)
 
     @property
     def name(self) -> str:

@@ -20,7 +20,10 @@ from dsc.components.streams import Push, Stream
 from dsc.components.wiring import Wiring, choose_sources, require_wired, wiring_errors
 from dsc.errors import NoAnswerError, NotWiredError, SkillError
 from dsc.outcomes import Outcome
-from dsc.sequencer.clock import run_simulated
+from dsc.sequencer.clock import LoopClock, run_simulated
+from dsc.wire.endpoint import LocalTransport
+from dsc.wire.host import Host
+from dsc.wire.remote import RemoteComponent
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 
 
@@ -99,10 +102,13 @@ def simulate(main):
     return run_simulated(main())
 
 
-def test_a_component_is_wired_by_service_and_uses_its_own_names():
+@pytest.mark.parametrize("far", [False, True])
+def test_a_component_is_wired_by_service_and_uses_its_own_names(far):
     async def main():
         cell, watch = Cell(), Watch()
-        wiring = wired(watch, cell)
+        transport = LocalTransport()
+        host = Host(cell, transport, LoopClock()) if far else None
+        wiring = wired(watch, await RemoteComponent.connect("cell", transport) if far else cell)
         assert await watch.battery.ask(watts=60.0) == {"hours": 2.0}
         await watch.tell.send(full=0.9)
         await watch.settings.set(reserve=5.0)
@@ -119,6 +125,8 @@ def test_a_component_is_wired_by_service_and_uses_its_own_names():
         await asyncio.sleep(1)
         assert not cell.activations.active("low")
         wiring.close()
+        if host is not None:
+            await host.close()
 
     simulate(main)
 
