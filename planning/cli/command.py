@@ -25,6 +25,7 @@ from planning.cli.doctor import doctor_command
 from planning.cli.host import host_command
 from planning.cli.new import new_command
 from planning.cli.run import components_of_target, robot_knowledge, run_command
+from planning.cli.wiring import wiring_command
 
 if TYPE_CHECKING:
     from knowledge_base.errors import InputError
@@ -63,6 +64,7 @@ app.command("host")(host_command)
 app.command("ps")(ps_command)
 app.command("call")(call_command)
 app.command("check")(check_command)
+app.command("wiring")(wiring_command)
 app.command("plan")(plan_command)
 app.command("doctor")(doctor_command)
 app.command("bundles")(bundles_command)

@@ -205,9 +205,9 @@ def devices(bundle: Bundle, *, seed: int | None = None, faults: float | None = N
     return components
 
 
-def components_for(bundle: Bundle) -> tuple[Component, ...]:
-    """Return new components of a bundle, those of its simulation included, to read their declarations."""
-    return require_instances(_components(bundle, simulated(bundle, Setup())))
+def components_for(bundle: Bundle, profile: Profile | None = None) -> tuple[Component, ...]:
+    """Return new components of a bundle and its simulation, to read their declarations."""
+    return require_instances(_components(bundle, simulated(bundle, Setup(profile=profile))))
 
 
 def initial_knowledge(bundle: Bundle, simulation: Simulation | None) -> Delta:
