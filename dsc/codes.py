@@ -14,7 +14,7 @@ CODES: Mapping[str, str] = {
     "clear": "`clear` names a composite or orthogonal state with a history.",
     "completion-is-wired": "A state whose content can end has a transition on `done`.",
     "component-message": "A component takes the message that `send` names.",
-    "component-wire": "A component requires the port that `wire` or `unwire` names, and the provided port fits.",
+    "component-wire": "An entry wires a port that the component requires to a provided port that fits.",
     "component-mode": "A component has the mode that `switch` names.",
     "component-parameter": "A component has the parameter that `set` names, and the value is in its range.",
     "condition": "A condition can be evaluated: its predicates, functions, types and arguments are declared.",

@@ -18,6 +18,7 @@ from knowledge_base.language.syntax.expression import Constant
 
 def check_commands(subject: Subject) -> Iterator[Finding]:
     """Yield findings about commands to unknown components, or with unknown names of parameters, modes or ports."""
+    yield from _wires_outside_entry(subject)
     components = subject.components
     for path, action, who in subject.actions() if components is not None else ():
         name = None if isinstance(action, Trigger) else component_of(action)  # the check of skills covers triggers
@@ -26,6 +27,15 @@ def check_commands(subject: Subject) -> Iterator[Finding]:
             yield subject.finding(path, "known-component", message, found=name, valid=components)
         elif name is not None and name in subject.interfaces:
             yield from _command(subject, action, path, who, subject.interfaces[name])
+
+
+def _wires_outside_entry(subject: Subject) -> Iterator[Finding]:
+    """Yield a finding for each wire in `exit` or `on_break`, which no later exit would end."""
+    for path, action, _ in subject.actions():
+        if isinstance(action, Wire | Unwire) and path[-2] in {"exit", "on_break"}:
+            key = "wire" if isinstance(action, Wire) else "unwire"
+            message = f"`{key}` stands in `entry`: the exit of the state restores the wire of before"
+            yield subject.finding(path, "component-wire", message)
 
 
 def _command(

@@ -522,6 +522,8 @@ WRONG = [
     ("component-wire", S + "  a:\n    entry:\n      unwire: lift.hight\n    on: {done: e}\n" + E, 5, "did you mean 'height'", ""),
     ("component-wire", S + "  a:\n    entry:\n      wire: lift.height\n      to: rular.height\n    on: {done: e}\n" + E, 6, "did you mean 'ruler'", ""),
     ("component-wire", S + "  a:\n    entry:\n      wire: lift.height\n      to: scale.weight\n    on: {done: e}\n" + E, 6, "pushes no 'metres'", ""),
+    ("component-wire", S + "  a:\n    exit:\n      wire: lift.height\n      to: ruler.height\n    on: {done: e}\n" + E, 4, "stands in `entry`", ""),
+    ("component-wire", S + "  a:\n    on_break: [{unwire: lift.height}]\n    on: {done: e}\n" + E, 4, "stands in `entry`", ""),
     ("component-message", S + "  a:\n    entry:\n      send: lift.lable\n    on: {done: e}\n" + E, 5, "takes no 'lable'", ""),
     # -- rules are transitions too
     (
