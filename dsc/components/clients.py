@@ -55,9 +55,9 @@ class _Client(Requirement):
 
     def _call(self, report: Callable[[Outcome], None] = lambda _: None) -> SkillCall[Any]:
         if not self._calls:
-            self._of = secrets.token_hex(6)
+            self._prefix = secrets.token_hex(6)
         self._calls += 1
-        return SkillCall(f"{self.name} {self._of} {self._calls}", LoopTime(), report)
+        return SkillCall(f"{self.name} {self._prefix} {self._calls}", LoopTime(), report)
 
     async def _reach(self, work: Callable[[Provider], Coroutine[Any, Any, Any]], within: float | None) -> Any:
         """Start the provider unless it is alive, and return the result of the work on it."""

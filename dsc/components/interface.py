@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from dsc.components.declarations import Parameter
 from dsc.components.life_cycle import NEUTRAL, Life
-from dsc.components.services import Service
+from dsc.components.services import Pattern, Service
 from dsc.skills import SkillSignature
 from knowledge_base.errors import UnknownNameError
 
@@ -80,11 +80,7 @@ class Interface:
 def _service_of(signature: SkillSignature) -> Service:
     """Return the service of a query, an event or a message."""
     gives = next(iter(signature.outcomes.values()), {})
-    defaults = frozenset(signature.defaults)
-    match signature.pattern:
-        case "query":
-            return Service("query", signature.parameters, gives, defaults)
-        case "event":
-            return Service("event", signature.parameters, gives, defaults)
-        case _:
-            return Service("send", signature.parameters, {}, defaults)
+    return Service(_PATTERNS[signature.pattern], signature.parameters, gives, frozenset(signature.defaults))
+
+
+_PATTERNS: Mapping[str, Pattern] = {"query": "query", "event": "event", "message": "send"}

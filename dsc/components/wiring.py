@@ -59,16 +59,24 @@ def wiring_errors(components: Iterable[Component]) -> Iterator[tuple[Requirement
                     yield port, _missing(port, component, deployed.values())
 
 
-def required_port(name: str, components: Mapping[str, Component]) -> tuple[Component, Requirement]:
-    """Return the component and its required port for `component.port`; raise `UnknownNameError` if it is missing."""
+def required_port(
+    name: str, components: Mapping[str, Component], to: str | None = None
+) -> tuple[Component, Requirement]:
+    """Return the component and its required port for `component.port`.
+
+    Raises:
+        UnknownNameError: there is no such component or port.
+        InputError: the provider `to` does not fit the port, see `provider_for`.
+    """
     component, _, port = name.partition(".")
     if component not in components:
         raise UnknownNameError(f"there is no component '{component}'", found=component, valid=components)
     owner = components[component]
-    if port not in owner.requirements:
-        message = f"component '{component}' requires no port '{port}'"
-        raise UnknownNameError(message, found=port, valid=owner.requirements)
-    return owner, owner.requirements[port]
+    owner.interface().require_port(component, port)
+    required = owner.requirements[port]
+    if to is not None:
+        provider_for(required, owner, components, to)
+    return owner, required
 
 
 def provider_for(
@@ -171,9 +179,7 @@ class Wiring:
         Raises:
             InputError: as for `provider_for`; then nothing has changed.
         """
-        owner, required = required_port(port, self._components)
-        if to is not None:
-            provider_for(required, owner, self._components, to)
+        owner, required = required_port(port, self._components, to)
         changes = [one for one in self.changes.get(port, ()) if one[0] != activation]
         changes.insert(0 if activation == 0 else len(changes), (activation, to))
         self.changes[port] = changes

@@ -10,7 +10,7 @@ from typing import Any
 from dsc.calls import OBSERVED, RECORDED
 from dsc.components.component import Component
 from dsc.components.hooks import is_own, running_task
-from dsc.components.wiring import provider_for, required_port
+from dsc.components.wiring import required_port
 from dsc.data_types import WORDS, Records, check_all, data_type, objects_in
 from dsc.dynamic.library import Library
 from dsc.engine.steps import NO_CHANGE, Start
@@ -339,9 +339,7 @@ def checked_wire(port: str, to: str | None, components: Mapping[str, Component])
     require_text(port, "a required port")
     if to is not None:
         require_text(to, "a provided port")
-    owner, required = required_port(port, components)
-    if to is not None:
-        provider_for(required, owner, components, to)
+    required_port(port, components, to)
     return WireMessage(port, to)
 
 
