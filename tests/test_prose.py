@@ -203,8 +203,3 @@ def test_a_pending_room_exists_and_still_breaks_a_rule(name: str) -> None:
     """Take a room off the list as soon as it passes."""
     inside = [path for path in prose.prose() if prose.room(path) == name]
     assert any(prose.findings(path) for path in inside), f"remove {name!r} from PENDING"
-
-
-def test_each_row_of_the_key_is_cited() -> None:
-    cited = {row for path in prose.citing() if path.suffix == ".py" for _, row in prose.cited(path)}
-    assert prose.key() - cited == set()
