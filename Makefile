@@ -96,6 +96,9 @@ soak-hosts: $(VENV)/.test   ## hosts of two robots and a device killed and stopp
 test-wire: $(VENV)/.test   ## the whole suite of a transport over Zenoh, also over a bad network, in real time
 	WIRE=1 $(BIN)/python -m pytest -n 4 tests/dsc/wire/test_zenoh.py
 
+test-deadlines: $(VENV)/.test   ## random sets of real-time tasks: do the tests of deadlines agree with simulated schedules? (SETS=N)
+	SETS=$(or $(SETS),10000) $(BIN)/python -m pytest tests/dsc/deployment/test_schedulability.py
+
 kill-kb: $(VENV)/.test   ## kill -9 a process that writes a store, for each durability: is all that it acknowledged there? (KILLS=N)
 	KILLS=$(or $(KILLS),100) $(BIN)/python -m pytest tests/knowledge_base/journal/test_kb_kill.py
 
@@ -169,6 +172,8 @@ pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/search.yaml --svg docs/pictures/search.svg
 	$(BIN)/dsc plot show planning/plots/achieve.yaml --svg docs/pictures/achieve.svg
 	$(BIN)/dsc plot show docs/plots/life_cycle.yaml --svg docs/pictures/life_cycle.svg
+	$(BIN)/dsc deployment draw examples/strangers/lab.yaml --svg docs/pictures/deployment.svg
+	$(BIN)/dsc deployment draw examples/strangers/lab.yaml --timeline --svg docs/pictures/worst_cases.svg
 	$(BIN)/dsc kb draw examples/kitchen/problem.pddl --to docs/pictures/kitchen.svg
 
 NODE_MODULES := frontend/node_modules/.made

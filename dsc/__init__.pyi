@@ -12,6 +12,8 @@ from dsc.components.clients import SendClient as SendClient
 from dsc.components.clients import StateClient as StateClient
 from dsc.components.component import ALWAYS as ALWAYS
 from dsc.components.component import Component as Component
+from dsc.components.demands import Demand as Demand
+from dsc.components.demands import TimedTask as TimedTask
 from dsc.components.life_cycle import Life as Life
 from dsc.components.parameters import Parameters as Parameters
 from dsc.components.parameters import parameter as parameter

@@ -17,6 +17,7 @@ import pytest
 from domains.butler import Scenario as ButlerScenario
 from domains.clean_up_table import Scenario
 from dsc import load_library, load_plot, parse_plot
+from dsc.deployment.model import parse_deployment
 from dsc.drawing import draw
 from dsc.text.profiles import parse_profile
 from planning.engines.registry import engine
@@ -40,7 +41,7 @@ def test_python_on_a_page_runs_from_top_to_bottom(page):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_yaml_on_a_page_is_a_plot_a_profile_or_a_scenario(page):
     readers: dict[str, Callable[..., object]] = {
-        "plot": parse_plot, "profile": parse_profile, "says": ButlerScenario.parse,
+        "plot": parse_plot, "profile": parse_profile, "says": ButlerScenario.parse, "deployment": parse_deployment,
     }  # fmt: skip
     for block in blocks(page, "yaml"):
         read = readers.get(block.partition(":")[0], Scenario.parse)
@@ -173,6 +174,14 @@ def test_the_pictures_are_what_the_project_draws_today(name):
     picture = (ROOT / "docs" / "pictures" / f"{name}.svg").read_text()
     folder = PICTURES[name]
     assert picture == draw(load_plot(folder / f"{name}.yaml"), load_library(folder)), "make pictures"
+
+
+@pytest.mark.parametrize(("name", "options"), [("deployment", []), ("worst_cases", ["--timeline"])])
+def test_the_pictures_of_the_deployment_are_what_the_project_draws_today(name, options):
+    dsc = Path(sys.executable).with_name("dsc")
+    command = [dsc, "deployment", "draw", ROOT / "examples" / "strangers" / "lab.yaml", *options]
+    drawn = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert (ROOT / "docs" / "pictures" / f"{name}.svg").read_text() == drawn, "make pictures"
 
 
 def test_every_picture_is_shown_somewhere():

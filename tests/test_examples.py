@@ -1,15 +1,20 @@
 """Every example runs and prints what its last lines say; a new example is covered the day it appears."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 import tutorial
+from typer.testing import CliRunner
+
+from planning.cli.command import app
 
 FOLDER = Path(__file__).parent.parent / "examples"
-EXAMPLES = sorted({*FOLDER.rglob("*.py")} - {FOLDER / "service.py"})  # the service has a test of its own
 MARK = "# Expected output:\n"
+PARTS = {FOLDER / "service.py", *FOLDER.glob("strangers/*_maker.py")}  # the service has a test of its own
+EXAMPLES = sorted({*FOLDER.rglob("*.py")} - PARTS)
 
 
 def expected(source: str) -> str:
@@ -24,6 +29,16 @@ def test_an_example_prints_its_expected_output(example):
     assert [line.rstrip() for line in done.stdout.splitlines()] == [
         line.rstrip() for line in expected(example.read_text()).splitlines()
     ]
+
+
+def test_the_bundles_of_strangers_know_no_other_bundle():
+    for maker in FOLDER.glob("strangers/*_maker.py"):
+        assert not re.search("(laser|map|power)_maker", maker.read_text()), maker
+
+
+def test_the_deployment_of_the_strangers_has_no_mistake():
+    result = CliRunner().invoke(app, ["deployment", "check", str(FOLDER / "strangers" / "lab.yaml")])
+    assert result.exit_code == 0, result.output
 
 
 def test_there_are_examples():

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 from dsc.annotations import Namespace, class_statement, evaluated
 from dsc.calls import Ended, SkillCall, Status
+from dsc.components.demands import Demand, read_demands
 from dsc.components.interface import Interface
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
 from dsc.components.parameters import Configuration, Parameters
@@ -46,6 +47,8 @@ class ComponentHooks:
         period: seconds between two calls of `step`; `None` without such steps.
         needs: for each mode, a tuple of names of required components, or of the component's required ports, whose
             providers it then needs; the key `ALWAYS` applies in every mode.
+        demands: for each mode, the hardware, resources and real-time tasks that the component needs of its host, see
+            `dsc.components.demands`; the key `ALWAYS` applies in every mode.
         parameters: the present values. A component declares its parameters by a subclass: `parameters: BaseParameters`;
             without one, any name is valid.
         life: the life cycle. When the device is lost, call `self.life.become(Life.FATAL_ERROR, "no power")`.
@@ -57,6 +60,7 @@ class ComponentHooks:
     modes: ClassVar[tuple[str, ...] | Mapping[str, tuple[str, ...]]] = ()
     device_errors: ClassVar[tuple[type[BaseException], ...]] = ()
     needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    demands: ClassVar[Mapping[str, Demand]] = {}
     period: float | None = None
 
     parameters: Parameters
@@ -167,6 +171,8 @@ class Component(ComponentHooks, RestartHooks):
             with tolerated():
                 check(cls)
         with class_statement(cls) as names:
+            if "demands" in vars(cls):
+                cls.demands = read_demands(vars(cls)["demands"])
             if "parameters" in get_annotations(cls):
                 cls.parameter_class = _parameter_class(cls, names)
             elif "parameters" in vars(cls):

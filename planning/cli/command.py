@@ -21,6 +21,7 @@ from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import register_reader
 from planning.cli import bundles_command, plan_command
 from planning.cli.check import check_command
+from planning.cli.deployment import app as deployment_app
 from planning.cli.doctor import doctor_command
 from planning.cli.host import host_command
 from planning.cli.new import new_command
@@ -58,6 +59,7 @@ app = typer.Typer(
 app.add_typer(plots.app, name="plot")
 app.add_typer(kb_app, name="kb")
 app.add_typer(runs_app, name="runs")
+app.add_typer(deployment_app, name="deployment")
 app.command("new")(new_command)
 app.command("run")(run_command)
 app.command("host")(host_command)

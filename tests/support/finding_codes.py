@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterable
 from pathlib import Path
 
-_CODE_IN = {"Finding": 1, "finding": 1, "caught": 2, "_plain": 3, "_evaluable": 3, "_untaken": 4}
+_CODE_IN = {"Finding": 1, "finding": 1, "caught": 2, "finding_at": 3, "_plain": 3, "_evaluable": 3, "_untaken": 4}
 """The position of the code among the arguments of calls that make findings."""
 
 

@@ -1,0 +1,77 @@
+"""Deadlines of real-time tasks: each core of each host, in each mode (S1.12)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dsc.components.demands import TimedTask
+from dsc.deployment.cores import Core, Verdict, cores_of, verdict_of
+from dsc.deployment.model import Deployment
+from dsc.deployment.tasks import Task
+from dsc.deployment.words import finding_at, in_mode, shown_time
+from dsc.errors import Finding
+from dsc.model.reading import FormPath
+from knowledge_base.errors import InputError
+
+SCHEDULE = "deployment-schedule"
+
+
+def check_deadlines(deployment: Deployment) -> Iterator[Finding]:
+    """Yield tasks without a core or with unclear priorities, and cores whose tasks may miss their deadlines."""
+    wrong = list(_task_mistakes(deployment))
+    yield from wrong
+    for core in () if wrong else cores_of(deployment):
+        try:
+            verdict = verdict_of(core)
+        except InputError as error:
+            error.place = deployment.place(("hosts", core.host))
+            yield Finding(error, SCHEDULE)
+            continue
+        for task in verdict.late(core)[: 1 if core.policy == "earliest_deadline" else None]:
+            component, name = task.name.split(".", 1)
+            path = ("hosts", core.host) if verdict.overload else _task_path(deployment, component, name)
+            yield finding_at(deployment, path, _delay(core, task, verdict), SCHEDULE)
+
+
+def _task_mistakes(deployment: Deployment) -> Iterator[Finding]:
+    explicit: dict[tuple[str, int], bool] = {}
+    for component, path, task in _all_tasks(deployment):
+        host = deployment.host_of(component) or ""
+        platform = deployment.platforms[deployment.hosts[host].platform]
+        where = (*path, "core")
+        if task.core >= platform.cores:
+            message = f"host '{host}' has no core {task.core}; its last core is {platform.cores - 1}"
+            yield finding_at(deployment, where, message, SCHEDULE)
+        elif platform.scheduling == "fixed_priority":
+            given = task.priority is not None
+            if explicit.setdefault((host, task.core), given) != given:
+                message = f"either all tasks on core {task.core} of host '{host}' have a priority, or none of them"
+                yield finding_at(deployment, path, message, SCHEDULE)
+
+
+def _all_tasks(deployment: Deployment) -> Iterator[tuple[str, FormPath, TimedTask]]:
+    for component, placed in deployment.components.items():
+        for path, demand in placed.demands(None):
+            for name, task in demand.tasks.items():
+                yield component, ("components", component, *path, "tasks", name), task
+
+
+def _task_path(deployment: Deployment, component: str, name: str) -> FormPath:
+    paths = (path for owner, path, _ in _all_tasks(deployment) if owner == component and path[-1] == name)
+    return next(paths, ("components", component))
+
+
+def _delay(core: Core, task: Task, verdict: Verdict) -> str:
+    where = f"core {core.number} of host '{core.host}'{in_mode(core.mode)}"
+    if core.utilisation > 1:
+        return f"the tasks on {where} need {core.utilisation:.0%} of its time"
+    if verdict.overload is not None:
+        due, work = shown_time(verdict.overload.time), shown_time(verdict.overload.work)
+        return f"{due} after all tasks on {where} have arrived together, {work} of work are due"
+    worst = verdict.responses[task.name] or 0
+    urgent = [one.name for one in core.tasks if one is not task and one.priority >= task.priority]
+    behind = f" behind {', '.join(urgent)}" if urgent else ""
+    return (
+        f"task '{task.name}' may end {shown_time(worst)} or more after its arrival{behind} on {where}, but its deadline"
+        f" is {shown_time(task.deadline)}"
+    )

@@ -1,0 +1,119 @@
+"""`dsc deployment`: a model is compared with its robot, drawn, and simulated."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from planning.cli.command import app
+
+ROBOT = """
+from dsc import Component, Push, Stream
+from planning import Bundle, PlanningDomain
+
+
+class Laser(Component):
+    demands = {"": {"hardware": ["laser"], "tasks": {"scan": {"period": 0.05, "worst_case": 0.008}}}}
+    scan = Push({"metres": "number"})
+
+
+class Mapper(Component):
+    name = "mapper"
+    demands = {"": {"resources": {"memory": 200}}, "mapping": {"resources": {"memory": 600}}}
+    modes = ("mapping",)
+    scan = Stream({"metres": "number"})
+
+
+def bundle():
+    return Bundle("lasers", components=lambda: [Laser("front"), Laser("rear"), Mapper()], goal="(mapped)",
+                  domain=PlanningDomain.parse("(define (domain d) (:predicates (mapped)))"))
+"""
+PROFILE = "profile: rear\nwiring: {mapper.scan: rear.scan}\n"
+MODEL = """
+deployment: lab
+robot: lasers.py:bundle
+profile: rear.yaml
+platforms: {pc: {resources: {memory: 1000}}}
+hosts: {base: {platform: pc}}
+devices: {one: {kind: laser, host: base}, two: {kind: laser, host: base}}
+groups: {sight: {host: base, components: [front, rear, mapper]}}
+components: {rear: {tasks: {scan: {period: 0.04, worst_case: 0.01}}}}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "lasers.py").write_text(ROBOT)
+    (tmp_path / "rear.yaml").write_text(PROFILE)
+    (tmp_path / "lab.yaml").write_text(MODEL)
+    return tmp_path
+
+
+def invoke(*words):
+    return CliRunner().invoke(app, ["deployment", *map(str, words)])
+
+
+def with_model(folder, old, new):
+    assert old in MODEL
+    (folder / "lab.yaml").write_text(MODEL.replace(old, new))
+
+
+def test_the_demands_of_classes_and_of_the_model_are_checked_together(folder):
+    result = invoke("check", folder / "lab.yaml")
+    assert result.exit_code == 0, result.output
+    assert "base, core 0, fixed priority: utilisation 41.0%, bound 82.8%" in result.output
+    rear, front = [line.split() for line in result.output.splitlines() if ".scan" in line]
+    assert (rear[0], rear[-2], front[0], front[-2]) == ("rear.scan", "10", "front.scan", "18")
+    assert "no mistakes found" in result.output
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (", two: {kind: laser, host: base}", "", "needs 'laser', but others use 'one' of host 'base'"),
+        ("memory: 1000", "memory: 700", "has 700 of 'memory', but its components use 800 (mapper 800)"),
+        ("[front, rear, mapper]", "[front, rear]", "component 'mapper' of the robot has no host"),
+        ("components: {", "components: {sonar: {host: base}, ", "the robot has no component 'sonar'"),
+        ("profile: rear.yaml\n", "", "several services fit port 'mapper.scan': front.scan, rear.scan"),
+        ("worst_case: 0.01", "worst_case: 0.036", "the tasks on core 0 of host 'base' need 106% of its time"),
+    ],
+)
+def test_a_robot_that_does_not_fit_is_reported(folder, old: str, new: str, said: str):
+    with_model(folder, old, new)
+    result = invoke("check", folder / "lab.yaml")
+    assert result.exit_code == 2
+    assert said in result.output
+    (found, *_) = json.loads(invoke("check", folder / "lab.yaml", "--json").output)
+    assert found["code"].startswith("deployment-")
+
+
+def test_a_simulation_never_exceeds_the_worst_response(folder):
+    result = invoke("simulate", folder / "lab.yaml", "--seconds", 60, "--json")
+    assert result.exit_code == 0
+    rows = json.loads(result.output)
+    assert [row["task"] for row in rows] == ["rear.scan", "front.scan"]
+    for row in rows:
+        assert row["missed"] == 0
+        assert 0 < row["response"] <= row["worst_response"] <= row["deadline"]
+    text = invoke("simulate", folder / "lab.yaml", "--seconds", 60).output
+    assert "1500 jobs, 0 missed; response 10 ms, at worst 10 ms" in text
+    with_model(folder, "worst_case: 0.01", "worst_case: 0.036")
+    assert invoke("simulate", folder / "lab.yaml").exit_code == 2
+
+
+def test_drawings_are_written(folder):
+    assert invoke("draw", folder / "lab.yaml", "--svg", folder / "out.svg").exit_code == 0
+    assert 'class="wire"' in (folder / "out.svg").read_text()
+    assert "worst cases of lab" in invoke("draw", folder / "lab.yaml", "--timeline").output
+
+
+def test_a_model_without_a_robot_needs_no_classes(folder):
+    plain = MODEL.replace("robot: lasers.py:bundle\nprofile: rear.yaml\n", "").replace(
+        "[front, rear, mapper]", "[rear]"
+    )
+    (folder / "plain.yaml").write_text(plain)
+    assert invoke("check", folder / "plain.yaml").exit_code == 0
+    with_model(folder, "robot: lasers.py:bundle", "robot: laserz.py")
+    assert "laserz.py" in str(invoke("check", folder / "lab.yaml").exception)
