@@ -154,7 +154,7 @@ class Requirement:
             whose = "" if provider is None else f" to '{provider.name}'"
             if cut.done():
                 raise NotWiredError(f"the wire of '{self.name}'{whose} was cut during a call")
-            raise NoAnswerError(f"no answer to '{self.name}'{whose} within {within:g} s")
+            raise NoAnswerError(f"the call of '{self.name}'{whose} has no answer within {within:g} s")
         finally:
             self._pending.discard(cut)
             if not task.done():

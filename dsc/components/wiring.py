@@ -39,6 +39,19 @@ def choose_sources(components: Iterable[Component], wiring: Mapping[str, str]) -
         ports[name].source = provider
 
 
+def name_sources(owners: Iterable[Component], components: Iterable[Component]) -> None:
+    """Set the source of each required port of the owners without one to its only provider among the components.
+
+    Raises:
+        InputError: several services fit a port.
+    """
+    deployed = {one.name: one for one in components}
+    for owner in owners:
+        for port in owner.requirements.values():
+            if port.source is None and (provider := provider_for(port, owner, deployed)) is not None:
+                port.source = provider.name
+
+
 def require_wired(components: Iterable[Component]) -> None:
     """Raise the first error of `wiring_errors`, if there is one."""
     for _, error in wiring_errors(components):

@@ -3,6 +3,7 @@ from dsc.wire.endpoint import LocalTransport as LocalTransport
 from dsc.wire.endpoint import Transport as Transport
 from dsc.wire.heartbeat import Heartbeat as Heartbeat
 from dsc.wire.host import Host as Host
+from dsc.wire.hosted_wiring import HostedWiring as HostedWiring
 from dsc.wire.realm import client_transport as client_transport
 from dsc.wire.realm import connect_all as connect_all
 from dsc.wire.realm import host_transport as host_transport

@@ -38,6 +38,9 @@ def host_command(
         bool,
         typer.Option("--supervised", help="Start the program again when it crashes or hangs, with growing delays."),
     ] = False,
+    profile: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", help="The robot, its parameters and its wiring, as for dsc run.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the simulation's faults.")] = None,
     faults: Annotated[float | None, typer.Option(min=0.0, max=1.0, help="Chance of a fault per skill call.")] = None,
     realm: Realm = REALM,
@@ -68,7 +71,8 @@ def host_command(
     async def main() -> None:
         with host_transport(realm, listen or (), connect or (), zenoh) as transport:
             if plots is None:
-                await _host(_devices(bundle, only or [], seed, faults), transport, replace=replace)
+                found = _devices(bundle, only or [], seed, faults, profile)
+                await _host(found, transport, replace=replace)
                 return
             if only:
                 raise InputError("a program hosts components, or plots: give --only, or --plots")
@@ -88,17 +92,35 @@ def _supervise() -> int:
     return Supervisor([sys.executable, *command], lambda line: typer.echo(line, err=True)).run()
 
 
-def _devices(bundle: Bundle, only: list[str], seed: int | None, faults: float | None) -> list[Component]:
-    """Return the components of a bundle, or some of them."""
+def _devices(
+    bundle: Bundle, only: list[str], seed: int | None, faults: float | None, profile: str | None
+) -> list[Component]:
+    """Return the components of a bundle, or some of them; each of their required ports has a source."""
+    from pathlib import Path
+
+    from dsc.text.profiles import find_profile
     from planning.robot.bringup import devices
 
-    found = {one.name: one for one in devices(bundle, seed=seed, faults=faults)}
+    settings = None if profile is None else find_profile(profile, bundle.profiles or Path())
+    found = {one.name: one for one in devices(bundle, seed=seed, faults=faults, profile=settings)}
     for name in only:
         if name not in found:
             raise UnknownNameError(f"'{bundle.name}' has no component '{name}'", found=name, valid=found)
     if not found:
         raise InputError(f"'{bundle.name}' has no components to host; --plots NAME hosts its plots", found=bundle.name)
-    return [one for name, one in found.items() if not only or name in only]
+    hosted = {name: one for name, one in found.items() if not only or name in only}
+    _name_sources(hosted, found, bundle)
+    return list(hosted.values())
+
+
+def _name_sources(hosted: dict[str, Component], found: dict[str, Component], bundle: Bundle) -> None:
+    """Choose the providers of the hosted components; without remote components, each port must have one."""
+    from dsc.components.wiring import name_sources, wiring_errors
+
+    for port, error in () if bundle.remote else wiring_errors(found.values()):
+        if port.name.partition(".")[0] in hosted:
+            raise error
+    name_sources(hosted.values(), found.values())
 
 
 async def _robot(bundle: Bundle, seed: int | None, faults: float | None, transport: ZenohTransport) -> Robot:
@@ -124,6 +146,7 @@ async def _host(components: list[Component], transport: ZenohTransport, *, repla
 
     from dsc.sequencer.clock import LoopClock
     from dsc.wire.host import Host
+    from dsc.wire.hosted_wiring import HostedWiring
     from dsc.wire.realm import SOON, hosted_names
     from dsc.wire.service_manager import READY, ServiceManager
 
@@ -133,6 +156,7 @@ async def _host(components: list[Component], transport: ZenohTransport, *, repla
             message = f"another program hosts '{one.name}' in the realm '{transport.realm}': end it, or --replace it"
             raise InputError(message, found=one.name)
     hosts = [Host(one, transport, LoopClock()) for one in components]
+    wires = asyncio.create_task(HostedWiring(components, transport).run())
     names = ", ".join(one.name for one in components)
     typer.echo(f"hosting {names} in the realm '{transport.realm}'; Ctrl-C ends it")
     ended = asyncio.Event()
@@ -146,6 +170,7 @@ async def _host(components: list[Component], transport: ZenohTransport, *, repla
     await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
     for task in waiting:
         task.cancel()
+    wires.cancel()
     for host in hosts:
         await host.close()
     if not ended.is_set() and all(host.replaced.is_set() for host in hosts):

@@ -197,11 +197,14 @@ def _require_remote(bundle: Bundle, remote: Sequence[Component]) -> None:
             raise InputError(message, found=name)
 
 
-def devices(bundle: Bundle, *, seed: int | None = None, faults: float | None = None) -> tuple[Component, ...]:
+def devices(
+    bundle: Bundle, *, seed: int | None = None, faults: float | None = None, profile: Profile | None = None
+) -> tuple[Component, ...]:
     """Return new components of a bundle, those of its simulation included, to host them; errors as for `deploy`."""
     _require_simulated(bundle, seed=seed, faults=faults)
-    components = require_instances(_components(bundle, simulated(bundle, Setup(seed, faults))))
-    configure(components)
+    components = require_instances(_components(bundle, simulated(bundle, Setup(seed, faults, profile=profile))))
+    choose_sources(components, wiring_of(gathered([bundle])))
+    configure(components, profile)
     return components
 
 

@@ -17,12 +17,13 @@ from dsc.components.ports import event, query, takes
 from dsc.components.requirement import Requirement
 from dsc.components.services import Service
 from dsc.components.streams import Push, Stream
-from dsc.components.wiring import Wiring, choose_sources, require_wired, wiring_errors
+from dsc.components.wiring import Wiring, choose_sources, name_sources, require_wired, wiring_errors
 from dsc.errors import NoAnswerError, NotWiredError, SkillError
 from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.wire.endpoint import LocalTransport
 from dsc.wire.host import Host
+from dsc.wire.hosted_wiring import HostedWiring
 from dsc.wire.remote import RemoteComponent
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 
@@ -248,7 +249,7 @@ def test_a_late_answer_and_wrong_arguments():
     async def main():
         watch = Watch()
         wired(Cell(hours=20.0), watch)
-        with pytest.raises(NoAnswerError, match=r"no answer to 'watch\.battery' to 'cell\.lasts' within 3 s"):
+        with pytest.raises(NoAnswerError, match=r"call of 'watch\.battery' to 'cell\.lasts' has no answer within 3 s"):
             await watch.battery.ask(watts=60.0, within=3)
         with pytest.raises(InputError, match="needs its argument 'watts'"):
             await watch.battery.ask()
@@ -402,3 +403,58 @@ def test_a_wiring_is_accepted_if_each_requirement_has_one_provider(wants, offers
     refused = {port.name for port, _ in wiring_errors([user, *[_offers(n, one) for n, one in enumerate(offers)]])}
     fitting = {f"user.port_{n}": sum(_accepted(wanted, one) for one in offers) for n, wanted in enumerate(wants)}
     assert refused == {name for name, count in fitting.items() if count != 1}
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_a_hosted_component_uses_components_of_its_program_and_of_others(far):
+    async def main():
+        transport, clock = LocalTransport(), LoopClock()
+        cell, watch = Cell(), Watch()
+        name_sources([watch], [cell, watch])
+        assert watch.battery.source == "cell.lasts"
+        here = Host(watch, transport, clock)
+        there = [] if far else [Host(cell, transport, clock)]
+        wires = asyncio.ensure_future(HostedWiring([watch] if far else [watch, cell], transport).run())
+        await asyncio.sleep(5)
+        if far:
+            with pytest.raises(NotWiredError):
+                await watch.battery.ask(watts=60.0)
+            there = [Host(cell, transport, clock)]  # it starts later
+            await asyncio.sleep(20)
+        assert await watch.battery.ask(watts=60.0) == {"hours": 2.0}
+        await watch.settings.set(reserve=5.0)
+        assert cell.parameters.reserve == 5.0
+        if far:
+            await there[0].close()
+            with pytest.raises((NoAnswerError, SkillError)):
+                await watch.battery.ask(watts=60.0)
+            there = [Host(Cell(hours=3.0), transport, clock)]
+            await asyncio.sleep(20)
+            assert await watch.battery.ask(watts=60.0) == {"hours": 3.0}
+        wires.cancel()
+        await asyncio.wait([wires])
+        with pytest.raises(NotWiredError):
+            await watch.battery.ask(watts=60.0)
+        for host in (here, *there):
+            await host.close()
+
+    simulate(main)
+
+
+def test_a_provider_of_another_program_that_does_not_fit_is_reported(caplog):
+    async def main():
+        transport, clock = LocalTransport(), LoopClock()
+        watch = Watch()
+        choose_sources([watch], {"watch.battery": "laser.scan"})
+        hosts = [Host(watch, transport, clock), Host(Laser("laser"), transport, clock)]
+        wires = asyncio.ensure_future(HostedWiring([watch], transport).run())
+        await asyncio.sleep(5)
+        with pytest.raises(NotWiredError):
+            await watch.battery.ask(watts=60.0)
+        wires.cancel()
+        await asyncio.wait([wires])
+        for host in hosts:
+            await host.close()
+
+    simulate(main)
+    assert "port 'watch.battery' is not wired" in caplog.text

@@ -298,3 +298,18 @@ def test_a_kept_run_that_is_killed_continues_with_its_remote_components(cell, tm
         report = json.loads(cell.said("run", "--resume", str(store), "--json").splitlines()[-1])
         assert report["goal_reached"]
     assert Counter(one["box"] for one in cell.lines() if one["what"] == "moved") == dict.fromkeys(BOXES, 1)
+
+
+def test_hosted_components_use_components_of_other_programs(cell):
+    strangers = Path(__file__).parents[3] / "examples" / "strangers"
+    battery = cell.host("--only", "accumulator", target=strangers / "robot.py")
+    listening, cell.endpoint = cell.endpoint, free_endpoint()
+    others = [word for name in ("front", "rear", "cartographer") for word in ("--only", name)]
+    profile = ["--profile", strangers / "backwards.yaml"]
+    cell.host(*others, *profile, "--connect", listening, target=strangers / "robot.py")
+    cell.said("call", "cartographer", "--switch", "mapping")
+    assert "metres=2.0, hours=1.5" in cell.said("call", "cartographer.survey", "--within", "5").replace(": ", "=")
+    battery.kill()
+    battery.wait()
+    ended = cell.said("call", "cartographer.survey", "--within", "5", status=1)
+    assert "the call of 'cartographer.energy' to 'accumulator.remaining' has no answer within 1 s" in ended
