@@ -25,7 +25,7 @@ CODES: Mapping[str, str] = {
     "deployment-placement": "Each component of a deployment has one host, and each name is declared.",
     "deployment-resources": "A host has enough of each resource for its active components.",
     "deployment-schedule": "The real-time tasks of each core meet their deadlines.",
-    "deployment-wiring": "Each required port of a deployed robot has a provider that fits.",
+    "deployment-needs": "The components that an active component needs are active in the same mode of the robot.",
     "dialect": "A form of SCXML is used only in a plot with `dialect: scxml`.",
     "distinct-names": "Names of one kind differ in more than their case and Unicode form.",
     "done-at-once": "A state that starts a skill reacts to the skill's outcome, as it is done immediately.",
@@ -75,5 +75,6 @@ CODES: Mapping[str, str] = {
     "turns": "Parallel work does not wait for itself at a component that executes one skill at a time.",
     "used-plot": "A plot with `when` implements a planning action, or another part of the robot names it.",
     "value-fits": "A value has the type of its place.",
+    "wiring": "Each required port of a robot has one provider that fits.",
 }
 """Conditions that hold without the finding, by code."""

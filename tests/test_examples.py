@@ -36,6 +36,14 @@ def test_the_bundles_of_strangers_know_no_other_bundle():
         assert not re.search("(laser|map|power)_maker", maker.read_text()), maker
 
 
+def test_the_run_of_the_strangers_prints_its_outputs():
+    folder = FOLDER / "strangers"
+    words = ["run", str(folder / "robot.py"), "--profile", str(folder / "backwards.yaml"), "--quiet"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    assert "outputs: metres 2.0, hours 1.5" in result.output
+
+
 def test_the_deployment_of_the_strangers_has_no_mistake():
     result = CliRunner().invoke(app, ["deployment", "check", str(FOLDER / "strangers" / "lab.yaml")])
     assert result.exit_code == 0, result.output

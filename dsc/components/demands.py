@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from dsc.model.language import Frozen
 from dsc.model.reading import LOCATED, Form
+
+Amount = Annotated[float, Field(ge=0)]
+"""An amount of a resource, in the unit of the resource."""
 
 
 class TimedTask(Frozen):
@@ -57,7 +60,7 @@ class Demand(Frozen):
     """
 
     hardware: tuple[str, ...] = ()
-    resources: dict[str, float] = Field(default_factory=dict)
+    resources: dict[str, Amount] = Field(default_factory=dict)
     tasks: dict[str, TimedTask] = Field(default_factory=dict)
 
 

@@ -127,8 +127,11 @@ def named_service(
 
 def ambiguous(port: str, fitting: Sequence[str]) -> InputError:
     """Return the error that several provided ports fit a required one."""
-    wire = f"`wiring: {{{port}: {fitting[0]}}}`"
-    message = f"several services fit port '{port}': {', '.join(fitting)}; choose one in the profile, as in {wire}"
+    wire = f'wiring={{"{port}": "{fitting[0]}"}}'
+    message = (
+        f"several services fit port '{port}': {', '.join(fitting)}; choose one for the robot, e.g. Bundle({wire}), or"
+        " under `wiring` in a profile, which a run then names"
+    )
     return InputError(message, found=port)
 
 

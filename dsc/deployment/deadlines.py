@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dsc.components.demands import TimedTask
 from dsc.deployment.cores import Core, Verdict, cores_of, verdict_of
 from dsc.deployment.model import Deployment
+from dsc.deployment.schedulability import demand
 from dsc.deployment.tasks import Task
 from dsc.deployment.words import finding_at, in_mode, shown_time
 from dsc.errors import Finding
@@ -18,7 +19,7 @@ SCHEDULE = "deployment-schedule"
 
 def check_deadlines(deployment: Deployment) -> Iterator[Finding]:
     """Yield tasks without a core or with unclear priorities, and cores whose tasks may miss their deadlines."""
-    wrong = list(_task_mistakes(deployment))
+    wrong = list(check_tasks(deployment))
     yield from wrong
     for core in () if wrong else cores_of(deployment):
         try:
@@ -33,7 +34,8 @@ def check_deadlines(deployment: Deployment) -> Iterator[Finding]:
             yield finding_at(deployment, path, _delay(core, task, verdict), SCHEDULE)
 
 
-def _task_mistakes(deployment: Deployment) -> Iterator[Finding]:
+def check_tasks(deployment: Deployment) -> Iterator[Finding]:
+    """Yield tasks on cores that their host does not have, and priorities of only some tasks on a core."""
     explicit: dict[tuple[str, int], bool] = {}
     for component, path, task in _all_tasks(deployment):
         host = deployment.host_of(component) or ""
@@ -51,8 +53,8 @@ def _task_mistakes(deployment: Deployment) -> Iterator[Finding]:
 
 def _all_tasks(deployment: Deployment) -> Iterator[tuple[str, FormPath, TimedTask]]:
     for component, placed in deployment.components.items():
-        for path, demand in placed.demands(None):
-            for name, task in demand.tasks.items():
+        for path, needs in placed.demands(None):
+            for name, task in needs.tasks.items():
                 yield component, ("components", component, *path, "tasks", name), task
 
 
@@ -64,10 +66,17 @@ def _task_path(deployment: Deployment, component: str, name: str) -> FormPath:
 def _delay(core: Core, task: Task, verdict: Verdict) -> str:
     where = f"core {core.number} of host '{core.host}'{in_mode(core.mode)}"
     if core.utilisation > 1:
-        return f"the tasks on {where} need {core.utilisation:.0%} of its time"
+        shares = ", ".join(f"{one.name} {float(one.utilisation):.0%}" for one in core.tasks)
+        return f"the tasks on {where} need {core.utilisation:.0%} of its time: {shares}"
     if verdict.overload is not None:
-        due, work = shown_time(verdict.overload.time), shown_time(verdict.overload.work)
-        return f"{due} after all tasks on {where} have arrived together, {work} of work are due"
+        time, work = verdict.overload.time, verdict.overload.work
+        due = [one for one in core.tasks if one.deadline - one.jitter <= time]
+        parts = ", ".join(f"{one.name} {shown_time(demand([one], time))}" for one in due)
+        blocked = " with blocking" if any(one.blocking for one in due) else ""
+        return (
+            f"{shown_time(time)} after all tasks on {where} have arrived together, {shown_time(work)} of work are"
+            f" due{blocked}: {parts}"
+        )
     worst = verdict.responses[task.name] or 0
     urgent = [one.name for one in core.tasks if one is not task and one.priority >= task.priority]
     behind = f" behind {', '.join(urgent)}" if urgent else ""

@@ -56,8 +56,14 @@ def _lack(deployment: Deployment, host: str, mode: str, component: str, wanted: 
     fitting = {name: one for name, one in deployment.devices.items() if wanted in {name, one.kind}}
     here = [name for name, one in fitting.items() if one.host == host]
     if here:
-        used = f"others use {quoted_list(here)} of host '{host}'"
-        return f"component '{component}' needs '{wanted}'{in_mode(mode)}, but {used}"
+        active = deployment.active()[mode]
+        users = {name for name, _, one in deployment.demands_on(host, active) if {*here, wanted} & {*one.hardware}}
+        others = quoted_list(sorted(users - {component})) or f"'{component}' itself"
+        remedy = "add a device, or declare it `shared: true`"
+        return (
+            f"component '{component}' needs '{wanted}'{in_mode(mode)}, but {others} uses {quoted_list(here)}; {remedy}"
+        )
     elsewhere = [f"'{name}' at host '{one.host}'" for name, one in fitting.items()]
-    at_others = f"; there is {', '.join(elsewhere)}" if elsewhere else ""
-    return f"component '{component}' needs '{wanted}', but host '{host}' has no such device{at_others}"
+    at_host = [f"'{name}' ({one.kind})" for name, one in deployment.devices.items() if one.host == host]
+    found = f"there is {', '.join(elsewhere)}" if elsewhere else f"it has {', '.join(at_host) or 'no devices'}"
+    return f"component '{component}' needs '{wanted}', but host '{host}' has no such device; {found}"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from dsc.components.demands import Demand
+from dsc.components.demands import Amount, Demand
 from dsc.deployment.schedule import Policy
 from dsc.model.language import Frozen, Written
 from dsc.model.reading import FormPath
@@ -28,14 +28,14 @@ class Platform(Frozen):
 
     cores: int = Field(default=1, ge=1)
     scheduling: Policy = "fixed_priority"
-    resources: dict[str, float] = Field(default_factory=dict)
+    resources: dict[str, Amount] = Field(default_factory=dict)
 
 
 class Host(Frozen):
     """A computer of the robot; `resources` are capacities that differ from those of its platform."""
 
     platform: str
-    resources: dict[str, float] = Field(default_factory=dict)
+    resources: dict[str, Amount] = Field(default_factory=dict)
 
 
 class Device(Frozen):

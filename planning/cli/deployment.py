@@ -34,14 +34,10 @@ def check(file: _File, json: JSON = False, sarif: SARIF = False, select: SELECT 
 
     Exit status: 0 without findings; 2 with findings.
     """
-    from dsc.deployment.model import load_deployment
-    from planning.robot.placed import check_robot, components_at, with_demands_of
+    from planning.robot.placed import check_deployment_file
 
-    deployment = load_deployment(file)
-    components = components_at(deployment, file.parent)
-    found = check_robot(deployment, components)
-    whole = with_demands_of(deployment, components.values())
-    nothing = "" if found else "\n".join([*_tables(whole), f"{file}: no mistakes found"])
+    found = check_deployment_file(file)
+    nothing = "" if found else "\n".join([*_tables(_whole(file)[0]), f"{file}: no mistakes found"])
     wrong = report([(file, one) for one in found], nothing, json=json, sarif=sarif, selection=select, strict=strict)
     raise typer.Exit(_WRONG if wrong else 0)
 
@@ -95,9 +91,10 @@ def _whole(file: Path) -> tuple[Deployment, dict[str, str]]:
     """Return the deployment in a file with the demands of its robot, and the providers by required port.
 
     Raises:
-        InputError: the file is not a deployment model, or a component has no host.
+        InputError: the file is not a deployment model, or a component or task has no place.
     """
     from dsc.components.wiring import provider_for
+    from dsc.deployment.deadlines import check_tasks
     from dsc.deployment.model import load_deployment
     from dsc.deployment.placement import check_placement
     from planning.robot.placed import components_at, with_demands_of
@@ -105,8 +102,9 @@ def _whole(file: Path) -> tuple[Deployment, dict[str, str]]:
     deployment = load_deployment(file)
     components = components_at(deployment, file.parent)
     whole = with_demands_of(deployment, components.values())
-    for wrong in check_placement(whole):
-        raise wrong.error
+    for check in (check_placement, check_tasks):
+        for wrong in check(whole):
+            raise wrong.error
     ports = [(port, one) for one in components.values() for port in one.requirements.values()]
     found = {port.name: provider_for(port, one, components) for port, one in ports}
     return whole, {name: provider.name for name, provider in found.items() if provider is not None}

@@ -43,8 +43,11 @@ def wiring_command(
         print_line(wires)
     else:
         for one in wires:
-            provider = one["provider"] or one["error"] or "not wired"
-            typer.echo(f"{one['port']:24} {provider:24} {one['by']:10} {one['service']}")
+            provider, by = one["provider"] or "not wired", one["by"] if one["provider"] else ""
+            typer.echo(f"{one['port']:24} {provider:24} {by:10} {one['service']}")
+        for one in wires:
+            if one["error"]:
+                typer.echo(one["error"])
         if not wires:
             typer.echo(f"the components of '{bundle.name}' require no ports")
     raise typer.Exit(2 if any(one["error"] for one in wires) else 0)

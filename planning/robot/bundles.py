@@ -259,6 +259,8 @@ def gathered(wanted: Iterable[Bundle | str], among: Mapping[str, Bundle] | None 
         UnknownNameError: a bundle is missing; the message identifies the bundle that needs it.
         InputError: two different bundles have equal names.
     """
+    if isinstance(wanted, Bundle | str):
+        raise InputError(f"the bundles are a list, e.g. [{getattr(wanted, 'name', wanted)!r}], not one bundle")
     wanted = tuple(wanted)
     given = {one.name: one for one in wanted if isinstance(one, Bundle)}
     found: dict[str, Bundle] = {}

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +19,6 @@ from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import DynamicState
 from dsc.profiles import configure
 from dsc.skills import SkillSignature, signatures
-from dsc.text.plot_files import load_plot
 from dsc.text.profiles import Profile, adapted, load_profile
 from dsc.validation import review_plot, validate_plot
 from dsc.validation.ignored import without_ignored
@@ -31,8 +29,6 @@ from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.expression import Constant, Expression, free_variables
 from knowledge_base.language.syntax.text import parse_condition
-from knowledge_base.pddl import read_problem
-from knowledge_base.pddl.domain_text import read_domain
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.analysis.explanation import proven_reasons
@@ -58,23 +54,25 @@ from planning.robot.bundles import (
 from planning.robot.fact_names import sources_of, wrong_facts
 from planning.robot.finding_order import in_order
 from planning.robot.initial_values import missing_values
+from planning.robot.placed import check_deployment_file
+from planning.robot.project_files import (
+    NAMES_PLOT,
+    READABLE,
+    check_files,
+    is_deployment,
+    is_profile,
+    objects_in,
+    text_of,
+    without_consequences,
+)
 from planning.robot.simulation import Setup, Simulation
-from planning.robot.soundness import IMPLEMENTED, check_implementations, interfaces
+from planning.robot.soundness import check_implementations, interfaces
 from planning.robot.targets import bundle_at
 from planning.robot.unused import never_true, quoted_names, unused_plots
 
-READABLE = "readable"
-"""The rule of findings about files and parts that cannot be read."""
-_KNOWN_PLOT = "known-plot"
 _PATIENT_SECONDS = 5.0
 """Time limit, in seconds, of the check whether the first goal can be reached."""
 _SKIPPED = frozenset({"build", "dist", "node_modules", "site-packages", "__pycache__"})
-_NAMES_PLOT = re.compile(r"^plot:\s*[\"']?([\w.-]+)", re.MULTILINE)
-_WORD = re.compile(r"[\w-]+")
-_IMPLEMENTS = re.compile(r"^implements:\s*[\"']?([\w.-]+)", re.MULTILINE)
-_NAMES_PROFILE = re.compile(r"^profile:", re.MULTILINE)
-_DEFINES_PROBLEM = re.compile(r"\(\s*define\s*\(\s*problem\b", re.IGNORECASE)
-_DEFINES_DOMAIN = re.compile(r"\(\s*define\s*\(\s*domain\b", re.IGNORECASE)
 
 
 def check_project(target: str, remote: Sequence[Component] = ()) -> list[Finding]:
@@ -94,7 +92,7 @@ def check_project(target: str, remote: Sequence[Component] = ()) -> list[Finding
         error = InputError("the folder is not a project, but contains projects", place=Place(str(path)))
         return [Finding(error, READABLE, names)]
     if path.is_file() and path.suffix != ".py":
-        return in_order(without_ignored(_profile_findings(path) if _is_profile(path) else _files([path]), [path]))
+        return in_order(without_ignored(_of_file(path), [path]))
     with collecting() as errors:
         bundle = _bundle(target) if not path.is_dir() or _has_robot(path) else None
         unread = any(str(one.place.source).endswith(".pddl") for one in errors if one.place is not None)
@@ -105,13 +103,14 @@ def check_project(target: str, remote: Sequence[Component] = ()) -> list[Finding
         if robot is not None and not errors and all(one.level == "warning" for one in findings):
             findings += robot.pointless()
     findings += [Finding(error, READABLE) for error in errors]
+    findings += [found for file in files if is_deployment(file) for found in check_deployment_file(file)]
     if bundle is not None and bundle.remote:
         findings = [_perhaps_remote(one, bundle, asked=bool(remote)) for one in findings]
     if path.is_dir():
         read = {Path(one.place.source or "").resolve() for one in findings if one.place is not None}
         if bundle is not None:
             read |= {Path(_source(plot) or "").resolve() for plot in bundle.plots}
-        findings += _files(file for file in files if file.resolve() not in read)
+        findings += check_files(file for file in files if file.resolve() not in read)
     return in_order(without_ignored(findings, files))
 
 
@@ -132,6 +131,13 @@ def _perhaps_remote(finding: Finding, bundle: Bundle, *, asked: bool) -> Finding
     )
 
 
+def _of_file(file: Path) -> list[Finding]:
+    """Return the findings about one file that is not Python."""
+    if is_deployment(file):
+        return check_deployment_file(file)
+    return _profile_findings(file) if is_profile(file) else check_files([file])
+
+
 def _profile_findings(file: Path) -> list[Finding]:
     """Return the findings about a profile, for the robot of the project around it."""
     project = next((folder for folder in file.absolute().parents if _has_robot(folder)), None)
@@ -141,10 +147,6 @@ def _profile_findings(file: Path) -> list[Finding]:
         if bundle is not None:
             _Robot(bundle).check_profile(profile)
     return [Finding(error, READABLE) for error in errors]
-
-
-def _is_profile(file: Path) -> bool:
-    return file.suffix in {".yaml", ".yml"} and _NAMES_PROFILE.search(_text(file)) is not None
 
 
 def _bundle(target: str) -> Bundle | None:
@@ -255,11 +257,13 @@ class _Robot:
             found += () if world is None else missing_values(self._domain, world)
             found += review_types(skills or (), self._domain.schema)
             found += wrong_facts(files, self._domain.schema)
-            quoted = quoted_names(map(_text, {*files, *(one for one in self._files if one.suffix == ".py")}))
+            quoted = quoted_names(map(text_of, {*files, *(one for one in self._files if one.suffix == ".py")}))
             found += unused_plots(self._plots, self._bundle.main, quoted)
             if world is not None and not self._bundle.remote:  # else other programs may make a fact true
                 found += never_true(self._plots, self._domain, world, quoted)
         self._check_components()
+        if self._components is not None and not self._lacks_remote:
+            found += [Finding(error, "wiring") for _, error in wiring_errors(self._components)]
         return found
 
     def _skills(self) -> list[SkillSignature] | None:
@@ -298,7 +302,7 @@ class _Robot:
 
     def _objects_nearby(self, schema: Schema) -> dict[str, str]:
         """Return the objects of the project's problem files."""
-        return {name: kind for file in self._files for name, kind in _objects_in(file, schema).items()}
+        return {name: kind for file in self._files for name, kind in objects_in(file, schema).items()}
 
     def _check_task(self, world: KnowledgeBase) -> None:
         """Check the goal and the main plot."""
@@ -377,7 +381,7 @@ class _Robot:
     def _check_main(self, main: str) -> None:
         plots = {plot.name: plot for plot in self._plots}
         if main not in plots:
-            if main in {name for file in self._broken_files() for name in _NAMES_PLOT.findall(_text(file))}:
+            if main in {name for file in self._broken_files() for name in NAMES_PLOT.findall(text_of(file))}:
                 return  # its file has the mistake
             raise UnknownNameError(f"the bundle '{self._bundle.name}' has no plot '{main}'", found=main, valid=plots)
         for name, parameter in plots[main].parameters.items():
@@ -394,9 +398,6 @@ class _Robot:
             require_deployed(self._components, [PlanningComponent.name])
         with tolerated():
             choose_sources(self._components, wiring_of(self._bundles))
-        for _, error in () if self._lacks_remote else wiring_errors(self._components):
-            with tolerated():
-                raise error
         with tolerated():
             configure(self._components)
         for file in self._profiles():
@@ -418,7 +419,7 @@ class _Robot:
                 with tolerated():
                     raise InputError("the name of a profile's file ends in `.yaml`", place=Place(str(file)))
         for file in self._files:
-            if file.parent.name != "profiles" and _is_profile(file):
+            if file.parent.name != "profiles" and is_profile(file):
                 yield file
 
     def check_profile(self, profile: Profile) -> None:
@@ -462,107 +463,7 @@ class _Robot:
 _EMPTY = "(define (domain bundles))"
 
 
-def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) -> list[Finding]:
-    """Return the findings without those about plots, actions and outcomes that are in files with errors."""
-    texts = [_text(file) for file in broken]
-    plots = {name for text in texts for name in _NAMES_PLOT.findall(text)}
-    actions = {name for text in texts for name in _IMPLEMENTS.findall(text)}
-    missing = {(_KNOWN_PLOT, name) for name in plots} | {(IMPLEMENTED, name) for name in actions}
-    words = {word for text in texts for word in _WORD.findall(text)}
-    events = {("rule-event", word) for word in words} | {("known-event", word) for word in words}
-    return [one for one in findings if (one.code, one.error.found) not in missing | events]
-
-
-# -- files ---------------------------------------------------------------------------------------------------
-
-
-def _files(files: Iterable[Path]) -> list[Finding]:
-    """Return the findings about files without a robot: their form, and the agreement of plots with their domain."""
-    files = list(files)
-    texts = {file: _text(file) for file in files}
-    found: list[Finding] = []
-    with collecting() as errors:
-        for file in files:
-            with tolerated():
-                _read(file, texts[file])
-    found += [Finding(error, READABLE) for error in errors]
-    plots = [file for file in files if file.suffix in {".yaml", ".yml"} and _NAMES_PLOT.search(texts[file])]
-    return found + _validated(plots)
-
-
-def _read(file: Path, text: str) -> None:
-    """Raise `InputError` for a file that is not Python, or is a domain with an error."""
-    if file.suffix == ".py":
-        try:
-            compile(text, str(file), "exec")
-        except (SyntaxError, ValueError) as error:
-            line = getattr(error, "lineno", None)
-            raise InputError(str(getattr(error, "msg", error)), place=Place(str(file), line)) from None
-    elif file.suffix == ".pddl" and _DEFINES_DOMAIN.search(text):
-        PlanningDomain.from_pddl(file)
-    elif _is_profile(file):
-        load_profile(file)
-
-
-def _validated(files: Iterable[Path]) -> list[Finding]:
-    """Return the findings about plot files; each plot may use the other plots of its folder."""
-    found: list[Finding] = []
-    folders: dict[Path, list[Path]] = {}
-    for file in files:
-        folders.setdefault(file.parent, []).append(file)
-    for folder, own in folders.items():
-        library, broken, plots = Library(), list[Path](), list[ActionPlot]()
-        for file in sorted(folder.glob("*.yaml")):
-            try:
-                plot = load_plot(file)
-                library.add(plot)
-            except InputError as error:
-                broken.append(file)
-                found += [Finding(error, READABLE)] if file in own else []
-            else:
-                plots += [plot] if file in own else []
-        schema = _schema(folder)
-        objects = None if schema is None else _declared_near(folder, schema)
-        for plot in plots:
-            findings = validate_plot(plot, library, schema, objects=objects, thorough=True)
-            findings = findings or review_plot(plot, library)
-            found += without_consequences(findings, broken)
-    return found
-
-
-def _schema(folder: Path) -> Schema | None:
-    """Return the schema of `domain.pddl` in a folder or the folder above; `None` without a readable one."""
-    for place in (folder / "domain.pddl", folder.parent / "domain.pddl"):
-        if place.is_file():
-            try:
-                return Schema.from_text(read_domain(place))
-            except InputError:  # reported as a finding about this file
-                return None
-    return None
-
-
 def _objects_of(world: KnowledgeBase) -> dict[str, str]:
     """Return the objects with their types."""
     found = {name: world.type_of(name) for name in world.objects(ROOT_TYPE)}
     return {name: kind for name, kind in found.items() if kind is not None}
-
-
-def _objects_in(file: Path, schema: Schema) -> Mapping[str, str]:
-    """Return the objects of a problem for the schema with their types; empty for another file."""
-    if file.suffix == ".pddl" and _DEFINES_PROBLEM.search(_text(file)):
-        with suppress(InputError):  # it is a problem for another domain, or has an error
-            return read_problem(file, schema).objects
-    return {}
-
-
-def _declared_near(folder: Path, schema: Schema) -> dict[str, str] | None:
-    """Return the objects of the problems in a folder or the folder above; `None` without a problem."""
-    files = [*folder.glob("*.pddl"), *folder.parent.glob("*.pddl")]
-    return {name: kind for file in files for name, kind in _objects_in(file, schema).items()} or None
-
-
-def _text(file: Path) -> str:
-    try:
-        return file.read_text("utf-8")
-    except (OSError, UnicodeDecodeError):
-        return ""

@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from dsc.components.component import ALWAYS, Component
 from dsc.components.demands import Demand
-from dsc.components.wiring import choose_sources, wiring_errors
+from dsc.components.wiring import choose_sources, provider_for, wiring_errors
 from dsc.deployment.checks import check_deployment
-from dsc.deployment.model import Deployment, Placed
+from dsc.deployment.model import Deployment, Placed, load_deployment
 from dsc.deployment.placement import PLACEMENT
 from dsc.deployment.words import finding_at
 from dsc.errors import Finding
+from dsc.model.reading import FormPath
 from dsc.profiles import configure
 from dsc.text.profiles import find_profile
-from knowledge_base.errors import UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError
 from planning.robot.bringup import components_for
 from planning.robot.bundles import gathered, wiring_of
+from planning.robot.project_files import READABLE
 from planning.robot.targets import bundle_at
 
-WIRING = "deployment-wiring"
+NEEDS = "deployment-needs"
+
+
+def check_deployment_file(file: Path) -> list[Finding]:
+    """Return the mistakes of the deployment model in a file, its robot included."""
+    try:
+        deployment = load_deployment(file)
+        return check_robot(deployment, components_at(deployment, file.parent))
+    except InputError as error:
+        return [Finding(error, READABLE)]
 
 
 def components_at(deployment: Deployment, folder: Path) -> dict[str, Component]:
@@ -35,18 +47,33 @@ def components_at(deployment: Deployment, folder: Path) -> dict[str, Component]:
     """
     if deployment.robot is None:
         return {}
-    bundle = bundle_at(_found_in(folder, deployment.robot))
-    name = deployment.profile
-    profile = None if name is None else find_profile(_found_in(folder, name), bundle.profiles or folder)
+    with _placed_at(deployment, "robot"):
+        bundle = bundle_at(_found_in(folder, deployment.robot))
+    profile = None
+    if deployment.profile is not None:
+        with _placed_at(deployment, "profile"):
+            profile = find_profile(_found_in(folder, deployment.profile), bundle.profiles or folder)
     components = components_for(bundle, profile)
     choose_sources(components, wiring_of(gathered([bundle])))
     configure(components, profile)
     return {one.name: one for one in components}
 
 
+@contextmanager
+def _placed_at(deployment: Deployment, key: str) -> Iterator[None]:
+    """Give the errors of the block that have no line the place of a key of the model."""
+    try:
+        yield
+    except InputError as error:
+        if error.place is None or error.place.line is None:
+            error.place = deployment.place((key,))
+        raise
+
+
 def _found_in(folder: Path, name: str) -> str:
-    """Return a name as a path in the folder, if there is such a file or folder; else the name."""
-    return str(folder / name) if (folder / name.partition(":")[0]).exists() else name
+    """Return a name as a path in the folder, if it is a file's name or a folder there; else the name."""
+    file = folder / name.partition(":")[0]
+    return str(folder / name) if file.suffix in {".py", ".yaml", ".yml"} or file.exists() else name
 
 
 def with_demands_of(deployment: Deployment, components: Iterable[Component]) -> Deployment:
@@ -58,7 +85,7 @@ def with_demands_of(deployment: Deployment, components: Iterable[Component]) -> 
     placed = dict(deployment.components)
     for one in components:
         if one.name in placed or one.name in members:
-            placed[one.name] = _over(one.demands, placed.get(one.name, Placed()))
+            placed[one.name] = _over(one, placed.get(one.name, Placed()))
     return deployment.model_copy(update={"components": placed})
 
 
@@ -71,23 +98,57 @@ def check_robot(deployment: Deployment, components: Mapping[str, Component]) -> 
         if name not in whole.components
     ]
     unknown = list(_unknown(deployment, components)) if components else []
-    unwired = [Finding(error, WIRING) for _, error in wiring_errors(components.values())]
-    return [*absent, *unknown, *unwired, *check_deployment(whole)]
+    unwired = [Finding(error, "wiring") for _, error in wiring_errors(components.values())]
+    needs = [] if unwired or unknown else _inactive(deployment, components)
+    return [*absent, *unknown, *unwired, *needs, *check_deployment(whole)]
 
 
 def _unknown(deployment: Deployment, components: Mapping[str, Component]) -> Iterator[Finding]:
-    """Yield the components of the model that the robot does not have."""
-    for name in deployment.components:
+    """Yield the components of the model, and their modes, that the robot does not have."""
+    for name, placed in deployment.components.items():
         if name not in components:
-            error = UnknownNameError(f"the robot has no component '{name}'", found=name, valid=components)
-            error.place = deployment.place(("components", name))
-            yield Finding(error, PLACEMENT)
+            yield _unknown_name(deployment, ("components", name), f"the robot has no component '{name}'", components)
+            continue
+        modes = [*components[name].modes]
+        for mode in placed.modes if modes else ():
+            if mode not in modes:
+                message = f"component '{name}' has no mode '{mode}'"
+                yield _unknown_name(deployment, ("components", name, "modes", mode), message, modes)
 
 
-def _over(declared: Mapping[str, Demand], placed: Placed) -> Placed:
-    """Return a placed component with the demands of its class below its own."""
-    modes = dict.fromkeys(mode for mode in (*declared, *placed.modes) if mode != ALWAYS)
-    below = {mode: _merge(declared.get(mode, Demand()), placed.modes.get(mode, Demand())) for mode in modes}
+def _unknown_name(deployment: Deployment, path: FormPath, message: str, valid: Collection[str]) -> Finding:
+    error = UnknownNameError(message, found=str(path[-1]), valid=valid)
+    error.place = deployment.place(path)
+    return Finding(error, PLACEMENT)
+
+
+def _inactive(deployment: Deployment, components: Mapping[str, Component]) -> Iterator[Finding]:
+    """Yield the components that an active component needs, and that are not active in the same mode of the robot."""
+    for mode, active in deployment.modes.items():
+        for name, state in active.items():
+            for needed in _needs(components[name], state, components) if name in components else ():
+                if needed not in active:
+                    message = f"component '{name}' needs '{needed}', which is not active in mode '{mode}'"
+                    yield finding_at(deployment, ("modes", mode, name), message, NEEDS)
+
+
+def _needs(component: Component, mode: str, components: Mapping[str, Component]) -> Iterator[str]:
+    """Yield the names of the components that a component needs in a mode; a port stands for its provider."""
+    for name in dict.fromkeys((*component.needs.get(ALWAYS, ()), *component.needs.get(mode, ()))):
+        port = component.requirements.get(name)
+        if port is None:
+            yield name
+        elif (provider := provider_for(port, component, components)) is not None:
+            yield provider.component.name
+
+
+def _over(component: Component, placed: Placed) -> Placed:
+    """Return a placed component with the modes of the component, and with the demands of its class below its own."""
+    declared = component.demands
+    modes = dict.fromkeys((*component.modes, *declared, *placed.modes))
+    below = {
+        mode: _merge(declared.get(mode, Demand()), placed.modes.get(mode, Demand())) for mode in modes if mode != ALWAYS
+    }
     return placed.model_copy(update={**dict(_merge(declared.get(ALWAYS, Demand()), placed)), "modes": below})
 
 

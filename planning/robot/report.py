@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
+from json import dumps
 from typing import Any, Literal
 
 from dsc.sequencer.clock import ClockKind
@@ -94,6 +95,8 @@ class Report:
         ):
             if counts:
                 lines.append(f"  {title}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
+        if self.outputs:
+            lines.append("  outputs: " + ", ".join(f"{name} {dumps(one)}" for name, one in self.outputs.items()))
         if self.faults and not self.skill_failures:
             lines.append(f"  {len(self.faults)} faults were drawn, and no skill reported a failure")
         return lines

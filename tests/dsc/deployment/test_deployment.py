@@ -73,13 +73,13 @@ def test_a_deployment_that_fits_has_no_findings():
         ("mapper: looking", "mapper: lookin", 29, "there is no mode of component 'mapper' with the name 'lookin'"),
         ("servo: neutral", "serwo: neutral", 29, "there is no component 'serwo'; did you mean 'servo'?"),
         ("kind: wlan, host: base", "kind: wlan, host: bas", 12, "there is no host 'bas'; did you mean 'base'?"),
-        ("hardware: [laser", "hardware: [sick_rear", 18, "needs 'sick_rear' in mode 'driving', but others use 'sick_rear' of host 'base'"),
-        ("hardware: [radio]", "hardware: [lidar]", 23, "component 'mapper' needs 'lidar', but host 'base' has no such device"),
+        ("hardware: [laser", "hardware: [sick_rear", 18, "needs 'sick_rear' in mode 'driving', but 'front' uses 'sick_rear'; add a device"),
+        ("hardware: [radio]", "hardware: [lidar]", 23, "but host 'base' has no such device; it has 'sick_front' (laser), 'sick_rear' (laser), 'radio' (wlan)"),
         ("step: {", "step: {core: 3, ", 24, "host 'arm' has no core 3; its last core is 0"),
         ("memory: 500", "memory: 900", 7, "host 'base' has 1000 MB of 'memory', but its components use 1100 MB (mapper 1100)"),
         ("resources: {memory: 1000}", "resources: {}", 7, "host 'base' has no resource 'memory', which 'mapper' uses"),
         ("scan: {period: 0.05, worst_case: 0.008}}}\n  rear", "scan: {priority: 1, period: 0.05, worst_case: 0.008}}}\n  rear", 18, "either all tasks on core 0 of host 'base' have a priority, or none"),
-        ("worst_case: 0.05}", "worst_case: 0.07}", 8, "the tasks on core 0 of host 'arm' in mode 'grasping' need 110% of its time"),
+        ("worst_case: 0.05}", "worst_case: 0.07}", 8, "the tasks on core 0 of host 'arm' in mode 'grasping' need 110% of its time: servo.step 40%, servo.log 70%"),
     ],
 )  # fmt: skip
 def test_a_mistake_has_its_place_and_its_reason(old: str, new: str, line: int, said: str):
@@ -116,7 +116,7 @@ def test_work_that_is_due_too_early_is_explained():
     )
     assert found == (
         "lab.yaml:8:3: 25 ms after all tasks on core 0 of host 'arm' in mode 'grasping' have arrived together,"
-        " 28 ms of work are due"
+        " 28 ms of work are due: servo.step 8 ms, servo.log 20 ms"
     )
 
 

@@ -22,7 +22,8 @@ class Laser(Component):
 class Mapper(Component):
     name = "mapper"
     demands = {"": {"resources": {"memory": 200}}, "mapping": {"resources": {"memory": 600}}}
-    modes = ("mapping",)
+    modes = ("mapping", "parked")
+    needs = {"mapping": ("scan",)}
     scan = Stream({"metres": "number"})
 
 
@@ -72,12 +73,25 @@ def test_the_demands_of_classes_and_of_the_model_are_checked_together(folder):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (", two: {kind: laser, host: base}", "", "needs 'laser', but others use 'one' of host 'base'"),
+        (", two: {kind: laser, host: base}", "", "needs 'laser', but 'rear' uses 'one'; add a device"),
         ("memory: 1000", "memory: 700", "has 700 of 'memory', but its components use 800 (mapper 800)"),
         ("[front, rear, mapper]", "[front, rear]", "component 'mapper' of the robot has no host"),
         ("components: {", "components: {sonar: {host: base}, ", "the robot has no component 'sonar'"),
         ("profile: rear.yaml\n", "", "several services fit port 'mapper.scan': front.scan, rear.scan"),
         ("worst_case: 0.01", "worst_case: 0.036", "the tasks on core 0 of host 'base' need 106% of its time"),
+        ("worst_case: 0.01", "worst_case: 0.05", "the worst case of 0.05 s is longer than the period of 0.04 s"),
+        (
+            "components: {",
+            "components: {mapper: {modes: {maping: {}}}, ",
+            "has no mode 'maping'; did you mean 'mapping'?",
+        ),
+        (
+            "components: {",
+            "modes: {drive: {mapper: mapping}}\ncomponents: {",
+            "'mapper' needs 'rear', which is not active",
+        ),
+        ("lasers.py:bundle", "lazers.py:bundle", "lab.yaml:3:1: there is no such file"),
+        ("rear.yaml", "reer.yaml", "reer.yaml'; did you mean 'rear.yaml'?"),
     ],
 )
 def test_a_robot_that_does_not_fit_is_reported(folder, old: str, new: str, said: str):
@@ -86,7 +100,8 @@ def test_a_robot_that_does_not_fit_is_reported(folder, old: str, new: str, said:
     assert result.exit_code == 2
     assert said in result.output
     (found, *_) = json.loads(invoke("check", folder / "lab.yaml", "--json").output)
-    assert found["code"].startswith("deployment-")
+    assert found["code"].startswith(("deployment-", "wiring", "readable"))
+    assert found["line"] or found["code"] == "wiring"
 
 
 def test_a_simulation_never_exceeds_the_worst_response(folder):
@@ -115,5 +130,25 @@ def test_a_model_without_a_robot_needs_no_classes(folder):
     )
     (folder / "plain.yaml").write_text(plain)
     assert invoke("check", folder / "plain.yaml").exit_code == 0
-    with_model(folder, "robot: lasers.py:bundle", "robot: laserz.py")
-    assert "laserz.py" in str(invoke("check", folder / "lab.yaml").exception)
+
+
+def test_a_mode_of_a_component_needs_no_demands(folder):
+    with_model(folder, "components: {", "modes: {idle: {mapper: parked}, back: {rear: neutral}}\ncomponents: {")
+    assert invoke("check", folder / "lab.yaml").exit_code == 0
+
+
+def test_a_task_on_a_missing_core_is_never_simulated_or_drawn(folder):
+    with_model(folder, "worst_case: 0.01}", "worst_case: 0.01, core: 2}")
+    for words in (["simulate", folder / "lab.yaml"], ["draw", folder / "lab.yaml", "--timeline"]):
+        assert "host 'base' has no core 2" in str(invoke(*words).exception)
+
+
+def test_a_check_of_the_project_includes_its_deployment_models(folder):
+    (folder / "robot.py").write_text("from lasers import bundle\n\nrobot = bundle()\n")
+    whole = CliRunner().invoke(app, ["check", str(folder)])
+    with_model(folder, "memory: 1000", "memory: 700")
+    for target in (folder, folder / "lab.yaml"):
+        found = CliRunner().invoke(app, ["check", str(target)])
+        assert "but its components use 800" in found.output
+        assert found.exit_code == 2
+    assert "lab.yaml" not in whole.output

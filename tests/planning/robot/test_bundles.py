@@ -181,3 +181,9 @@ def test_failures_may_be_any_collection_of_outcomes_but_no_text():
     assert set(Bundle("mine", failures=["jammed", "stuck"]).failures) == {"jammed", "stuck"}
     with pytest.raises(InputError, match="failures are a set of outcomes, not the text 'jammed'"):
         Bundle("mine", failures="jammed")
+
+
+@pytest.mark.parametrize("one", ["handling", Bundle("handling")])
+def test_one_bundle_is_not_a_list_of_bundles(one):
+    with pytest.raises(InputError, match=r"the bundles are a list, e\.g\. \['handling'\], not one bundle"):
+        Robot.of_bundles(one)
