@@ -19,6 +19,7 @@ from domains.clean_up_table import Scenario
 from dsc import load_library, load_plot, parse_plot
 from dsc.deployment.model import parse_deployment
 from dsc.drawing import draw
+from dsc.monitoring.profile import parse_monitoring
 from dsc.text.profiles import parse_profile
 from planning.engines.registry import engine
 
@@ -42,6 +43,7 @@ def test_python_on_a_page_runs_from_top_to_bottom(page):
 def test_yaml_on_a_page_is_a_plot_a_profile_or_a_scenario(page):
     readers: dict[str, Callable[..., object]] = {
         "plot": parse_plot, "profile": parse_profile, "says": ButlerScenario.parse, "deployment": parse_deployment,
+        "monitor": parse_monitoring,
     }  # fmt: skip
     for block in blocks(page, "yaml"):
         read = readers.get(block.partition(":")[0], Scenario.parse)

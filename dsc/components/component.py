@@ -17,6 +17,7 @@ from dsc.components.interface import Interface
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
 from dsc.components.parameters import Configuration, Parameters
 from dsc.components.ports import TAKES, EventActivations, messages, plain_methods
+from dsc.components.program_use import program_use
 from dsc.components.requirement import Requirement
 from dsc.components.services import Service
 from dsc.components.streams import Push
@@ -379,6 +380,7 @@ class Component(ComponentHooks, RestartHooks):
                 name: None if port.provider is None else port.provider.name for name, port in self.requirements.items()
             },
             "steps": asdict(self.life.steps),
+            "program": program_use(),
         }
 
 

@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 
 from dsc.cli import plots
 from dsc.cli.logs import PROGRAMMING_ERROR
+from dsc.cli.monitor import monitor_command
 from dsc.cli.runs import app as runs_app
 from dsc.cli.runs import view_command
 from dsc.cli.wire import call_command, ps_command
@@ -65,6 +66,7 @@ app.command("run")(run_command)
 app.command("host")(host_command)
 app.command("ps")(ps_command)
 app.command("call")(call_command)
+app.command("monitor")(monitor_command)
 app.command("check")(check_command)
 app.command("wiring")(wiring_command)
 app.command("plan")(plan_command)

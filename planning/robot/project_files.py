@@ -10,6 +10,7 @@ from pathlib import Path
 from dsc.dynamic.library import Library
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot
+from dsc.monitoring.profile import load_monitoring
 from dsc.text.plot_files import load_plot
 from dsc.text.profiles import load_profile
 from dsc.validation import review_plot, validate_plot
@@ -26,8 +27,6 @@ NAMES_PLOT = re.compile(r"^plot:\s*[\"']?([\w.-]+)", re.MULTILINE)
 _KNOWN_PLOT = "known-plot"
 _WORD = re.compile(r"[\w-]+")
 _IMPLEMENTS = re.compile(r"^implements:\s*[\"']?([\w.-]+)", re.MULTILINE)
-_NAMES_PROFILE = re.compile(r"^profile:", re.MULTILINE)
-_NAMES_DEPLOYMENT = re.compile(r"^deployment:", re.MULTILINE)
 _DEFINES_PROBLEM = re.compile(r"\(\s*define\s*\(\s*problem\b", re.IGNORECASE)
 _DEFINES_DOMAIN = re.compile(r"\(\s*define\s*\(\s*domain\b", re.IGNORECASE)
 _YAML = frozenset({".yaml", ".yml"})
@@ -35,12 +34,17 @@ _YAML = frozenset({".yaml", ".yml"})
 
 def is_deployment(file: Path) -> bool:
     """Return whether a file is a deployment model."""
-    return file.suffix in _YAML and _NAMES_DEPLOYMENT.search(text_of(file)) is not None
+    return _has_key(file, "deployment")
 
 
 def is_profile(file: Path) -> bool:
     """Return whether a file is a settings profile; a deployment model may name one."""
-    return file.suffix in _YAML and _NAMES_PROFILE.search(text_of(file)) is not None and not is_deployment(file)
+    return _has_key(file, "profile") and not is_deployment(file)
+
+
+def _has_key(file: Path, key: str) -> bool:
+    """Return whether a file is YAML whose outermost mapping has a key."""
+    return file.suffix in _YAML and re.search(rf"^{key}:", text_of(file), re.MULTILINE) is not None
 
 
 def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) -> list[Finding]:
@@ -80,6 +84,8 @@ def _read(file: Path, text: str) -> None:
         PlanningDomain.from_pddl(file)
     elif is_profile(file):
         load_profile(file)
+    elif _has_key(file, "monitor"):
+        load_monitoring(file)
 
 
 def _validated(files: Iterable[Path]) -> list[Finding]:

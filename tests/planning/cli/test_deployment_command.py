@@ -143,6 +143,13 @@ def test_a_task_on_a_missing_core_is_never_simulated_or_drawn(folder):
         assert "host 'base' has no core 2" in str(invoke(*words).exception)
 
 
+def test_a_check_of_the_project_includes_its_monitoring_profiles(folder):
+    (folder / "robot.py").write_text("from lasers import bundle\n\nrobot = bundle()\n")
+    (folder / "monitor.yaml").write_text("monitor: m\ncomponents: {front: {stream: {scan: change}}}\n")
+    found = CliRunner().invoke(app, ["check", str(folder)])
+    assert "monitor.yaml:2:22: unknown key 'stream'; did you mean 'streams'?" in found.output
+
+
 def test_a_check_of_the_project_includes_its_deployment_models(folder):
     (folder / "robot.py").write_text("from lasers import bundle\n\nrobot = bundle()\n")
     whole = CliRunner().invoke(app, ["check", str(folder)])

@@ -313,3 +313,17 @@ def test_hosted_components_use_components_of_other_programs(cell):
     battery.wait()
     ended = cell.said("call", "cartographer.survey", "--within", "5", status=1)
     assert "the call of 'cartographer.energy' to 'accumulator.remaining' has no answer within 1 s" in ended
+
+
+def test_hosted_components_are_monitored(cell, tmp_path):
+    strangers = Path(__file__).parents[3] / "examples" / "strangers"
+    cell.host(target=strangers / "robot.py")
+    cell.said("call", "cartographer", "--switch", "mapping")
+    drawn = tmp_path / "values.svg"
+    said = cell.said("monitor", strangers / "monitor.yaml", "--seconds", "3", "--json", "--svg", drawn)
+    found = [json.loads(line) for line in said.splitlines()]
+    values = {(one["component"], one["entry"]): one["value"] for one in found}
+    assert values["cartographer", "mode"] == "mapping"
+    assert values["front", "program.memory_mib"] > 1
+    assert sum(one["entry"] == "program.memory_mib" for one in found) >= 2
+    assert "front.program.memory_mib" in drawn.read_text()
