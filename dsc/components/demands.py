@@ -14,6 +14,9 @@ from dsc.model.reading import LOCATED, Form
 Amount = Annotated[float, Field(ge=0)]
 """An amount of a resource, in the unit of the resource."""
 
+SHORTEST = 1e-6
+"""Minimum period of a task, in seconds."""
+
 
 class TimedTask(Frozen):
     """A real-time task of a component; all times are seconds.
@@ -28,7 +31,7 @@ class TimedTask(Frozen):
         core: the processor core of the host, from 0.
     """
 
-    period: float = Field(gt=0)
+    period: float = Field(ge=SHORTEST)
     worst_case: float = Field(gt=0)
     deadline: float | None = Field(default=None, gt=0)
     jitter: float = Field(default=0.0, ge=0)

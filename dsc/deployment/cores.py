@@ -88,11 +88,13 @@ def cores_of(deployment: Deployment) -> Iterator[Core]:
 
 
 def _tasks_on(deployment: Deployment, host: str, active: Mapping[str, str | None]) -> dict[str, TimedTask]:
-    return {
-        f"{component}.{name}": task
-        for component, _, demand in deployment.demands_on(host, active)
-        for name, task in demand.tasks.items()
-    }
+    """Return the tasks on a host as `component.task`; equal names of several modes as `component.mode.task`."""
+    found: dict[str, TimedTask] = {}
+    for component, path, demand in deployment.demands_on(host, active):
+        for name, task in demand.tasks.items():
+            is_further = f"{component}.{name}" in found and active[component] is None
+            found[f"{component}.{path[-1]}.{name}" if is_further else f"{component}.{name}"] = task
+    return found
 
 
 def _with_priorities(tasks: dict[str, TimedTask]) -> list[Task]:

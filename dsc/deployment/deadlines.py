@@ -28,9 +28,9 @@ def check_deadlines(deployment: Deployment) -> Iterator[Finding]:
             error.place = deployment.place(("hosts", core.host))
             yield Finding(error, SCHEDULE)
             continue
-        for task in verdict.late(core)[: 1 if core.policy == "earliest_deadline" else None]:
-            component, name = task.name.split(".", 1)
-            path = ("hosts", core.host) if verdict.overload else _task_path(deployment, component, name)
+        of_core = verdict.overload is not None or core.utilisation > 1
+        for task in verdict.late(core)[: 1 if of_core else None]:
+            path = ("hosts", core.host) if of_core else _task_path(deployment, task)
             yield finding_at(deployment, path, _delay(core, task, verdict), SCHEDULE)
 
 
@@ -58,9 +58,11 @@ def _all_tasks(deployment: Deployment) -> Iterator[tuple[str, FormPath, TimedTas
                 yield component, ("components", component, *path, "tasks", name), task
 
 
-def _task_path(deployment: Deployment, component: str, name: str) -> FormPath:
+def _task_path(deployment: Deployment, task: Task) -> FormPath:
+    """Return the path of the task `component.task` or `component.mode.task` in the model."""
+    component, *mode, name = task.name.split(".")
     paths = (path for owner, path, _ in _all_tasks(deployment) if owner == component and path[-1] == name)
-    return next(paths, ("components", component))
+    return next((path for path in paths if not mode or mode[0] in path), ("components", component))
 
 
 def _delay(core: Core, task: Task, verdict: Verdict) -> str:

@@ -97,15 +97,15 @@ def _whole(file: Path) -> tuple[Deployment, dict[str, str]]:
     from dsc.deployment.deadlines import check_tasks
     from dsc.deployment.model import load_deployment
     from dsc.deployment.placement import check_placement
-    from planning.robot.placed import components_at, with_demands_of
+    from planning.robot.placed import robot_at, with_demands_of
 
     deployment = load_deployment(file)
-    components = components_at(deployment, file.parent)
+    components, remote = robot_at(deployment, file.parent)
     whole = with_demands_of(deployment, components.values())
     for check in (check_placement, check_tasks):
         for wrong in check(whole):
             raise wrong.error
-    ports = [(port, one) for one in components.values() for port in one.requirements.values()]
+    ports = [(port, one) for one in components.values() for port in one.requirements.values() if not remote]
     found = {port.name: provider_for(port, one, components) for port, one in ports}
     return whole, {name: provider.name for name, provider in found.items() if provider is not None}
 

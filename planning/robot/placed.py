@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 from dsc.components.component import ALWAYS, Component
 from dsc.components.demands import Demand
@@ -30,13 +31,20 @@ def check_deployment_file(file: Path) -> list[Finding]:
     """Return the mistakes of the deployment model in a file, its robot included."""
     try:
         deployment = load_deployment(file)
-        return check_robot(deployment, components_at(deployment, file.parent))
+        return check_robot(deployment, robot_at(deployment, file.parent))
     except InputError as error:
         return [Finding(error, READABLE)]
 
 
-def components_at(deployment: Deployment, folder: Path) -> dict[str, Component]:
-    """Return the components of a deployment's robot by name, with its profile; none without a robot.
+class Parts(NamedTuple):
+    """The components of a robot by name, and the names of those that other programs host."""
+
+    components: Mapping[str, Component]
+    remote: Collection[str]
+
+
+def robot_at(deployment: Deployment, folder: Path) -> Parts:
+    """Return the components of a deployment's robot, with its profile; none without a robot.
 
     Args:
         deployment: the model.
@@ -46,7 +54,7 @@ def components_at(deployment: Deployment, folder: Path) -> dict[str, Component]:
         InputError: the robot or the profile cannot be read.
     """
     if deployment.robot is None:
-        return {}
+        return Parts({}, ())
     with _placed_at(deployment, "robot"):
         bundle = bundle_at(_found_in(folder, deployment.robot))
     profile = None
@@ -56,7 +64,7 @@ def components_at(deployment: Deployment, folder: Path) -> dict[str, Component]:
     components = components_for(bundle, profile)
     choose_sources(components, wiring_of(gathered([bundle])))
     configure(components, profile)
-    return {one.name: one for one in components}
+    return Parts({one.name: one for one in components}, bundle.remote)
 
 
 @contextmanager
@@ -89,27 +97,29 @@ def with_demands_of(deployment: Deployment, components: Iterable[Component]) -> 
     return deployment.model_copy(update={"components": placed})
 
 
-def check_robot(deployment: Deployment, components: Mapping[str, Component]) -> list[Finding]:
-    """Return the mistakes of a deployment model, also in comparison with the components of its robot."""
+def check_robot(deployment: Deployment, robot: Parts) -> list[Finding]:
+    """Return the mistakes of a deployment model, also in comparison with its robot."""
+    components = robot.components
     whole = with_demands_of(deployment, components.values())
     absent = [
         finding_at(deployment, ("components",), f"component '{name}' of the robot has no host", PLACEMENT)
-        for name in components
+        for name in [*components, *robot.remote]
         if name not in whole.components
     ]
-    unknown = list(_unknown(deployment, components)) if components else []
-    unwired = [Finding(error, "wiring") for _, error in wiring_errors(components.values())]
-    needs = [] if unwired or unknown else _inactive(deployment, components)
+    unknown = list(_unknown(deployment, robot)) if components or robot.remote else []
+    errors = [] if robot.remote else wiring_errors(components.values())  # the ports of other programs are unknown
+    unwired = [Finding(error, "wiring") for _, error in errors]
+    needs = [] if unwired or unknown or robot.remote else _inactive(deployment, components)
     return [*absent, *unknown, *unwired, *needs, *check_deployment(whole)]
 
 
-def _unknown(deployment: Deployment, components: Mapping[str, Component]) -> Iterator[Finding]:
+def _unknown(deployment: Deployment, robot: Parts) -> Iterator[Finding]:
     """Yield the components of the model, and their modes, that the robot does not have."""
+    names = [*robot.components, *robot.remote]
     for name, placed in deployment.components.items():
-        if name not in components:
-            yield _unknown_name(deployment, ("components", name), f"the robot has no component '{name}'", components)
-            continue
-        modes = [*components[name].modes]
+        if name not in names:
+            yield _unknown_name(deployment, ("components", name), f"the robot has no component '{name}'", names)
+        modes = [*robot.components[name].modes] if name in robot.components else []
         for mode in placed.modes if modes else ():
             if mode not in modes:
                 message = f"component '{name}' has no mode '{mode}'"
@@ -127,7 +137,7 @@ def _inactive(deployment: Deployment, components: Mapping[str, Component]) -> It
     for mode, active in deployment.modes.items():
         for name, state in active.items():
             for needed in _needs(components[name], state, components) if name in components else ():
-                if needed not in active:
+                if needed in components and needed not in active:
                     message = f"component '{name}' needs '{needed}', which is not active in mode '{mode}'"
                     yield finding_at(deployment, ("modes", mode, name), message, NEEDS)
 

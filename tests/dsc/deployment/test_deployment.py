@@ -133,7 +133,7 @@ def test_tasks_without_priorities_are_urgent_by_their_deadlines():
     [
         ("{period: 0.1, worst_case: 0.2}", "worst_case: the worst case of 0.2 s is longer than the period of 0.1 s"),
         ("{period: 1, worst_case: 0.2, deadline: 0.1}", "longer than the deadline of 0.1 s"),
-        ("{period: 0, worst_case: 0.2}", "greater than 0"),
+        ("{period: 0, worst_case: 0.2}", "greater than or equal to 0.000001"),
         ("{period: 1, worst_cas: 0.2}", "did you mean 'worst_case'"),
     ],
 )
@@ -171,3 +171,25 @@ def test_drawings_have_each_host_component_wire_and_task():
     assert "#b3261e" not in timeline
     late = draw_worst_cases(changed(("worst_case: 0.05}", "worst_case: 0.07}")))
     assert "#b3261e" in late
+
+
+def test_tasks_of_equal_names_in_several_modes_all_count():
+    both = changed(
+        ("looking: {hardware", "looking: {tasks: {fuse: {period: 0.1, worst_case: 0.09, core: 1}}, hardware"),
+        (LAB[LAB.index("modes:\n  driving") :], ""),
+    )
+    (core,) = [one for one in cores_of(both) if one.number == 1]
+    assert [task.name for task in core.tasks] == ["mapper.looking.fuse", "mapper.fuse"]
+    (found,) = [str(one) for one in check_deployment(both) if one.code == "deployment-schedule"]
+    assert found.endswith("need 115% of its time: mapper.looking.fuse 90%, mapper.fuse 25%")
+
+
+def test_a_late_task_of_several_modes_has_its_place():
+    both = changed(
+        ("looking: {hardware", "looking: {tasks: {fuse: {period: 0.4, worst_case: 0.1, deadline: 0.12, core: 1}}, hardware"),
+        ("fuse: {period: 0.2, worst_case: 0.05, core: 1}", "fuse: {period: 0.2, worst_case: 0.05, deadline: 0.1, core: 1}"),
+        (LAB[LAB.index("modes:\n  driving") :], ""),
+    )  # fmt: skip
+    (found,) = [str(one) for one in check_deployment(both) if one.code == "deployment-schedule"]
+    assert found.startswith("lab.yaml:23:")
+    assert "'mapper.looking.fuse' may end 150 ms or more after its arrival behind mapper.fuse" in found

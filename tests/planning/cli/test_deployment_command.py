@@ -159,3 +159,13 @@ def test_a_check_of_the_project_includes_its_deployment_models(folder):
         assert "but its components use 800" in found.output
         assert found.exit_code == 2
     assert "lab.yaml" not in whole.output
+
+
+def test_components_of_other_programs_are_placed_too(folder):
+    robot = ROBOT.replace('goal="(mapped)",', 'goal="(mapped)", remote=("arm",),')
+    (folder / "lasers.py").write_text(robot)
+    lacks = invoke("check", folder / "lab.yaml")
+    assert "component 'arm' of the robot has no host" in lacks.output
+    with_model(folder, "components: {", "components: {arm: {host: base}, ")
+    assert invoke("check", folder / "lab.yaml").exit_code == 0
+    assert invoke("draw", folder / "lab.yaml").exit_code == 0
