@@ -39,7 +39,8 @@ ALWAYS = {("plan",): ("--seconds", "1"), ("view",): ("--no-open",)}
 """Arguments that stand before what was drawn: a search may take the time that it is given."""
 ENDINGS = {
     "plot": "yaml", "chart": "scxml", "profile": "yaml", "scenario": "yaml", "domain": "pddl", "fragment": "pddl",
-    "problem": "pddl", "world": "json", "trace": "jsonl", "knowledge-store": "db", "run-store": "db",
+    "problem": "pddl", "world": "json", "trace": "jsonl", "knowledge-store": "db", "run-store": "db", "deployment": "yaml",
+    "monitoring": "yaml",
 }  # fmt: skip
 """What files of commands are made of."""
 WORDS = (

@@ -19,6 +19,11 @@ from domains.clean_up_table.bringup import bundle, deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.calls import SkillCall
 from dsc.components.component import Component
+from dsc.deployment.checks import check_deployment
+from dsc.deployment.cores import cores_of
+from dsc.deployment.diagram import draw_deployment
+from dsc.deployment.model import load_deployment
+from dsc.deployment.timeline import draw_worst_cases
 from dsc.drawing import draw
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
@@ -27,6 +32,7 @@ from dsc.engine.machine_state import MachineState
 from dsc.errors import NotExpressibleError, RunawayError
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
+from dsc.monitoring.profile import load_monitoring
 from dsc.outcomes import Outcome
 from dsc.runs.archive import archive
 from dsc.scxml.reader import parse_scxml
@@ -162,6 +168,23 @@ def _run(plot: ActionPlot, plots: Library) -> None:
     form = json.loads(json.dumps(machine.state.to_json()))
     if MachineState.from_json(form, plots) != machine.state:
         raise AssertionError("the machine's state is another one after JSON")
+
+
+def read_deployment(data: bytes, folder: Path) -> None:
+    """A deployment model; one without mistakes is drawn, and its tasks meet their deadlines in the worst case."""
+    deployment = load_deployment(_written(data, folder, "deployment.yaml"))
+    if check_deployment(deployment):
+        return
+    for core in cores_of(deployment):
+        if core.worst_schedule().misses:
+            raise AssertionError(f"a deadline is missed on {core}")
+    draw_deployment(deployment, {})
+    draw_worst_cases(deployment)
+
+
+def read_monitoring(data: bytes, folder: Path) -> None:
+    """A monitoring profile."""
+    load_monitoring(_written(data, folder, "monitor.yaml"))
 
 
 def read_profile(data: bytes, folder: Path) -> None:
@@ -558,6 +581,8 @@ READERS = (
     ),
     Target("chart", read_chart, ("tests/support/broken/scxml/*.scxml",), share=6),
     Target("profile", read_profile, ("domains/*/profiles/*.yaml",), share=3),
+    Target("deployment", read_deployment, ("examples/strangers/lab.yaml",), share=3),
+    Target("monitoring", read_monitoring, ("examples/strangers/monitor.yaml",), share=1),
     Target("scenario", read_scenario, (), share=2),
     Target("state", read_state, (), "json", share=3),
     Target(
