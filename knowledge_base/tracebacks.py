@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
+import sys
 import sysconfig
 import traceback
 from collections.abc import Callable, Iterator
@@ -57,6 +58,14 @@ def place_of(made: type | Callable[..., Any]) -> Place | None:
         return Place(inspect.getsourcefile(source), inspect.getsourcelines(source)[1])
     except (OSError, TypeError):
         return None
+
+
+def calling_place(package: str) -> Place | None:
+    """Return the innermost line of the stack that is not in a folder; `None` without one."""
+    frame = sys._getframe(1)  # noqa: SLF001  # the only way to the caller's line
+    while frame is not None and frame.f_code.co_filename.startswith((package, __file__)):
+        frame = frame.f_back  # type: ignore[assignment]  # `None` at the end
+    return None if frame is None else Place(frame.f_code.co_filename, frame.f_lineno)
 
 
 def user_place(error: BaseException) -> Place | None:

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Coroutine, Mapping
 from copy import copy
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 from dsc.calls import SkillCall
@@ -16,8 +17,10 @@ from dsc.errors import NoAnswerError, NotWiredError
 from dsc.outcomes import Outcome
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
+from knowledge_base.tracebacks import calling_place
 
 _Result = TypeVar("_Result")
+_HERE = str(Path(__file__).parent)
 
 
 class Server(Protocol):
@@ -80,6 +83,7 @@ class Requirement:
 
     Attributes:
         name: the port as `component.port`, for messages and profiles.
+        place: the line of the declaration, for messages.
         provider: the present provider; `None` if the port is not wired.
     """
 
@@ -92,6 +96,7 @@ class Requirement:
         self.source = source
         self.optional = optional
         self.name = ""
+        self.place = calling_place(_HERE)
         self.provider: Provider | None = None
         self._runs = 0
         self._pending: set[asyncio.Future[None]] = set()

@@ -17,7 +17,6 @@ from dsc.components.component import Component
 from dsc.components.requirement import Provider, Requirement
 from dsc.components.services import Service, ambiguous, fits, named_service, require_fitting
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.tracebacks import place_of
 
 
 def providers_of(component: Component) -> list[Provider]:
@@ -115,7 +114,7 @@ def provider_for(
     fitting = [one for one in found if fits(one.name, port.service, one.service)]
     if len(fitting) > 1:
         error = ambiguous(port.name, [one.name for one in fitting])
-        error.place = place_of(type(owner))
+        error.place = port.place
         raise error
     return fitting[0] if fitting else None
 
@@ -141,7 +140,7 @@ def _missing(port: Requirement, owner: Component, components: Iterable[Component
                     require_fitting(provider.name, port.service, provider.service)
                 except InputError as error:
                     reasons.append(str(error))
-    return SchemaError("; ".join([message, *reasons[:3]]), found=port.name, place=place_of(type(owner)))
+    return SchemaError("; ".join([message, *reasons[:3]]), found=port.name, place=port.place)
 
 
 class Wiring:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import pickle
+from pathlib import Path
 from typing import ClassVar
 
 import pytest
@@ -458,3 +459,13 @@ def test_a_provider_of_another_program_that_does_not_fit_is_reported(caplog):
 
     simulate(main)
     assert "port 'watch.battery' is not wired" in caplog.text
+
+
+def test_an_error_of_wiring_has_the_line_of_the_port():
+    lines = Path(__file__).read_text("utf-8").splitlines()
+    ((_, error),) = wiring_errors([Laser("front"), Laser("rear"), Mapper()])
+    assert error.place is not None
+    assert lines[(error.place.line or 0) - 1].strip() == 'scan = Stream({"metres": "number"})'
+    assert error.place.source == __file__
+    ((_, missing),) = wiring_errors([Mapper()])
+    assert missing.place == error.place
