@@ -11,6 +11,7 @@ from dsc.components.component import ALWAYS, Component
 from dsc.components.demands import Demand
 from dsc.components.wiring import choose_sources, provider_for, wiring_errors
 from dsc.deployment.checks import check_deployment
+from dsc.deployment.deadlines import SCHEDULE
 from dsc.deployment.model import Deployment, Placed, load_deployment
 from dsc.deployment.placement import PLACEMENT
 from dsc.deployment.words import finding_at
@@ -110,7 +111,8 @@ def check_robot(deployment: Deployment, robot: Parts) -> list[Finding]:
     errors = [] if robot.remote else wiring_errors(components.values())  # the ports of other programs are unknown
     unwired = [Finding(error, "wiring") for _, error in errors]
     needs = [] if unwired or unknown or robot.remote else _inactive(deployment, components)
-    return [*absent, *unknown, *unwired, *needs, *check_deployment(whole)]
+    other_periods = _other_periods(whole, components)
+    return [*absent, *unknown, *unwired, *needs, *other_periods, *check_deployment(whole)]
 
 
 def _unknown(deployment: Deployment, robot: Parts) -> Iterator[Finding]:
@@ -130,6 +132,19 @@ def _unknown_name(deployment: Deployment, path: FormPath, message: str, valid: C
     error = UnknownNameError(message, found=str(path[-1]), valid=valid)
     error.place = deployment.place(path)
     return Finding(error, PLACEMENT)
+
+
+def _other_periods(deployment: Deployment, components: Mapping[str, Component]) -> Iterator[Finding]:
+    """Yield the tasks `step` whose period is not that of the component's periodic steps."""
+    for name, placed in deployment.components.items():
+        period = components[name].period if name in components else None
+        for path, demand in placed.demands(None):
+            task = demand.tasks.get("step")
+            if period is not None and task is not None and task.period != period:
+                message = (
+                    f"task 'step' has a period of {task.period:g} s, but component '{name}' steps every {period:g} s"
+                )
+                yield finding_at(deployment, ("components", name, *path, "tasks", "step", "period"), message, SCHEDULE)
 
 
 def _inactive(deployment: Deployment, components: Mapping[str, Component]) -> Iterator[Finding]:

@@ -169,3 +169,20 @@ def test_components_of_other_programs_are_placed_too(folder):
     with_model(folder, "components: {", "components: {arm: {host: base}, ")
     assert invoke("check", folder / "lab.yaml").exit_code == 0
     assert invoke("draw", folder / "lab.yaml").exit_code == 0
+
+
+STEPS = """
+    period = 0.05
+
+    async def step(self):
+        pass
+
+    scan = Push"""
+
+
+def test_a_task_has_the_period_of_the_steps_of_its_component(folder):
+    (folder / "lasers.py").write_text(ROBOT.replace("    scan = Push", STEPS))
+    with_model(folder, "rear: {tasks: {scan: {period: 0.04,", "rear: {tasks: {step: {period: 0.04,")
+    found = invoke("check", folder / "lab.yaml")
+    assert "lab.yaml:9:" in found.output
+    assert "task 'step' has a period of 0.04 s, but component 'rear' steps every 0.05 s" in found.output
