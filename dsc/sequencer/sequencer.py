@@ -141,6 +141,7 @@ class Sequencer(OutsideInput):
             "in_use": sorted(self.dispatcher.in_use),
             "switched_on": sorted(self.dispatcher.activation.on),
             "waits": list(self.dispatcher.waits),
+            "waits_for_resources": dict(self.dispatcher.activation.waiting),
             "waiting": len(self._inbox.waiting),
             "knowledge_version": self.knowledge.version,
         }

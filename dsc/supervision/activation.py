@@ -10,7 +10,9 @@ from dsc.components.component import Component
 from dsc.components.hooks import GRACE, abandon, contained, reason_of
 from dsc.components.life_cycle import NEUTRAL, Announcer, Life
 from dsc.errors import ProgrammingError
+from dsc.rank import ORDINARY, Rank
 from dsc.supervision.component_registry import ComponentRegistry
+from dsc.supervision.room import Room, amounts_of
 from knowledge_base.errors import InputError
 
 PAUSE = 1.0
@@ -32,6 +34,7 @@ class ComponentActivation(Announcer):
     Attributes:
         registry: the deployed components.
         concerned: names of the components that participate.
+        waiting: the reasons of the components in use that wait for resources, by name.
     """
 
     def __init__(self, registry: ComponentRegistry, used: Callable[[], Iterable[str]]) -> None:
@@ -39,6 +42,9 @@ class ComponentActivation(Announcer):
         self.registry = registry
         self._used = used
         self.concerned: set[str] = set()
+        self.waiting: dict[str, str] = {}
+        self._room: Room | None = None
+        self._rank_of: Callable[[str], Rank] = lambda _: ORDINARY
         self._in_mode: dict[str, None] = {}
         self._supervisors: dict[str, Supervisor] = {}
         self._released: dict[str, asyncio.Task[None]] = {}
@@ -52,6 +58,11 @@ class ComponentActivation(Announcer):
     def on(self) -> frozenset[str]:
         """Names of the components that are alive and active."""
         return frozenset(supervisor.name for supervisor in self._supervisors.values() if supervisor.on)
+
+    def share(self, room: Room, rank_of: Callable[[str], Rank]) -> None:
+        """Activate components only if the room has their resources; those of a larger rank come first."""
+        self._room, self._rank_of = room, rank_of
+        room.listen(self.look)
 
     def deploy(self, component: Component) -> None:
         """Add a component to the registry; it replaces a component with an equal name."""
@@ -68,6 +79,7 @@ class ComponentActivation(Announcer):
         kind = type(component)
         if (
             component.needs
+            or component.demands
             or component.period is not None
             or kind.needed is not Component.needed
             or kind.activate is not Component.activate
@@ -102,6 +114,8 @@ class ComponentActivation(Announcer):
         for component in self.registry.components.values():
             component.life.leave(self.look)
         self._keep_only({})
+        if self._room is not None:
+            self._room.leave(self.look)
         if self._released:
             # A task may wait `GRACE` for another component, then `GRACE` for its own.
             _, others = await asyncio.wait(self._released.values(), timeout=2 * GRACE)
@@ -111,11 +125,14 @@ class ComponentActivation(Announcer):
 
     # -- for skills and supervisors ---------------------------------------------------------------------------
 
-    def supervisor(self, component: Component) -> Supervisor:
-        """Return the supervisor of a component in use; the components that it needs have supervisors afterwards."""
+    def supervisor(self, component: Component) -> Supervisor | None:
+        """Return the supervisor of a component in use; the components that it needs have supervisors afterwards.
+
+        The result is `None` while the component waits for resources.
+        """
         if self._looking or component.name not in self._supervisors:
             self._supervise()
-        return self._supervisors[component.name]
+        return self._supervisors.get(component.name)
 
     def supervisors_of(self, component: Component) -> Iterator[Supervisor]:
         """Yield the supervisors of the components that `component` needs in its mode, then its own supervisor.
@@ -161,10 +178,35 @@ class ComponentActivation(Announcer):
             return
         required: dict[str, Component | None] = {}
         in_mode = [name for name in self._in_mode if self.registry.components[name].mode != NEUTRAL]
-        for name in (*sorted(self._used()), *in_mode):
-            if name in self.concerned:
-                self._require(name, None, required)
+        in_use = [name for name in (*sorted(self._used()), *in_mode) if name in self.concerned]
+        for name in in_use if self._room is None else self._with_room(self._room, dict.fromkeys(in_use)):
+            self._require(name, None, required)
         self._keep_only(required)
+
+    def _with_room(self, room: Room, in_use: Iterable[str]) -> Iterator[str]:
+        """Yield the components in use that have their resources, and note those that wait for resources.
+
+        Those that are active already come first, then those of larger ranks. A component does not overtake another one
+        that waits for the same resource.
+        """
+        before, self.waiting = self.waiting, {}
+        awaited: set[str] = set()
+        for name in sorted(in_use, key=self._rank_of, reverse=True):
+            chain: dict[str, None] = {name: None}
+            with suppress(InputError):  # the skill of the component fails with this error
+                chain = self._closure(name, {}, ())
+            known = {one: self.registry.known(one) for one in chain}
+            wanted = {one: amounts_of(found, found.mode) for one, found in known.items() if found is not None}
+            resources = {resource for amounts in wanted.values() for resource in amounts}
+            is_new = name not in self._supervisors
+            reason = "others wait for its resources" if is_new and resources & awaited else room.take(wanted, id(self))
+            if reason:
+                self.waiting[name] = reason
+                awaited |= resources
+            if not (reason and is_new):
+                yield name
+        if before != self.waiting:
+            super().announce()
 
     def _require(self, name: str, needing: Component | None, required: dict[str, Component | None]) -> None:
         """Add a component together with the component that needs it, then the component's own dependencies."""
@@ -195,6 +237,8 @@ class ComponentActivation(Announcer):
         def over(task: asyncio.Task[None]) -> None:
             if self._released.get(supervisor.name) is task:
                 del self._released[supervisor.name]
+            if self._room is not None and supervisor.name not in self._supervisors:
+                self._room.release(supervisor.name, id(self))
 
         del self._supervisors[supervisor.name]
         supervisor.release(after)

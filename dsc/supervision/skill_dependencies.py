@@ -33,6 +33,8 @@ class SkillDependencies:
         """The dependency that the skill waits for, as text; empty if it waits for none."""
         if not self.concerned:
             return ""
+        if reason := self._activation.waiting.get(self._component.name):
+            return f"component '{self._component.name}', which waits for resources: {reason}"
         with suppress(InputError):  # `ready` raises this error
             for one in self._activation.supervisors_of(self._component):
                 if not one.on:
@@ -54,9 +56,12 @@ class SkillDependencies:
 
     async def _supervised(self) -> None:
         supervisor = self._activation.supervisor(self._component)
-        before = supervisor.failures
+        before = 0 if supervisor is None else supervisor.failures
 
         def settled() -> bool:
+            supervisor = self._activation.supervisor(self._component)
+            if supervisor is None or self._component.name in self._activation.waiting:
+                return False
             supervisors = list(self._activation.supervisors_of(self._component))
             for one in supervisors:
                 if one.problem is not None:

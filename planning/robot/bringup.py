@@ -27,7 +27,7 @@ from knowledge_base.tracebacks import place_of, user_place
 from planning.engines.planner import Planner
 from planning.execution.shipped_plots import shipped_plots
 from planning.problem.construction import check_goal
-from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of, wiring_of
+from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of, resources_of, wiring_of
 from planning.robot.program import Origin
 from planning.robot.robot import Robot, kind_of
 from planning.robot.simulation import Setup, Simulation
@@ -168,6 +168,7 @@ def _deployed(
             bundle.planning_domain, _library(bundle, setup.profile), components, None, planner,
             clock=clock, foresight=bundle.foresight, store=setup.store, durability=durability, failures=bundle.failures,
             origin=Origin(bundle, task, simulation, setup.profile, kept, setup.resumes),
+            resources=resources_of(gathered([bundle])),
         )  # fmt: skip
     except BaseException:
         if simulation is not None:

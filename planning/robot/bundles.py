@@ -58,6 +58,7 @@ class BundleParts(TypedDict, total=False):
     conversions: tuple[Conversion[..., Any], ...]
     remote: tuple[str, ...]
     wiring: Mapping[str, str]
+    resources: Mapping[str, float] | None
 
 
 @dataclass(frozen=True, eq=False)  # without slots, for the cached properties
@@ -86,6 +87,7 @@ class Bundle:
         conversions: the functions that terms of the plots may call, see `dsc.conversion`.
         remote: the names of components that other programs host (`dsc host`). A run connects to them, in real time.
         wiring: the providers of required ports, both as `component.port`, unless a profile names others.
+        resources: the capacity of each resource that active components share, see `Robot`.
     """
 
     name: str
@@ -105,6 +107,7 @@ class Bundle:
     conversions: tuple[Conversion[..., Any], ...] = ()
     remote: tuple[str, ...] = ()
     wiring: Mapping[str, str] = field(default_factory=dict)
+    resources: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.failures, str):
@@ -311,6 +314,12 @@ def plots_of(bundles: Collection[Bundle]) -> list[ActionPlot]:
 def conversions_of(bundles: Iterable[Bundle]) -> list[Conversion[..., Any]]:
     """Return the conversions of the bundles, without repetitions."""
     return list(dict.fromkeys(one for bundle in bundles for one in bundle.conversions))
+
+
+def resources_of(bundles: Iterable[Bundle]) -> dict[str, float] | None:
+    """Return the capacities of the bundles; `None` if no bundle states any."""
+    stated = [bundle.resources for bundle in bundles if bundle.resources is not None]
+    return {name: amount for one in stated for name, amount in one.items()} if stated else None
 
 
 def wiring_of(bundles: Iterable[Bundle]) -> dict[str, str]:

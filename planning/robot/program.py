@@ -18,11 +18,14 @@ from dsc.dynamic.library import Library
 from dsc.events import SKILL_FAILURES
 from dsc.model.plot import ActionPlot
 from dsc.profiles import configure
+from dsc.rank import ORDINARY, Rank
 from dsc.runs.pruning import prune
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import ClockKind, LoopClock
+from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import signatures
+from dsc.supervision.room import Room
 from dsc.text.profiles import Profile, adapted
 from dsc.trace import Listener, Trace
 from knowledge_base.errors import InputError, SchemaError, StoreError
@@ -44,6 +47,7 @@ from planning.robot.bundles import (
     domain_of,
     gathered,
     plots_of,
+    resources_of,
     shipped_by,
     wiring_of,
     with_plots_of,
@@ -95,6 +99,7 @@ class RobotProgram:
         origin: Origin | None = None,
         conversions: Iterable[Conversion[..., Any]] = (),
         wiring: Mapping[str, str] | None = None,
+        resources: Mapping[str, float] | None = None,
     ) -> None:
         require_parts(knowledge, planner, foresight, store)
         self.components = require_instances(components)
@@ -102,6 +107,9 @@ class RobotProgram:
         choose_sources(self.components, wiring or {})
         require_deployed(self.components, [PlanningComponent.name])
         require_wired(self.components)
+        self.room = None if resources is None else Room(resources)
+        if self.room is not None:
+            self.room.require(self.components)
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
         if any(component.name == PlanningComponent.name for component in self.components):
             raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)
@@ -162,6 +170,7 @@ class RobotProgram:
         found = gathered(bundles)
         how.setdefault("failures", frozenset[str]().union(*(bundle.failures for bundle in found)))
         how.setdefault("conversions", conversions_of(found))
+        how.setdefault("resources", resources_of(found))
         how["wiring"] = {**wiring_of(found), **(how.get("wiring") or {})}
         known = adapted([*plots_of(found), *plots], profile)
         parts = [*components_of(found), *components]
@@ -235,6 +244,8 @@ class RobotProgram:
             shared=[component.name for component in components if component.concurrent],
             foresight=self._foresight,
         )  # fmt: skip
+        if self.room is not None:
+            sequencer.dispatcher.activation.share(self.room, partial(_rank_of, sequencer.dispatcher))
         sequencer.listen(planning.note)
         sequencer.dispatcher.deploy(planning, last=True)
         return sequencer, planning
@@ -287,3 +298,8 @@ def failure_events(library: Library) -> frozenset[str]:
     emitted = {event for plot in library if plot.implements for event in plot.emits}
     answered = {rule.on for plot in library for rule in plot.rules if rule.on is not None}
     return frozenset({*SKILL_FAILURES, *emitted, *answered})
+
+
+def _rank_of(dispatcher: Dispatcher, component: str) -> Rank:
+    """Return the largest rank of the running skills of a component."""
+    return max((start.rank for start in dispatcher.started() if start.component == component), default=ORDINARY)

@@ -70,6 +70,8 @@ class Robot(RobotProgram):
         origin: the deployed bundle; `None` for a robot that was not made by `deploy`.
         conversions: the functions that terms of the plots may call; a `Library` has its own.
         wiring: the providers of required ports, both as `component.port`, see `dsc.components.wiring`.
+        resources: the capacity of each resource that components demand, see `dsc.supervision.room`; without it, all
+            components may be active together.
 
     Attributes:
         clock: the kind of time; `None` for that of the event loop.
