@@ -271,6 +271,11 @@ class LifeCycle(Announcer):
                 await self._hooks.switch(mode)
             self._entered = mode
 
+    @property
+    def works(self) -> bool:
+        """Whether a skill is executed; a skill that waits to begin does not count."""
+        return bool(self._skills)
+
     @contextmanager
     def executing(self, task: asyncio.Task[Any]) -> Iterator[None]:
         """Return a context manager in which the task executes a skill; exit hooks wait for its end."""

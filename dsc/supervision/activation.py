@@ -186,8 +186,8 @@ class ComponentActivation(Announcer):
     def _with_room(self, room: Room, in_use: Iterable[str]) -> Iterator[str]:
         """Yield the components in use that have their resources, and note those that wait for resources.
 
-        Those that are active already come first, then those of larger ranks. A component does not overtake another one
-        that waits for the same resource.
+        Those of larger ranks come first, and none overtakes another one that waits for the same resource. A component
+        that has too little for its new mode becomes inactive, unless it works, so that no two wait for each other.
         """
         before, self.waiting = self.waiting, {}
         awaited: set[str] = set()
@@ -203,7 +203,8 @@ class ComponentActivation(Announcer):
             if reason:
                 self.waiting[name] = reason
                 awaited |= resources
-            if not (reason and is_new):
+            root = known[name]
+            if not reason or (not is_new and root is not None and root.life.works):
                 yield name
         if before != self.waiting:
             super().announce()

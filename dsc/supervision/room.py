@@ -68,9 +68,11 @@ class Room(Announcer):
             if sum(amounts.values()) > capacity:
                 parts = ", ".join(f"{name} {amount:g}" for name, amount in sorted(amounts.items()))
                 return f"the robot has {capacity:g} of '{resource}' for {parts}"
-        self.users = users
+        before, self.users = self.users, users
         for name in wanted:
             self._holders.setdefault(name, set()).add(holder)
+        if any(amount < before.get(name, {}).get(what, 0.0) for name in wanted for what, amount in users[name].items()):
+            self.announce()
         return ""
 
     def release(self, component: str, holder: int) -> None:

@@ -126,11 +126,14 @@ class Part(Component):
     active: ClassVar[dict[str, int]] = {}
     most: ClassVar[int] = 0
 
-    def __init__(self, name: str, amount: int, needs: tuple[str, ...]) -> None:
+    modes = ("large",)
+
+    def __init__(self, name: str, amount: int, more: int, needs: tuple[str, ...]) -> None:
         super().__init__(name)
         self.amount = amount
         self.needs = {ALWAYS: needs}  # type: ignore[misc]
-        self.demands = {ALWAYS: Demand(resources={"memory": amount})}  # type: ignore[misc]
+        always, large = Demand(resources={"memory": amount}), Demand(resources={"memory": more})
+        self.demands = {ALWAYS: always, "large": large}  # type: ignore[misc]
 
     async def activate(self, active: bool) -> None:
         await asyncio.sleep(0.1)
@@ -150,26 +153,33 @@ class Part(Component):
 def robots(draw: st.DrawFn):
     number = draw(st.integers(2, 5))
     amounts = draw(st.lists(st.integers(0, 5), min_size=number, max_size=number))
+    more = draw(st.lists(st.integers(0, 5), min_size=number, max_size=number))
     needs = [
         tuple(f"c{n}" for n in draw(st.sets(st.integers(0, k - 1), max_size=2))) if k else () for k in range(number)
     ]
     starts = draw(st.lists(st.floats(0, 3).map(lambda x: round(x, 1)), min_size=number, max_size=number))
     spare = draw(st.integers(0, 6))
-    return amounts, needs, starts, spare
+    return amounts, more, needs, starts, spare
 
 
 @given(robots())
 def test_the_capacity_is_never_exceeded_and_each_skill_ends(robot):
-    amounts, needs, starts, spare = robot
+    amounts, more, needs, starts, spare = robot
     chains: list[set[int]] = []
     for k, others in enumerate(needs):
         chains.append({k}.union(*(chains[int(name[1:])] for name in others)))
-    capacity = max(sum(amounts[n] for n in chain) for chain in chains) + spare
+    capacity = max(sum(amounts[n] + more[n] for n in chain) for chain in chains) + spare
     Part.active.clear()
     Part.most = 0
-    look = "{entry: {trigger: COMPONENT.look, with: {seconds: 1}}, on: {looked: e#}}"
+    trigger = "{trigger: COMPONENT.look, with: {seconds: 1}}"
+    larger = (
+        "{entry: [{switch: COMPONENT, to: large}, "
+        + trigger
+        + "], exit: {switch: COMPONENT, to: neutral}, on: {looked: e#}}"
+    )
+    look = "{entry: " + trigger + ", on: {looked: x#}}\n          x#: " + larger
     plot = parallel(*(f"{at + 0.1:g} c{n} {look}" for n, at in enumerate(starts)))
-    parts = [Part(f"c{n}", amount, needs[n]) for n, amount in enumerate(amounts)]
+    parts = [Part(f"c{n}", amount, more[n], needs[n]) for n, amount in enumerate(amounts)]
     assert run(plot, *parts, memory=capacity).reached
     assert Part.most <= capacity
     assert Part.active == {}
