@@ -97,8 +97,9 @@ class Monitor:
             else:
                 if (name, PROBLEM) in self._last:
                     self._report(name, PROBLEM, None, CHANGE)
+                values = {entry: self._entry(found, name, entry) for entry in entries}
                 for entry, when in entries.items():
-                    self._report(name, entry, self._entry(found, name, entry), when)
+                    self._report(name, entry, values[entry], when)
             await asyncio.sleep(pause)
 
     def _entry(self, found: Mapping[str, Any], name: str, entry: str) -> Any:

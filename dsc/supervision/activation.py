@@ -44,6 +44,7 @@ class ComponentActivation(Announcer):
         self.concerned: set[str] = set()
         self.waiting: dict[str, str] = {}
         self._room: Room | None = None
+        self._in_order: list[str] = []  # the components in use, the earliest first
         self._rank_of: Callable[[str], Rank] = lambda _: ORDINARY
         self._in_mode: dict[str, None] = {}
         self._supervisors: dict[str, Supervisor] = {}
@@ -186,12 +187,15 @@ class ComponentActivation(Announcer):
     def _with_room(self, room: Room, in_use: Iterable[str]) -> Iterator[str]:
         """Yield the components in use that have their resources, and note those that wait for resources.
 
-        Those of larger ranks come first, and none overtakes another one that waits for the same resource. A component
-        that has too little for its new mode becomes inactive, unless it works, so that no two wait for each other.
+        Those of larger ranks come first, then those that were used earlier. None overtakes another one that waits for
+        the same resource. A component that has too little for its new mode becomes inactive, unless it works. So no two
+        wait for each other.
         """
         before, self.waiting = self.waiting, {}
         awaited: set[str] = set()
-        for name in sorted(in_use, key=self._rank_of, reverse=True):
+        names = dict.fromkeys(in_use)
+        self._in_order = list(dict.fromkeys(name for name in (*self._in_order, *names) if name in names))
+        for name in sorted(self._in_order, key=self._rank_of, reverse=True):
             chain: dict[str, None] = {name: None}
             with suppress(InputError):  # the skill of the component fails with this error
                 chain = self._closure(name, {}, ())

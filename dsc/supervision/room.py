@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 
 from dsc.components.component import ALWAYS, Component
 from dsc.components.life_cycle import Announcer
 from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.language.checking.inputs import shown
 
 Amounts = Mapping[str, float]
 
@@ -30,10 +32,16 @@ class Room(Announcer):
 
     Attributes:
         users: the amounts by component.
+
+    Raises:
+        InputError: a capacity is not a number from 0 on.
     """
 
     def __init__(self, capacity: Amounts) -> None:
         super().__init__()
+        for name, amount in capacity.items():
+            if isinstance(amount, bool) or not isinstance(amount, int | float) or not 0 <= amount < math.inf:
+                raise InputError(f"the capacity of '{name}' is a number from 0 on, not {shown(amount)}", found=name)
         self.capacity = dict(capacity)
         self.users: dict[str, Amounts] = {}
         self._holders: dict[str, set[int]] = {}
@@ -66,8 +74,9 @@ class Room(Announcer):
         for resource, capacity in self.capacity.items():
             amounts = {name: found[resource] for name, found in users.items() if found.get(resource)}
             if sum(amounts.values()) > capacity:
-                parts = ", ".join(f"{name} {amount:g}" for name, amount in sorted(amounts.items()))
-                return f"the robot has {capacity:g} of '{resource}' for {parts}"
+                needed = sum(amounts.pop(name, 0.0) for name in wanted)
+                parts = ", ".join(f"{name} uses {amount:g}" for name, amount in sorted(amounts.items()))
+                return f"it needs {needed:g} of '{resource}'; of {capacity:g}, {parts or 'nothing is used'}"
         before, self.users = self.users, users
         for name in wanted:
             self._holders.setdefault(name, set()).add(holder)

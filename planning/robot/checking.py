@@ -60,6 +60,7 @@ from planning.robot.project_files import (
     READABLE,
     check_files,
     is_deployment,
+    is_monitoring,
     is_profile,
     objects_in,
     text_of,
@@ -414,7 +415,8 @@ class _Robot:
         """Yield the files of the bundle's profiles, and of other profiles in the project that no other robot has."""
         own = self._bundle.profiles
         if own is not None and own.is_dir():
-            yield from sorted(own.glob("*.yaml"))
+            found = sorted(own.glob("*.yaml"))
+            yield from (file for file in found if not is_deployment(file) and not is_monitoring(file))
             for file in own.glob("*.yml"):
                 with tolerated():
                     raise InputError("the name of a profile's file ends in `.yaml`", place=Place(str(file)))

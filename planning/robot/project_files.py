@@ -42,6 +42,11 @@ def is_profile(file: Path) -> bool:
     return _has_key(file, "profile") and not is_deployment(file)
 
 
+def is_monitoring(file: Path) -> bool:
+    """Return whether a file is a monitoring profile."""
+    return _has_key(file, "monitor")
+
+
 def _has_key(file: Path, key: str) -> bool:
     """Return whether a file is YAML whose outermost mapping has a key."""
     return file.suffix in _YAML and re.search(rf"^{key}:", text_of(file), re.MULTILINE) is not None
@@ -84,7 +89,7 @@ def _read(file: Path, text: str) -> None:
         PlanningDomain.from_pddl(file)
     elif is_profile(file):
         load_profile(file)
-    elif _has_key(file, "monitor"):
+    elif is_monitoring(file):
         load_monitoring(file)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import pytest
 from hypothesis import given
@@ -44,7 +44,7 @@ def empty_log():
     Camera.log.clear()
 
 
-def run(plot: str, *components: Component, **capacity: float):
+def run(plot: str, *components: Component, **capacity: Any):
     with Robot(DOMAIN, [parse_plot(plot)], components, clock="simulated", resources=capacity or None) as robot:
         return robot.run("p")
 
@@ -91,13 +91,24 @@ def test_the_more_urgent_skill_has_the_room_first():
     assert [one for one in Camera.log if one[0] == "+"] == ["+left", "+right", "+middle"]
 
 
+@pytest.mark.parametrize("names", [("ant", "zed"), ("zed", "ant")])
+def test_of_equal_ranks_the_earlier_one_has_the_room_first(names):
+    cameras = [Camera(name) for name in ("mid", "ant", "zed")]
+    first, second = names
+    plot = parallel(f"0.1 mid {LOOK}", f"0.3 {second} {LOOK}", f"0.2 {first} {LOOK}")
+    assert run(plot, *cameras, memory=1000).reached
+    assert [one for one in Camera.log if one[0] == "+"] == ["+mid", f"+{first}", f"+{second}"]
+
+
 def test_a_wait_for_room_ends_with_the_deadline_and_its_reason():
     long = "0.1 left {entry: {trigger: COMPONENT.look, with: {seconds: 100}}, on: {looked: e#}}"
     late = "{to: e#, assign: {reason: ?event.reason}}"
     bounded = "0.2 right {entry: {trigger: COMPONENT.look, within: 5}, on: {looked: e#, timed_out: " + late + "}}"
     plot = parallel(long, bounded, outputs="{reason: {type: text, initial: nothing}}")
     end = run(plot, Camera("left"), Camera("right"), memory=1000)
-    assert "waits for resources: the robot has 1000 of 'memory' for left 600, right 600" in end.outputs["reason"]
+    assert (
+        "'right', which waits for resources: it needs 600 of 'memory'; of 1000, left uses 600" in end.outputs["reason"]
+    )
 
 
 def test_a_mode_that_needs_more_waits_for_the_room():
@@ -116,6 +127,9 @@ def test_a_mode_that_needs_more_waits_for_the_room():
 def test_demands_that_never_fit_are_refused():
     with pytest.raises(InputError, match=r"component 'left' needs 900 of 'memory', and the robot has 800"):
         run(ONE_BY_ONE, Camera("left"), Camera("right"), memory=800)
+    for capacity in ("a", -1, True, float("nan")):
+        with pytest.raises(InputError, match="the capacity of 'memory' is a number from 0 on"):
+            run(ONE_BY_ONE, Camera("left"), Camera("right"), memory=capacity)
     with pytest.raises(UnknownNameError, match="component 'left' needs 'memory', which the robot does not have"):
         run(ONE_BY_ONE, Camera("left"), Camera("right"), memori=800)
 

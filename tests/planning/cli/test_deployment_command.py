@@ -150,6 +150,20 @@ def test_a_check_of_the_project_includes_its_monitoring_profiles(folder):
     assert "monitor.yaml:2:22: unknown key 'stream'; did you mean 'streams'?" in found.output
 
 
+def test_a_monitoring_profile_among_profiles_is_none_of_them(folder):
+    profiles = folder / "profiles"
+    profiles.mkdir()
+    (profiles / "rear.yaml").write_text(PROFILE)
+    (profiles / "monitor.yaml").write_text("monitor: m\ncomponents: {front: {diagnose: {life: change}}}\n")
+    (folder / "lasers.py").write_text(ROBOT.replace("goal=", f"profiles=Path({str(profiles)!r}), goal="))
+    (folder / "robot.py").write_text("from lasers import bundle\n\nrobot = bundle()\n")
+    source = (folder / "lasers.py").read_text()
+    (folder / "lasers.py").write_text("from pathlib import Path\n" + source)
+    found = CliRunner().invoke(app, ["check", str(folder)]).output
+    assert "several services fit port 'mapper.scan'" in found
+    assert "monitor.yaml" not in found
+
+
 def test_a_check_of_the_project_includes_its_deployment_models(folder):
     (folder / "robot.py").write_text("from lasers import bundle\n\nrobot = bundle()\n")
     whole = CliRunner().invoke(app, ["check", str(folder)])
