@@ -26,7 +26,7 @@ class Platform(Frozen):
         resources: capacity of each resource by name.
     """
 
-    cores: int = Field(default=1, ge=1)
+    cores: int = Field(default=1, ge=1, le=1024)
     scheduling: Policy = "fixed_priority"
     resources: dict[str, Amount] = Field(default_factory=dict)
 

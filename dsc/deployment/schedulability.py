@@ -11,13 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from heapq import merge
-from itertools import count, pairwise
+from itertools import count, pairwise, repeat
 
 from dsc.deployment.tasks import Task, hyperperiod, utilisation
 from knowledge_base.errors import InputError
 
-MOST_POINTS = 200_000
-"""Maximum number of jobs or deadlines that one test examines."""
+MOST_POINTS = 50_000
+"""Maximum number of steps of one test: iterations of response times, or deadlines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,30 +56,34 @@ def response_time(task: Task, others: Sequence[Task]) -> int | None:
         others: the other tasks of its core; those of equal priority count as more urgent.
 
     Raises:
-        InputError: the busy period of the task has more than `MOST_POINTS` jobs.
+        InputError: the test needs more than `MOST_POINTS` steps.
     """
     urgent = [other for other in others if other.priority >= task.priority]
     if utilisation([task, *urgent]) > 1:
         return None
     repeats = hyperperiod([task, *urgent])
-    worst = 0
-    for number in range(MOST_POINTS):
-        done = _end_of_job(task, urgent, number)
+    worst, number = 0, 0
+    steps = repeat(None, MOST_POINTS)
+    while True:
+        done = _end_of_job(task, urgent, number, steps)
         worst = max(worst, task.jitter + done - number * task.period)
         next_arrival = (number + 1) * task.period - task.jitter
         if worst > task.deadline or done <= next_arrival or number * task.period > repeats:
             return worst
-    raise _no_decision(f"the busy period of task '{task.name}'")
+        number += 1
 
 
-def _end_of_job(task: Task, urgent: Sequence[Task], number: int) -> int:
+def _end_of_job(task: Task, urgent: Sequence[Task], number: int, steps: Iterator[None]) -> int:
     """Return the end of the job with a number in the busy period, or the first time at which it misses its deadline."""
     own = task.blocking + (number + 1) * task.worst_case
     latest = task.deadline + number * task.period - task.jitter
-    end, before = own, -1
-    while end != before and end <= latest:
-        end, before = own + _interference(urgent, end), end
-    return end
+    end = own
+    for _ in steps:
+        following = own + _interference(urgent, end)
+        if following == end or end > latest:
+            return end
+        end = following
+    raise _no_decision(f"the response time of task '{task.name}'")
 
 
 def _interference(urgent: Sequence[Task], time: int) -> int:
@@ -134,6 +138,6 @@ def _end_of_test(tasks: Sequence[Task], blocking: int) -> int | None:
 
 def _no_decision(what: str) -> InputError:
     return InputError(
-        f"{what} has more than {MOST_POINTS} jobs, so that the test does not end; choose periods with a smaller"
+        f"{what} needs more than {MOST_POINTS} steps, so that the test does not end; choose periods with a smaller"
         " common multiple, or a lower utilisation"
     )

@@ -10,6 +10,8 @@ from typing import Literal, NamedTuple
 
 from dsc.deployment.tasks import Task
 
+MOST_EARLY = 1_000
+"""Maximum number of jobs of a task that arrive before the worst case begins."""
 Policy = Literal["fixed_priority", "earliest_deadline"]
 
 
@@ -74,9 +76,13 @@ class Schedule:
 
 
 def worst_jobs(tasks: Iterable[Task], until: int) -> Iterator[Job]:
-    """Yield the jobs of the worst case: all tasks are ready together at 0, after their longest jitter."""
+    """Yield the jobs of the worst case: all tasks are ready together at 0, after their longest jitter.
+
+    Of the jobs that arrived before 0, each task has the last `MOST_EARLY`.
+    """
     for task in tasks:
-        for arrival in range(-task.jitter, until, task.period):
+        skipped = max(0, task.jitter // task.period - MOST_EARLY)
+        for arrival in range(skipped * task.period - task.jitter, until, task.period):
             yield Job(task, arrival, max(0, arrival), task.worst_case)
 
 

@@ -9,6 +9,7 @@ import typer
 
 from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, report
 from knowledge_base.cli.console import print_json
+from knowledge_base.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,6 +25,8 @@ app = typer.Typer(
 )
 
 _File = Annotated[Path, typer.Argument(metavar="FILE", help="A deployment model (YAML).")]
+_MOST_JOBS = 1_000_000
+"""Maximum number of simulated jobs of a core."""
 _WRONG = 2
 """Exit status with findings or missed deadlines."""
 
@@ -141,6 +144,8 @@ def _simulation_rows(core: Core, seconds: float, seed: int) -> Iterator[dict[str
     from dsc.deployment.tasks import NANOSECONDS
 
     until = round(seconds * NANOSECONDS)
+    if sum(until // task.period for task in core.tasks) > _MOST_JOBS:
+        raise InputError(f"--seconds {seconds:g} are more than {_MOST_JOBS} jobs; simulate a shorter time")
     jobs = list(random_jobs(core.tasks, until, Random(seed)))  # noqa: S311  a simulation
     schedule = run_jobs(jobs, core.policy, until)
     responses, worst = schedule.responses(), verdict_of(core).responses
