@@ -12,6 +12,7 @@ from knowledge_base.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from dsc.components.component import Component
+    from dsc.text.profiles import Profile
     from dsc.wire.host import Host
     from dsc.wire.service_manager import ServiceManager
     from dsc.wire.zenoh_transport import ZenohTransport
@@ -57,7 +58,9 @@ def host_command(
     Programs of one machine meet without options. On several machines, one program listens and the others connect.
     """
     import asyncio
+    from pathlib import Path
 
+    from dsc.text.profiles import find_profile
     from dsc.wire.realm import host_transport
     from planning.robot.targets import bundle_at
 
@@ -68,15 +71,17 @@ def host_command(
     if supervised:
         raise typer.Exit(_supervise())
 
+    settings = None if profile is None else find_profile(profile, bundle.profiles or Path())
+
     async def main() -> None:
         with host_transport(realm, listen or (), connect or (), zenoh) as transport:
             if plots is None:
-                found = _devices(bundle, only or [], seed, faults, profile)
+                found = _devices(bundle, only or [], seed, faults, settings)
                 await _host(found, transport, replace=replace)
                 return
             if only:
                 raise InputError("a program hosts components, or plots: give --only, or --plots")
-            with await _robot(bundle, seed, faults, transport) as robot:
+            with await _robot(bundle, seed, faults, settings, transport) as robot:
                 await _host([_component(plots, robot, private=private)], transport, replace=replace)
 
     asyncio.run(main())
@@ -93,16 +98,12 @@ def _supervise() -> int:
 
 
 def _devices(
-    bundle: Bundle, only: list[str], seed: int | None, faults: float | None, profile: str | None
+    bundle: Bundle, only: list[str], seed: int | None, faults: float | None, profile: Profile | None
 ) -> list[Component]:
     """Return the components of a bundle, or some of them; each of their required ports has a source."""
-    from pathlib import Path
-
-    from dsc.text.profiles import find_profile
     from planning.robot.bringup import devices
 
-    settings = None if profile is None else find_profile(profile, bundle.profiles or Path())
-    found = {one.name: one for one in devices(bundle, seed=seed, faults=faults, profile=settings)}
+    found = {one.name: one for one in devices(bundle, seed=seed, faults=faults, profile=profile)}
     for name in only:
         if name not in found:
             raise UnknownNameError(f"'{bundle.name}' has no component '{name}'", found=name, valid=found)
@@ -123,13 +124,15 @@ def _name_sources(hosted: dict[str, Component], found: dict[str, Component], bun
     name_sources(hosted.values(), found.values())
 
 
-async def _robot(bundle: Bundle, seed: int | None, faults: float | None, transport: ZenohTransport) -> Robot:
+async def _robot(
+    bundle: Bundle, seed: int | None, faults: float | None, profile: Profile | None, transport: ZenohTransport
+) -> Robot:
     """Return the robot of a bundle, connected to its remote components."""
     from dsc.wire.realm import connect_all
     from planning.robot.bringup import deploy
 
     remote = await connect_all(bundle.remote, transport)
-    return deploy(bundle, seed=seed, faults=faults, clock="real", remote=remote)
+    return deploy(bundle, seed=seed, faults=faults, profile=profile, clock="real", remote=remote)
 
 
 def _component(name: str, robot: Robot, *, private: bool) -> Component:
