@@ -35,6 +35,8 @@ from dsc.errors import SkillError as SkillError
 from dsc.errors import UncertainActionError as UncertainActionError
 from dsc.events import Event as Event
 from dsc.model.plot import ActionPlot as ActionPlot
+from dsc.monitoring.profile import MonitoringProfile as MonitoringProfile
+from dsc.monitoring.profile import load_monitoring as load_monitoring
 from dsc.outcomes import Outcome as Outcome
 from dsc.profiles import configure as configure
 from dsc.reflection import MODELS as MODELS

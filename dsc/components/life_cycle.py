@@ -55,7 +55,7 @@ class Announcer:
     """Source of change notifications for listeners; use it only in the loop's own thread."""
 
     def __init__(self) -> None:
-        self._listeners: set[Callable[[], None]] = set()
+        self._listeners: dict[Callable[[], None], None] = {}  # in order, so that simulated runs repeat
 
     def announce(self) -> None:
         """Call the listeners."""
@@ -64,11 +64,11 @@ class Announcer:
 
     def listen(self, listener: Callable[[], None]) -> None:
         """Call the listener after each later change."""
-        self._listeners.add(listener)
+        self._listeners[listener] = None
 
     def leave(self, listener: Callable[[], None]) -> None:
         """Stop calling the listener."""
-        self._listeners.discard(listener)
+        self._listeners.pop(listener, None)
 
     async def until(self, holds: Callable[[], bool]) -> None:
         """Wait until `holds()` is true; call `holds` again after each change."""

@@ -11,9 +11,10 @@ wiring:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from dsc.components.component import Component
+from dsc.components.life_cycle import Announcer
 from dsc.components.requirement import Provider, Requirement
 from dsc.components.services import Service, ambiguous, fits, named_service, require_fitting
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
@@ -143,12 +144,11 @@ def _missing(port: Requirement, owner: Component, components: Iterable[Component
     return SchemaError("; ".join([message, *reasons[:3]]), found=port.name, place=port.place)
 
 
-class Wiring:
-    """The wires of a run, also to components that are deployed late.
+class Wiring(Announcer):
+    """The wires of a run, also to components that are deployed late; announces changes.
 
     Args:
         components: the deployed components, by name.
-        changed: receives the name of each component whose wires have changed.
 
     Attributes:
         changes: by required port, the wires of states and operators, the effective one last.
@@ -159,16 +159,22 @@ class Wiring:
         InputError: several services fit a required port without a source.
     """
 
-    def __init__(
-        self,
-        components: Mapping[str, Component],
-        changed: Callable[[str], None] = lambda _: None,
-    ) -> None:
+    def __init__(self, components: Mapping[str, Component]) -> None:
+        super().__init__()
         self._components = components
-        self._changed = changed
         self._joined: dict[Requirement, Component] = {}
         self.changes: dict[str, list[tuple[int, str | None]]] = {}  # activations, and providers
         self._connect_all()
+
+    def wires(self) -> dict[str, dict[str, str | None]]:
+        """Return the providers of required ports by component and port; the provider of a cut wire is `None`."""
+        return {
+            owner.name: {
+                port: None if one.provider is None else one.provider.name for port, one in owner.requirements.items()
+            }
+            for owner in self._components.values()
+            if owner.requirements
+        }
 
     def deployed(self, component: Component) -> None:
         """Connect a newly deployed component, which may replace another one."""
@@ -231,7 +237,7 @@ class Wiring:
         else:
             port.connect(provider)
         if provider != before:
-            self._changed(owner.name)
+            self.announce()
 
     def _provider(self, port: Requirement, owner: Component, chosen: str | None) -> Provider | None:
         """Return the provider of a port; `None` if it is not deployed yet."""

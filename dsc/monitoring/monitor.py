@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,17 +43,23 @@ class Monitor:
         profile: the entries to observe.
         components: local or remote components by name.
         listener: called with each observation, in the loop's thread.
+        sleep: waits between two diagnoses.
 
     Raises:
         UnknownNameError: a component or a push port of the profile does not exist.
     """
 
     def __init__(
-        self, profile: MonitoringProfile, components: Mapping[str, Component], listener: Callable[[Observation], None]
+        self,
+        profile: MonitoringProfile,
+        components: Mapping[str, Component],
+        listener: Callable[[Observation], None],
+        sleep: Callable[[float], Awaitable[object]] = asyncio.sleep,
     ) -> None:
         self._profile = profile
         self._components = components
         self._listener = listener
+        self._sleep = sleep
         self._began = 0.0
         self._last: dict[tuple[str, str], tuple[float, Any]] = {}
         for name, observed in profile.components.items():
@@ -100,7 +106,7 @@ class Monitor:
                 values = {entry: self._entry(found, name, entry) for entry in entries}
                 for entry, when in entries.items():
                     self._report(name, entry, values[entry], when)
-            await asyncio.sleep(pause)
+            await self._sleep(pause)
 
     def _entry(self, found: Mapping[str, Any], name: str, entry: str) -> Any:
         """Return the entry of a diagnosis, where `a.b` is the entry `b` of the entry `a`."""

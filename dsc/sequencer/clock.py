@@ -71,6 +71,11 @@ class LoopClock:
         finally:
             handle.cancel()
 
+    async def sleep_in_background(self, seconds: float) -> None:
+        """Wait, without an effect on `idle`; simulated time does not jump for this wait alone."""
+        loop = asyncio.get_running_loop()
+        await (loop.sleep_in_background(seconds) if isinstance(loop, SimulatedEventLoop) else asyncio.sleep(seconds))
+
     def call_at(self, due: float, call: Callable[[], object]) -> ScheduledCall:
         """Schedule a call for second `due` of run time, or for the next loop iteration if `due` is past."""
         return ScheduledCall(asyncio.get_running_loop(), due + self._start, call)
@@ -228,6 +233,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         self._holds = 0
         self._settling: list[asyncio.Future[None]] = []
         self._idle: list[tuple[float, asyncio.Future[None]]] = []
+        self._background: set[asyncio.TimerHandle] = set()
         selector = _IdleSelector(self._settle_or_jump, self._until_jump, self._advance)
         self.real_input = RealInput(selector)
         super().__init__(selector)
@@ -258,6 +264,17 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
             self._due = [due for due in self._due if not due.timer.cancelled()]
             heapq.heapify(self._due)
             self._cancelled = 0
+
+    async def sleep_in_background(self, seconds: float) -> None:
+        """Wait, see `LoopClock.sleep_in_background`."""
+        waits = self.create_future()
+        timer = self.call_later(seconds, waits.set_result, None)
+        self._background.add(timer)
+        try:
+            await waits
+        finally:
+            self._background.discard(timer)
+            timer.cancel()
 
     def run_in_executor(
         self, executor: Any, func: Callable[[Unpack[_Args]], _Result], *args: *_Args
@@ -354,13 +371,20 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
         """Resolve the futures of `idle` before whose time nothing is scheduled; return whether there are any."""
         if not self._idle:
             return False
-        self._drop_cancelled()
-        next_due = self._due[0].timer.when() if self._due else math.inf
+        next_due = self._next_due()
         idle = [waits for before, waits in self._idle if before <= next_due and not waits.done()]
         self._idle = [one for one in self._idle if not one[1].done() and one[1] not in idle]
         for waits in idle:
             waits.set_result(None)
         return bool(idle)
+
+    def _next_due(self) -> float:
+        """Return the time of the next scheduled call that is not in the background; `math.inf` without one."""
+        self._drop_cancelled()
+        if self._due and self._due[0].timer not in self._background:
+            return self._due[0].timer.when()
+        others = (due.timer for due in self._due if due.timer not in self._background)
+        return min((timer.when() for timer in others if not timer.cancelled()), default=math.inf)
 
     def _drop_cancelled(self) -> None:
         while self._due and self._due[0].timer.cancelled():
@@ -368,7 +392,7 @@ class SimulatedEventLoop(asyncio.SelectorEventLoop):
 
     def _jump(self) -> bool:
         self._drop_cancelled()
-        if not self._due:
+        if not self._due or (self._pace is None and self._next_due() == math.inf):
             return False
         moment = self._due[0].moment
         self.real_input.end_wait()

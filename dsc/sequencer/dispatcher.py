@@ -74,6 +74,7 @@ class Dispatcher:
         activation: keeps required components alive and active.
         outbox: one-way outputs to components.
         timers: timeouts, periods, delayed events and scheduled input from outside.
+        wiring: the wires between components.
     """
 
     def __init__(
@@ -95,7 +96,8 @@ class Dispatcher:
         self.outbox = Outbox(self._refused)
         self._lives = ComponentLives(self._components.values(), self._failed, self._recovered)
         self._undeployed = Undeployed(clock, post, self._refused, self._components.keys())
-        self._wiring = Wiring(self._components, self.activation.changed)
+        self.wiring = Wiring(self._components)
+        self.wiring.listen(self.activation.look)
         self._faults: list[str] = []
         self._failures: dict[str, str] = {}  # reasons of the components that have failed and not recovered
         self._unreported: dict[str, list[str]] = {}  # reasons of failed components, which their skills may report
@@ -117,7 +119,7 @@ class Dispatcher:
         self._undeployed.complete = last
         self._lives.add(component)
         self.activation.deploy(component)
-        self._wiring.deployed(component)
+        self.wiring.deployed(component)
         for held in self._undeployed.release(component.name):
             if isinstance(held.output, steps.Start):
                 self._start(held.output, InterruptedSkill(held.at, None, 0))
@@ -205,7 +207,7 @@ class Dispatcher:
 
     def _wire(self, wire: steps.SetWire) -> None:
         try:
-            self._wiring.wire(f"{wire.component}.{wire.port}", wire.to, wire.activation)
+            self.wiring.wire(f"{wire.component}.{wire.port}", wire.to, wire.activation)
         except InputError as error:
             self._refused(wire, error)
 
@@ -245,10 +247,8 @@ class Dispatcher:
 
     def skill_of(self, task: asyncio.Task[Any]) -> str | None:
         """Return the skill whose execution is this task, as `arm.grasp`; `None` for other tasks."""
-        for running in tuple(self._running.values()):
-            if running.task is task:
-                return f"{running.start.component}.{running.start.skill}"
-        return None
+        starts = (one.start for one in tuple(self._running.values()) if one.task is task)
+        return next((f"{start.component}.{start.skill}" for start in starts), None)
 
     def signature(self, start: steps.Start) -> SkillSignature:
         """Return the signature of a skill with all known records; `UNKNOWN_SKILL` for a skill that is missing."""
@@ -409,7 +409,7 @@ class Dispatcher:
             for task in stopped:
                 failure(task)  # marks the error as retrieved; the skill was cancelled
         await self.activation.close()
-        self._wiring.close()
+        self.wiring.close()
         unstopped = await self._lives.close(None if self.is_part else self.activation.needed)
         problems = [*self.outbox.failures(), *self._undeployed.close(), *self._faults, *unstopped]
         for problem in problems:
@@ -571,5 +571,5 @@ class Dispatcher:
             if running.start.activation == activation:
                 self.stop(running.start)
         self.timers.cancel(activation)
-        if self._wiring.changes:
-            self._wiring.revert(activation)
+        if self.wiring.changes:
+            self.wiring.revert(activation)

@@ -21,6 +21,7 @@ from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer import message_checks
 from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.component_tracing import ComponentTracer
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.inbox import Inbox, LivelockGuard
 from dsc.sequencer.outside_input import OutsideInput
@@ -97,6 +98,7 @@ class Sequencer(OutsideInput):
             self.trace.listen(store.receive)
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id, library)
+        self._tracer = ComponentTracer(self.trace, self.dispatcher.wiring, self.dispatcher.activation)
         self._open_ended = open_ended
         self._over = False
         self._stopped: str | None = None  # the reason to end the run, from outside; not kept with its state
@@ -224,6 +226,7 @@ class Sequencer(OutsideInput):
         livelock = LivelockGuard(self.clock) if self.clock.simulated else None
         limit = self.clock.call_at(self._until, self._expire) if math.isfinite(self._until) else None
         reactor.know_skills(self.dispatcher.skills())
+        self._tracer.listen()
         try:
             await begin()
             self._reacts = False
@@ -260,6 +263,7 @@ class Sequencer(OutsideInput):
                 self._leave()
             finally:
                 untaken = await self.dispatcher.close()
+                self._tracer.close()
                 unsubscribe()
         return self._end([*bugs], untaken)
 
@@ -346,6 +350,7 @@ class Sequencer(OutsideInput):
     def _record_world(self) -> None:
         named = () if self.clock.simulated else zip(("robot", "run"), logged_run.get(), strict=True)
         self._reactor.tracer.world(self.knowledge, **dict(named))
+        self._tracer.record_wires()
 
     def _start(self, plot: str, arguments: Mapping[str, Any]) -> None:
         store, reactor = self.store, self._reactor

@@ -101,6 +101,9 @@ def run_command(
         OnSignal, typer.Option(help="With a store: Ctrl-C, SIGTERM and SIGHUP suspend the run, or end it.")
     ] = OnSignal.suspend,
     resume: Annotated[Path | None, typer.Option(help="Resume the interrupted run in this store.")] = None,
+    monitor: Annotated[
+        Path | None, typer.Option(help="Record the values that this monitoring profile (YAML) selects.")
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Show it in the browser while it runs.")] = False,
     port: Port = 0,
     no_open: NoOpen = False,
@@ -120,15 +123,19 @@ def run_command(
     Exit status: 0 goal reached, 1 something is left (the report says what and why), 2 bad input. Status 3 reports an
     exception in the code of the robot, and the log says where.
     """
+    from dsc.monitoring.profile import load_monitoring
     from dsc.trace import BEGINS
     from knowledge_base.errors import InputError
     from knowledge_base.output_files import Output
 
     show_logs(verbose, quiet=quiet)
     settings = None if profile is None or not Path(profile).suffix else Path(profile)
+    monitored = None if monitor is None else load_monitoring(monitor)
     if speed is not None and real_time:
         raise InputError("a run is in real time, or in simulated time at a --speed")
-    output = None if trace is None else Output(trace, "--trace", scenario, settings, store, resume, over=BEGINS)
+    output = (
+        None if trace is None else Output(trace, "--trace", scenario, settings, store, resume, monitor, over=BEGINS)
+    )
     planner = None if engine is None else _planner(engine)
     wire = _Wire(realm, connect or (), zenoh)
     if resume is not None:
@@ -150,6 +157,8 @@ def run_command(
     follow = partial(_followed, robot, speed=inf if speed is None else speed, until=until,
                      on_signal=on_signal, quiet=json or quiet, trace=output)  # fmt: skip
     with wire, robot:
+        if monitored is not None:
+            robot.monitor(monitored)
         if not view:
             report = follow()
             _print(report, as_json=json)

@@ -17,6 +17,7 @@ from dsc.conversions import Conversion
 from dsc.dynamic.library import Library
 from dsc.events import SKILL_FAILURES
 from dsc.model.plot import ActionPlot
+from dsc.monitoring.profile import MonitoringProfile
 from dsc.profiles import configure
 from dsc.rank import ORDINARY, Rank
 from dsc.runs.pruning import prune
@@ -52,6 +53,7 @@ from planning.robot.bundles import (
     wiring_of,
     with_plots_of,
 )
+from planning.robot.observations import require_observable
 from planning.robot.run import Run
 from planning.robot.simulation import Simulation
 from planning.robot.soundness import interfaces, require_parts, require_sound
@@ -130,6 +132,7 @@ class RobotProgram:
         self._foresight = foresight
         self._failures = failures
         self._listeners: list[Listener] = []
+        self._monitored: list[MonitoringProfile] = []
         self._runs: dict[Run[Any], None] = {}
         self._started = 0
         self._closed = False
@@ -218,6 +221,15 @@ class RobotProgram:
         for run in self._runs:
             run.listen(listener)
         return partial(self._ignore, listener)
+
+    def monitor(self, profile: MonitoringProfile) -> None:
+        """Record the observations of a monitoring profile in every later run, as records `observation`.
+
+        Raises:
+            UnknownNameError: a component or a push port of the profile does not exist.
+        """
+        require_observable(profile, {one.name: one for one in self.components})
+        self._monitored.append(profile)
 
     def _ignore(self, listener: Listener) -> None:
         if listener in self._listeners:

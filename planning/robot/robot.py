@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Mapping
+from functools import partial
 from typing import Any, Self, cast
 from uuid import uuid4
 
@@ -29,6 +30,7 @@ from planning.execution.goals import LATE, QueuedGoal
 from planning.execution.planning_component import PlanningComponent
 from planning.problem.construction import check_goal
 from planning.robot.judgement import Judgement
+from planning.robot.observations import record_observations
 from planning.robot.program import RobotProgram
 from planning.robot.progress import Tally
 from planning.robot.report import Report
@@ -455,7 +457,8 @@ class Robot(RobotProgram):
         self, number: str, sequencer: Sequencer, planning: PlanningComponent,
         main: Coroutine[Any, Any, RunEnd[Outputs]],
     ) -> Run[Outputs]:  # fmt: skip
-        run = Run(number, sequencer, planning, _closing(main, planning, (self.name, number)))
+        observers = [partial(record_observations, profile, sequencer) for profile in self._monitored]
+        run = Run(number, sequencer, planning, _closing(main, planning, (self.name, number), observers))
         self._runs[run] = None
         run.task.add_done_callback(lambda _: self._runs.pop(run))
         return run
@@ -530,12 +533,18 @@ def _require_kind(kept: Kept, kind: ClockKind) -> None:
 
 
 async def _closing(
-    running: Coroutine[Any, Any, RunEnd[Outputs]], planning: PlanningComponent, logged: tuple[str, str]
+    running: Coroutine[Any, Any, RunEnd[Outputs]],
+    planning: PlanningComponent,
+    logged: tuple[str, str],
+    observers: Iterable[Callable[[], Coroutine[Any, Any, None]]],
 ) -> RunEnd[Outputs]:
     logged_run.set(logged)  # in the task of the run
+    observing = [asyncio.ensure_future(observe()) for observe in observers]
     try:
         return await running
     finally:
+        for one in observing:
+            one.cancel()
         await planning.over()
 
 

@@ -109,6 +109,20 @@ def test_wires_of_states_are_reverted_at_their_exits():
     assert wires == [("probe.source", to) for to in ("left.who", "right", "right.who", None)]
 
 
+def test_the_trace_has_the_wires_of_the_start_and_each_change():
+    records: list[Record] = []
+    with robot_of() as robot:
+        robot.listen(records.append)
+        robot.run("visits")
+    found = [one for one in records if one.type == "component"]
+    assert {one.data["component"] for one in found} == {"probe"}
+    assert [one.data["wires"]["source"] for one in found] == [
+        "middle.who", "left.who", "right.who", "left.who", "right.who", "left.who", None, "left.who", "middle.who",
+    ]  # fmt: skip
+    types: dict[int | None, str] = {one.seq: one.type for one in records}
+    assert [types.get(one.cause) for one in found] == [None, *["step"] * 8]
+
+
 @pytest.mark.parametrize(("to", "said"), [("left.who", "left"), ("right", "right")])
 def test_an_operator_wires_below_the_states(to, said):
     def prepare(sequencer):

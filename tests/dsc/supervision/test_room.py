@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dsc import ALWAYS, Component, Demand, Outcome, SkillCall, parse_plot, skill
+from dsc.trace import Record
 from knowledge_base import InputError, UnknownNameError
 from planning import Robot
 
@@ -77,6 +78,17 @@ LOOK = "{entry: {trigger: COMPONENT.look}, on: {looked: e#}}"
 def test_a_component_leaves_before_another_one_needs_its_room():
     assert run(ONE_BY_ONE, Camera("left"), Camera("right"), memory=1000).reached
     assert Camera.log == ["+left", "-left", "+right", "-right"]
+
+
+def test_the_trace_has_the_waits_for_resources_and_their_ends():
+    records: list[Record] = []
+    plot = parallel(f"0 left {LOOK}", f"1 right {LOOK}")
+    with Robot(DOMAIN, [parse_plot(plot)], [Camera("left"), Camera("right")], clock="simulated",
+               resources={"memory": 1000}) as robot:  # fmt: skip
+        robot.listen(records.append)
+        assert robot.run("p").reached
+    waits = [(one.t, one.data["waits"]) for one in records if one.type == "component"]
+    assert waits == [(1.0, "it needs 600 of 'memory'; of 1000, left uses 600"), (3.0, None)]
 
 
 def test_without_capacities_components_overlap():
