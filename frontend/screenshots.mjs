@@ -60,9 +60,24 @@ try {
     await shoot("designed");
   });
   await storeLooked();
+  await componentsLooked();
 } finally {
   await browser.close();
   await program.stop();
+}
+
+/** A run with two cameras, which a monitoring profile observes. */
+async function componentsLooked() {
+  const [observed, example] = [join(mkdtempSync(join(tmpdir(), "dsc-")), "observed.jsonl"), join(ROOT, "examples", "second_camera")];
+  run("run", `${example}.py`, "--monitor", `${example}.yaml`, "--trace", observed, "--json");
+  const other = await serve("view", observed, "--no-open");
+  const { page, context } = await open(browser, other.url);
+  await loaded(page, 200);
+  await goTo(page, 200);
+  await page.getByRole("tab", { name: "Components" }).click();
+  await page.locator(".side").screenshot({ path: join(PICTURES, "viewer_components.png") });
+  await context.close();
+  await other.stop();
 }
 
 /** A store into which the run's knowledge went, change by change. */

@@ -217,7 +217,9 @@ def _require_needs(component: Component) -> None:
     """
     name, needs = component.name, component.needs
     if not isinstance(needs, Mapping):
-        message = f"`needs` of component '{name}' is a mapping of modes, as in {_EXAMPLE}, not {shown(needs)}"
+        message = (
+            f"`needs` of component '{name}' is a mapping of modes, as in {_EXAMPLE}, or of ALWAYS, not {shown(needs)}"
+        )
         raise InputError(message, place=place_of(type(component)))
     modes = (NEUTRAL, *component.modes)
     for mode, needed in needs.items():

@@ -1,6 +1,7 @@
 /** The panes, and the time line under all of them. */
 
 import { useEffect, useState } from "react";
+import { Components } from "./panes/Components";
 import { Chart } from "./panes/Chart";
 import { Graph } from "./panes/Graph";
 import { Controls } from "./panes/Controls";
@@ -14,12 +15,12 @@ import { useKeys } from "./keys";
 import { useControl, useKind, useSelection } from "./session";
 import { Turn } from "./turn";
 
-const TABS = ["Why", "Knowledge"] as const;
+const TABS = ["Why", "Knowledge", "Components", "Control"] as const;
 
 export function Page() {
   const selection = useSelection();
   const control = useControl();
-  const [tab, setTab] = useState<(typeof TABS)[number] | "Control">("Why");
+  const [tab, setTab] = useState<(typeof TABS)[number]>("Why");
   useKeys();
   useEffect(() => {
     if (selection) setTab(selection.kind === "thing" ? "Knowledge" : "Why");
@@ -28,7 +29,7 @@ export function Page() {
   useEffect(() => {
     if (kind === "store") setTab("Knowledge");
   }, [kind]);
-  const tabs = control ? ([...TABS, "Control"] as const) : TABS;
+  const tabs = TABS.filter((name) => (name === "Control" ? control : name !== "Components" || kind !== "store"));
   return (
     <div className={`page ${kind}`}>
       <div className="top">
@@ -49,6 +50,7 @@ export function Page() {
         <Turn>
           {tab === "Why" && <Why />}
           {tab === "Knowledge" && <Knowledge />}
+          {tab === "Components" && <Components />}
         </Turn>
         {tab === "Control" && <Turn><Controls /></Turn>}
       </section>

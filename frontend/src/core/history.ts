@@ -1,9 +1,11 @@
 /** All records there are, and the moment after any of them, in a few milliseconds either way. */
 
+import { Observed } from "./components";
 import { advance, beginning, copyOf, type Moment } from "./moment";
 import { joinPath, type PlotForm } from "./plots";
 import { whole } from "./reading";
-import type { DecisionRec, EndRec, PlotRec, Rec, StepRec } from "./records";
+import type { DecisionRec, EndRec, ObservationRec, PlotRec, Rec, StepRec } from "./records";
+import { placeAfter } from "./search";
 import { damaged, isDamaged, type Damaged } from "./sound";
 import { stateWords } from "./words";
 
@@ -33,6 +35,8 @@ export class History {
   readonly marks: Readonly<Record<Mark, number[]>> = {
     failure: [], plan: [], decision: [], step: [], knowledge: [], scene: [],
   };
+  /** Values of components over time. */
+  readonly observed = new Observed();
   private readonly records: Rec[] = [];
   /** Path of a state -> when which plots became its content, in order. */
   private readonly bound = new Map<string, { seq: number; hash: string }[]>();
@@ -98,13 +102,13 @@ export class History {
   /** The next marked record after `seq` (`way` 1) or before it (-1). */
   beside(seq: number, mark: Mark, way: 1 | -1): number | undefined {
     const marks = this.marks[mark];
-    const place = firstAfter(marks, way > 0 ? seq : seq - 1);
+    const place = placeAfter(marks, way > 0 ? seq : seq - 1, (one) => one);
     return way > 0 ? marks[place] : marks[place - 1];
   }
 
   /** The last marked records up to `seq`, the latest first. */
   before(seq: number, mark: Mark, most: number): Rec[] {
-    const end = firstAfter(this.marks[mark], seq);
+    const end = placeAfter(this.marks[mark], seq, (one) => one);
     const found = this.marks[mark].slice(Math.max(0, end - most), end).reverse();
     return found.map((one) => this.record(one)!);
   }
@@ -112,7 +116,7 @@ export class History {
   /** The last decision of a dynamic state up to `seq`. */
   decisionOf(path: string, seq: number): DecisionRec | undefined {
     const { decision } = this.marks;
-    for (let at = firstAfter(decision, seq) - 1; at >= 0; at--) {
+    for (let at = placeAfter(decision, seq, (one) => one) - 1; at >= 0; at--) {
       const found = this.record(decision[at]!) as DecisionRec;
       if (found.state === path) return found;
     }
@@ -121,13 +125,7 @@ export class History {
 
   /** The last record at or before a time. */
   seqAt(t: number): number {
-    let [low, high] = [0, this.last];
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.records[middle]!.t <= t) low = middle + 1;
-      else high = middle;
-    }
-    return low;
+    return placeAfter(this.records, t, (one) => one.t);
   }
 
   /** The last plot up to `seq` in the state of that path. */
@@ -175,19 +173,9 @@ export class History {
       this.plots.set(hash, words ? { ...plot, words } : plot);
     }
     if (rec.type === "end") this.end = rec as EndRec;
+    if (rec.type === "observation") this.observed.add(rec as ObservationRec);
     if (rec.type === "step") this.bind(rec as StepRec);
     const mark = MARKS.get(rec.type) ?? (rec.type === "end" && (rec as EndRec).problem ? "failure" : undefined);
     if (mark) this.marks[mark].push(rec.seq);
   }
-}
-
-/** Place of the first number greater than `limit` in a sorted list. */
-export function firstAfter(numbers: readonly number[], limit: number): number {
-  let [low, high] = [0, numbers.length];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (numbers[middle]! <= limit) low = middle + 1;
-    else high = middle;
-  }
-  return low;
 }

@@ -1,10 +1,12 @@
 /** How things were after a record: a pure function of the records up to it. */
 
+import { withAction, withComponent, type Components } from "./components";
 import { newPlan, withEnd, withOrder, withStep, type Plan } from "./plans";
 import { splitPath, stepsOf, stepTexts, type PlotForm } from "./plots";
 import {
   written,
   type ActionRec,
+  type ComponentRec,
   type EventRec,
   type Fact,
   type KnowledgeRec,
@@ -45,6 +47,7 @@ export interface Moment {
   trail: readonly Trace[];
   /** Skills at work, by the seq of the record that started them. */
   working: Map<number, ActionRec>;
+  components: Components;
   plans: Plan[];
   /** Path of a state -> place in `plans` of the plan that is carried out in it. */
   running: Map<string, number>;
@@ -68,7 +71,7 @@ export type Plots = ReadonlyMap<string, PlotForm>;
 export function beginning(): Moment {
   return {
     seq: 0, t: 0, active: new Map(), bound: new Map(), variables: new Map(), trail: [],
-    working: new Map(), plans: [], running: new Map(), search: null, trouble: null, broken: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
+    working: new Map(), components: new Map(), plans: [], running: new Map(), search: null, trouble: null, broken: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
     scene: null, end: null,
   };
 }
@@ -77,7 +80,7 @@ export function beginning(): Moment {
 export function copyOf(moment: Moment): Moment {
   return {
     ...moment, active: new Map(moment.active), bound: new Map(moment.bound), variables: new Map(moment.variables),
-    working: new Map(moment.working), plans: [...moment.plans], running: new Map(moment.running),
+    working: new Map(moment.working), components: new Map(moment.components), plans: [...moment.plans], running: new Map(moment.running),
     nodes: new Map(moment.nodes), facts: new Map(moment.facts), values: new Map(moment.values),
   };
 }
@@ -98,6 +101,7 @@ const CHANGES: ReadonlyMap<string, Change> = new Map(Object.entries<Change>({
   world: worldBegins,
   knowledge: knowledgeChanged,
   action: acted,
+  component: (moment, rec: ComponentRec) => withComponent(moment.components, rec),
   event: happened,
   scene: (moment, rec: Rec) => void (moment.scene = rec.seq),
   rule: (moment, rec: Rec) => void (moment.trouble = rec.seq),
@@ -126,6 +130,7 @@ function searchEnds(moment: Moment, skill = "planner.plan"): void {
 
 /** A skill is started, waits for its component, gets it, or is cancelled since its state was left. */
 function acted(moment: Moment, rec: ActionRec): void {
+  withAction(moment.components, rec);
   if (rec.action === "start") moment.working.set(rec.seq, rec);
   if (rec.action !== "wait" && rec.action !== "begin" && rec.action !== "cancel") return;
   for (const [seq, one] of moment.working) {

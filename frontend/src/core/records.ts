@@ -144,9 +144,24 @@ export interface ActionRec extends Rec {
   readonly value?: Value;
   readonly component?: string;
   readonly mode?: string;
+  /** Of `wire`: the provided port; null cuts the wire. */
+  readonly to?: string | null;
   /** Of `wait`: the skill whose end it waits for. */
   readonly for?: string;
   readonly arguments?: Named;
+}
+
+/** Of a component with required ports, or one that waits for resources. */
+export interface ComponentRec extends Rec {
+  readonly component: string;
+  readonly wires?: Readonly<Record<string, string | null>>;
+  readonly waits?: string | null;
+}
+
+export interface ObservationRec extends Rec {
+  readonly component: string;
+  readonly entry: string;
+  readonly value: Value;
 }
 
 export interface EventRec extends Rec {

@@ -2,7 +2,7 @@
 
 import { Fragment } from "react";
 import { endWords } from "../core/ends";
-import { written, type ActionRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named,
+import { written, type ActionRec, type ComponentRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named, type ObservationRec,
   type PlanBrokenRec, type PlanAskedRec, type PlanFoundRec, type PlanNoneRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
 import type { Damaged } from "../core/sound";
 import { wordsIn } from "../core/words";
@@ -30,11 +30,18 @@ function inWords(rec: Rec): string {
     case "action": {
       const { action, skill, port, value, component, mode } = rec as ActionRec;
       if (action === "wait") return `${skill} waits for ${(rec as ActionRec).for}`;
-      return action === "start" || action === "begin" || action === "cancel" ? `${action} ${skill}` : action === "set" ? `set ${port} to ${String(value)}` : `switch ${component} to ${mode}`;
+      if (action === "wire") return wired(port ?? "", (rec as ActionRec).to ?? null);
+      if (action === "set") return `set ${port} to ${String(value)}`;
+      return action === "switch" ? `switch ${component} to ${mode}` : `${action} ${skill ?? port}`;
     }
     case "step": {
       const taken = (rec as StepRec).microsteps.flatMap((micro) => micro.taken);
       return taken.length ? `${ending(rec, taken[0]!.from)} → ${ending(rec, taken.at(-1)!.to ?? taken.at(-1)!.from)}` : (rec as StepRec).microsteps.some((micro) => micro.entered.length) ? "the start" : "the run leaves its states";
+    }
+    case "component": return componentNews(rec as ComponentRec);
+    case "observation": {
+      const { component, entry, value: seen } = rec as ObservationRec;
+      return `${component}.${entry}: ${jsonOf(seen)}`;
     }
     case "scene": return `${(rec as SceneRec).things.length} things`;
     case "plan.ordered": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
@@ -49,6 +56,15 @@ function inWords(rec: Rec): string {
     case "end": return endWords(rec as EndRec);
     default: return "";
   }
+}
+
+function componentNews({ component, wires, waits }: ComponentRec): string {
+  if (wires) return Object.entries(wires).map(([port, provider]) => wired(`${component}.${port}`, provider)).join(", ");
+  return waits ? `${component} waits: ${waits}` : `${component} waits no longer`;
+}
+
+function wired(port: string, provider: string | null): string {
+  return provider === null ? `${port} is not wired` : `${port} ← ${provider}`;
 }
 
 function shortGoal({ goal }: PlanAskedRec): string {

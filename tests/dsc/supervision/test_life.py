@@ -281,7 +281,7 @@ def test_a_start_that_was_broken_off_is_begun_by_who_waits_for_it():
             "in its mode 'scanning' are a tuple, as in needs = {'scanning': ('power',)}, not 'base'",
         ),
         ({ALWAYS: [1]}, "needs of component 'laser' are a tuple"),
-        (("base",), "is a mapping of modes, as in needs = {'scanning': ('power',)}, not"),
+        (("base",), "is a mapping of modes, as in needs = {'scanning': ('power',)}, or of ALWAYS, not"),
         ({"scaning": ("base",)}, "in its mode 'scaning', which it does not have; did you mean 'scanning'?"),
     ],
 )
