@@ -69,6 +69,7 @@ class Trace:
         last: number of the last record of a resumed run.
 
     Attributes:
+        now: returns the seconds of run time.
         heard: whether there is a listener.
         blame: receives an error of a listener, which is then not called again; `None` raises the error. An `OSError`,
             e.g. of a full disk, and an `InputError` are always raised.
@@ -76,7 +77,7 @@ class Trace:
     """
 
     def __init__(self, now: Callable[[], float], last: int = 0) -> None:
-        self._now = now
+        self.now = now
         self._listeners: list[Listener] = []
         self._seq = last
         self.heard = False
@@ -100,7 +101,7 @@ class Trace:
         self._seq += 1
         if not self.heard:
             return self._seq
-        made = Record(self._seq, self._now(), type_, self.cause, data)
+        made = Record(self._seq, self.now(), type_, self.cause, data)
         for listener in tuple(self._listeners):
             try:
                 listener(made)

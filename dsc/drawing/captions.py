@@ -28,7 +28,7 @@ from dsc.model.declarations import PlotParameter, PlotVariable
 from dsc.model.language import term_text
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import Handler, Reaction, Rule
-from dsc.model.states import State
+from dsc.model.states import DynamicState, State
 from dsc.model.transitions import CHOICE, SelectState, TimedTransition, Transition, TransitionSource, case_value
 from knowledge_base.language.syntax.expression import TRUE, And, Comparison, Constant, Expression, Term, Variable
 from knowledge_base.language.syntax.text import to_text
@@ -253,6 +253,11 @@ def _values(arguments: Mapping[str, Term]) -> str:
     return "(" + ", ".join(term_text(value) for value in arguments.values()) + ")"
 
 
+def choice_text(state: DynamicState) -> str:
+    """Return how a dynamic state chooses, as ` by utility`; empty for a choice by order."""
+    return "" if state.choose == "order" else f" by {state.choose}"
+
+
 def content_text(use: str, arguments: Mapping[str, Term]) -> str:
     """Return, as text, the name and arguments of a plot that a state uses."""
     return use + (_values(arguments) if arguments else "")
@@ -270,6 +275,7 @@ def facts(plot: ActionPlot) -> list[str]:
         for what, text in (
             ("implements", plot.implements or ""),
             ("fits when", to_text(plot.when) if plot.when is not None else ""),
+            *((name, to_text(term)) for name, term in plot.scores().items()),
             ("listens to", _events(plot.receives)),
             ("outcomes", _events(plot.emits)),
             ("outputs", _declared(plot.outputs)),

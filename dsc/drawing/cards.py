@@ -9,6 +9,7 @@ from dsc.drawing.captions import (
     action_text,
     block_texts,
     captions,
+    choice_text,
     content_text,
     facts,
     labelled,
@@ -205,7 +206,9 @@ def _choices(state: DynamicState, library: Library | None) -> list[CardRow]:
     for name in state.dynamic:
         plot = _known(name, library)
         condition = f" [{to_text(plot.when)}]" if plot is not None and plot.when is not None else ""
-        rows.append(_row(f"◇ {content_text(name, _taken(state, plot))}{condition}"))
+        term = None if plot is None else plot.scores().get(state.choose)
+        score = "" if term is None else f"{choice_text(state)} {to_text(term)}"
+        rows.append(_row(f"◇ {content_text(name, _taken(state, plot))}{condition}{score}"))
     if state.goal is not None:
         rows.append(_row(f"plan for {to_text(state.goal)}"))
     return rows

@@ -10,6 +10,7 @@ from rich.tree import Tree
 from dsc.drawing.captions import (
     Labelled,
     block_texts,
+    choice_text,
     content_text,
     facts,
     full_text,
@@ -101,7 +102,7 @@ def _kind(state: AnyState) -> str:  # noqa: PLR0911  # a table by kind
         case SubmachineState():
             return f"use {content_text(state.use, state.arguments)}"
         case DynamicState():
-            return f"dynamic [{', '.join(state.dynamic)}]"
+            return f"dynamic [{', '.join(state.dynamic)}]{choice_text(state)}"
         case CompositeState() | OrthogonalState():
             return type(state).__name__.removesuffix("State").lower()
         case _:

@@ -6,11 +6,15 @@ condition (S0.4).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Plots
+from dsc.engine.exclusion import Excluded, FailedCandidate
 from dsc.engine.situation import Bindings, Decision, Verdict
 from dsc.model.data_forms import (
     PLAIN,
@@ -21,7 +25,7 @@ from dsc.model.data_forms import (
     reads_data,
 )
 from dsc.model.plot import ActionPlot
-from dsc.model.states import DynamicState
+from dsc.model.states import Choice, DynamicState
 from knowledge_base.facts import Content, Delta
 from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds
 from knowledge_base.language.evaluation.explanation import explain
@@ -34,9 +38,19 @@ from knowledge_base.world.overlay import Overlay
 
 
 class KnowledgeSituation:
-    """A `Situation` for one macrostep; it never changes the knowledge base."""
+    """A `Situation` for one macrostep; it never changes the knowledge base.
 
-    def __init__(self, knowledge: KnowledgeBase, library: Library) -> None:
+    Args:
+        knowledge: the knowledge base.
+        library: the plots.
+        now: returns the second of run time, equal in the whole macrostep.
+
+    Attributes:
+        now: see `Situation`.
+    """
+
+    def __init__(self, knowledge: KnowledgeBase, library: Library, now: Callable[[], float] = lambda: 0.0) -> None:
+        self.now = now
         self._version = knowledge.version
         self._knowledge = knowledge
         self._library = library
@@ -72,9 +86,12 @@ class KnowledgeSituation:
         self._world.apply(delta)
         return delta
 
-    def choose(self, state: DynamicState, holder: str, bindings: Bindings) -> Decision:
+    def choose(
+        self, state: DynamicState, holder: str, bindings: Bindings, failed: Sequence[FailedCandidate] = ()
+    ) -> Decision:
         """See `Situation`."""
-        return choose(state, holder, bindings, self._world, self._library, self._version)
+        excluded = Excluded(failed, self.now()) if failed else None
+        return choose(state, holder, bindings, self._world, self._library, self._version, excluded)
 
 
 ACHIEVE = "achieve"
@@ -82,12 +99,19 @@ ACHIEVE = "achieve"
 
 
 def choose(
-    state: DynamicState, holder: str, bindings: Mapping[str, Any], world: World, plots: Plots, version: int
+    state: DynamicState,
+    holder: str,
+    bindings: Mapping[str, Any],
+    world: World,
+    plots: Plots,
+    version: int,
+    excluded: Excluded | None = None,
 ) -> Decision:
     """Return the decision on the content of `state`, a dynamic state of the plot named `holder`.
 
-    If the state's goal is already true, no plot is chosen. Otherwise the first candidate with a true condition is
-    chosen. If no candidate fits and the state has a goal, the plot `achieve` is chosen.
+    If the state's goal is already true, no plot is chosen. Otherwise `choose` of the state determines the choice among
+    the candidates with true conditions; one whose number is unknown comes last. If no candidate fits and the state has
+    a goal, the plot `achieve` is chosen.
 
     Raises:
         UnknownNameError: a candidate is not in the library, or a variable has no value.
@@ -98,23 +122,27 @@ def choose(
     if goal is not None and holds(goal, world, {}):
         return Decision(None, satisfied=True, version=version)
     arguments = {name: _argument(term, world, bindings) for name, term in state.arguments.items()}
-    chosen: str | None = None
-    chosen_arguments: dict[str, Any] = {}
-    verdicts = []
+    verdicts, own = [], {}
     for name in state.dynamic:
         plot = plots.plot(name)
-        own = {key: value for key, value in arguments.items() if key in plot.parameters}
-        verdict = judge(plot, own, world)
+        own[name] = {key: value for key, value in arguments.items() if key in plot.parameters}
+        verdict = judge(plot, own[name], world)
+        if verdict.fits and excluded is not None and (reason := excluded.reason(name, own[name])):
+            verdict = Verdict(name, fits=False, reason=reason)
+        if verdict.fits and state.choose != "order":
+            verdict = replace(verdict, score=_score(plot, state.choose, own[name], world))
         verdicts.append(verdict)
-        if verdict.fits and chosen is None:
-            chosen, chosen_arguments = name, own
+    fitting = [one for one in verdicts if one.fits]
+    best = fitting[:1] if state.choose == "order" else sorted(fitting, key=partial(_rank, by=state.choose))
+    chosen = best[0].plot if best else None
+    chosen_arguments = own[chosen] if chosen is not None else {}
     if chosen is None and goal is not None:
         chosen = ACHIEVE
         budget = state.budget
         chosen_arguments = {
             "goal": to_text(goal), "holder": holder, "replans": budget.replans, "seconds": budget.seconds,
         }  # fmt: skip
-    return Decision(chosen, chosen_arguments, verdicts=tuple(verdicts), version=version)
+    return Decision(chosen, chosen_arguments, verdicts=tuple(verdicts), version=version, by=state.choose)
 
 
 def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdict:
@@ -125,6 +153,23 @@ def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdi
     when = plain_condition(plot.when, Values(bindings)) if reads_data(plot.when) else plot.when
     why = explain(when, world, scalars(bindings))
     return Verdict(plot.name, fits=why.truth, reason=str(why.deciding), explanation=why.to_json())
+
+
+def _score(plot: ActionPlot, by: Choice, arguments: Mapping[str, Any], world: World) -> float | None:
+    """Return the number by which a candidate is chosen; `None` if it declares none, or if a part of it is unknown."""
+    term = plot.scores().get(by)
+    if term is None:
+        return None
+    bindings = {**_defaults(plot), **arguments}
+    found = evaluate_term(plain_term(term, Values(bindings)), world, scalars(bindings))
+    return None if isinstance(found, bool) or not isinstance(found, int | float) else float(found)
+
+
+def _rank(verdict: Verdict, by: Choice) -> float:
+    """Return a number that is smallest for the candidate to choose; a sort keeps the order of equal ones."""
+    if verdict.score is None:
+        return math.inf
+    return verdict.score if by == "cost" else -verdict.score
 
 
 def _argument(term: Term, world: World, bindings: Mapping[str, Any]) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
+from dsc.engine.exclusion import failures_of, with_end
 from dsc.engine.frames import Frame
 from dsc.engine.machine_state import NOTHING, Configuration, FrameState, configuration_of
 from dsc.engine.performing import Performer, fill_parameters
@@ -91,6 +92,8 @@ class Execution:
             parts: the parts of all reactions, in execution order.
         """
         for frame, reaction in reactions:
+            if reaction.candidate_ends:
+                self._count_failures(frame, reaction)
             if reaction.continues:
                 self._take_out(frame, reaction)
         if len(reactions) == 1:
@@ -110,6 +113,17 @@ class Execution:
             target = part.edge.targets[0] if arguments and part.edge is not None else -1
             for entrance in part.entrances:
                 self._enter(frame, entrance, arguments if entrance.node.index == target else NOTHING)
+
+    def _count_failures(self, frame: Frame, reaction: CompiledReaction) -> None:
+        """Count the ends of candidates that their dynamic states may exclude after failures."""
+        for edge in reaction.candidate_ends:
+            node = frame.compiled.nodes[edge.source]
+            inner = frame.resting.get(node.name) or frame.children.get(node.name)
+            if inner is not None and isinstance(node.state, DynamicState):
+                plot, now = inner.compiled.plot, self.performer.situation.now()
+                frame.variables = with_end(
+                    frame.variables, node.name, node.state, plot, inner.variables, edge.trigger, now
+                )
 
     def _take_out(self, frame: Frame, reaction: CompiledReaction) -> None:
         """Take the plots that continue out of their hosts, so that the exits of the hosts do not exit them."""
@@ -269,7 +283,8 @@ class Execution:
             places = {given: Variable(f"passed.{given}") for given in passed}
             state = state.model_copy(update={"arguments": {**state.arguments, **places}})
             bindings = {**bindings, **{f"passed.{given}": value for given, value in passed.items()}}
-        decision = self.performer.situation.choose(state, frame.compiled.plot.name, bindings)
+        failed = failures_of(name, frame.variables) if state.exclude is not None else ()
+        decision = self.performer.situation.choose(state, frame.compiled.plot.name, bindings, failed)
         self.performer.decisions.append(DecisionMade(frame.prefix + name, decision))
         return decision
 

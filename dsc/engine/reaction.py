@@ -27,7 +27,7 @@ from dsc.model.actions import (
     Unwire,
     Wire,
 )
-from dsc.model.states import FinalState, HistoryState, State
+from dsc.model.states import DynamicState, FinalState, HistoryState, State
 
 _AnyAction = TypeVar("_AnyAction", bound=ExternalAction | Internal)
 Action = ExternalAction | Internal
@@ -111,6 +111,7 @@ class CompiledReaction:
         exits: all exits, in order.
         following: the configuration after the microstep.
         continues: indices of the nodes whose plots continue in the plots that replace them.
+        candidate_ends: transitions from dynamic states that exclude failed candidates.
         keeps: names of states that keep the event until their least time has passed.
         taken, exited, entered: the reaction's report if the plot is the outermost one: transitions and state names.
         silent: whether the reaction only exits states, without any action.
@@ -128,6 +129,7 @@ class CompiledReaction:
     silent: bool = False
     still: bool = False
     continues: tuple[int, ...] = ()
+    candidate_ends: tuple[TransitionEdge, ...] = ()
     reports: dict[str, tuple[Taken, ...]] = field(default_factory=dict)
 
     def taken_in(self, compiled: CompiledPlot, prefix: str) -> tuple[Taken, ...]:
@@ -235,7 +237,14 @@ class _Work:
             silent=silent and not parts,
             still=silent and stays and bool(parts) and all(part.quiet for part in parts),
             continues=tuple([part.edge.source for part in parts if part.edge is not None and part.edge.keeps]),
+            candidate_ends=tuple(
+                [part.edge for part in parts if part.edge is not None and self._excludes(part.edge.source)]
+            ),
         )  # fmt: skip
+
+    def _excludes(self, node: int) -> bool:
+        state = self.compiled.nodes[node].state
+        return isinstance(state, DynamicState) and state.exclude is not None
 
     def _exits(self, left: set[int], own: set[int]) -> tuple[Exit, ...]:
         """Return the exits, inner nodes first and later nodes before earlier nodes; interrupt nodes outside `own`."""

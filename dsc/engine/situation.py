@@ -6,10 +6,11 @@ SCXML (5.9.1), and exists only in dialect `scxml`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
+from dsc.engine.exclusion import FailedCandidate
 from dsc.engine.tables import CompiledPlot
 from dsc.model.states import DynamicState
 from knowledge_base.facts import Delta
@@ -46,12 +47,14 @@ class Verdict:
         fits: whether the candidate's condition is true.
         reason: the part of the condition that determines the result, as text.
         explanation: the whole condition as a tree with truth values, as plain data.
+        score: the number by which the state chooses; `None` if the state chooses by order, or if the number is unknown.
     """
 
     plot: str
     fits: bool
     reason: str
     explanation: Mapping[str, Any] = field(default_factory=dict)
+    score: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,7 @@ class Decision:
         satisfied: whether the state's goal is already true; then no plot is bound and the state is done.
         verdicts: a verdict for each candidate, in the order of preference.
         version: version of the knowledge at the decision.
+        by: the choice among candidates that fit, see `choose` of `DynamicState`.
     """
 
     chosen: str | None
@@ -71,6 +75,7 @@ class Decision:
     satisfied: bool = False
     verdicts: tuple[Verdict, ...] = ()
     version: int = 0
+    by: str = "order"
 
     def _repr_html_(self) -> str:
         title = "the goal holds" if self.satisfied else f"chosen: {self.chosen or 'no candidate fits'}"
@@ -97,8 +102,21 @@ class Situation(Protocol):
         """Apply an effect and return its change: later calls read the change, and the caller commits it."""
         ...
 
-    def choose(self, state: DynamicState, holder: str, bindings: Bindings) -> Decision:
-        """Return the decision on the content of a dynamic state; `holder` is the name of the state's plot."""
+    def choose(
+        self, state: DynamicState, holder: str, bindings: Bindings, failed: Sequence[FailedCandidate] = ()
+    ) -> Decision:
+        """Return the decision on the content of a dynamic state.
+
+        Args:
+            state: the dynamic state.
+            holder: the name of the state's plot.
+            bindings: values of variables.
+            failed: the remembered failures of candidates, see `exclusion`.
+        """
+        ...
+
+    def now(self) -> float:
+        """Return the second of run time, which is equal in the whole macrostep."""
         ...
 
 

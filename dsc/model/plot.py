@@ -12,7 +12,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from dsc.model.declarations import PlotParameter, PlotVariable, TypeText
-from dsc.model.language import ConditionField, Written, constant
+from dsc.model.language import ConditionField, TermField, Written, constant
 from dsc.model.ranges import Who, refuse_change
 from dsc.model.reading import LOCATED, FormPath
 from dsc.model.rules import Handler, Rule, told_apart
@@ -27,6 +27,7 @@ from dsc.model.states import (
     SubmachineState,
 )
 from knowledge_base.errors import UnknownNameError
+from knowledge_base.language.syntax.expression import Term
 from knowledge_base.notebook import svg_by
 from knowledge_base.spelling import is_plain_name
 
@@ -65,6 +66,8 @@ class ActionPlot(Written):
         types: records by name: the types of their fields. Plots of one library share their records.
         emits: outcome events with the types of their attributes; the host state must handle every outcome event.
         when: condition under which the plot fits as a candidate of a dynamic state (bottom-up, S0.4).
+        priority, utility, cost: terms by which dynamic states may choose among candidates that fit, see `choose`
+            of `DynamicState` (S0.14).
         implements: name of the planning action that the plot executes; both must have equal names of parameters.
         effects: treatment of the planning action's effects: `observed` before the next step, or `assumed`.
         confirm: seconds to wait until the effects are observed.
@@ -86,6 +89,9 @@ class ActionPlot(Written):
     receives: dict[str, dict[str, TypeText] | None] = Field(default_factory=dict)
     emits: dict[str, dict[str, TypeText] | None] = Field(default_factory=dict)
     when: ConditionField | None = None
+    priority: TermField | None = None
+    utility: TermField | None = None
+    cost: TermField | None = None
     implements: str | None = None
     effects: Literal["observed", "assumed"] = "observed"
     confirm: float = Field(default=5.0, gt=0, strict=True)
@@ -98,6 +104,11 @@ class ActionPlot(Written):
     _text: str | None = PrivateAttr(default=None)
     _words: AddedNames = PrivateAttr(default=AddedNames({}, {}, {}))
     _repr_svg_ = svg_by("dsc.drawing:draw")
+
+    def scores(self) -> dict[str, Term]:
+        """Return the declared terms by which dynamic states may choose the plot: `priority`, `utility` and `cost`."""
+        found = {"priority": self.priority, "utility": self.utility, "cost": self.cost}
+        return {name: term for name, term in found.items() if term is not None}
 
     def with_default(self, name: str, value: object, who: Who) -> ActionPlot:
         """Return a copy of the plot with another default of a parameter, set by the role `who`.

@@ -136,11 +136,31 @@ class Budget(Frozen):
     seconds: float = Field(default=10.0, gt=0, strict=True)
 
 
+Choice = Literal["order", "priority", "utility", "cost"]
+"""Choice of a dynamic state among the candidates that fit: the first one, or by this field of the candidates."""
+
+
+class Exclusion(Frozen):
+    """Condition under which a dynamic state does not choose a candidate that has failed.
+
+    Attributes:
+        failures: number of successive failures with equal arguments: the candidate has ended with an outcome, one of
+            its skills has failed, or the state was left by `after`.
+        seconds: time of the exclusion after the last failure.
+    """
+
+    failures: int = Field(default=1, ge=1, strict=True)
+    seconds: float = Field(gt=0, strict=True)
+
+
 class DynamicState(State):
     """A state that chooses its content on its entry (S0.4), and may request the content from a planner (S0.12).
 
     Attributes:
         dynamic: names of candidate plots, in order of preference; each candidate declares its condition in `when`.
+        choose: the choice among several candidates that fit (S0.14): the first one in `order`, the one of the largest
+            `priority` or `utility`, or of the smallest `cost`; of equal ones the first.
+        exclude: exclusion of candidates that have failed; by default none.
         arguments: values for the candidates' parameters (`with`).
         goal: planning goal; if no candidate fits, a plan for the goal is made. The goal adds the outcomes `no_plan` and
             `gave_up`, which the chart must handle.
@@ -148,6 +168,8 @@ class DynamicState(State):
     """
 
     dynamic: tuple[str, ...] = ()
+    choose: Choice = "order"
+    exclude: Exclusion | None = None
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
     goal: ConditionField | None = None
     budget: Budget = Budget()

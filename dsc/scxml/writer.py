@@ -116,7 +116,7 @@ def to_scxml(plot: ActionPlot) -> str:
     require_targets(plot)
     for what, there in (("parameters", plot.parameters), ("outputs", plot.outputs), ("rules", plot.rules),
                         ("handlers", plot.handlers),
-                        ("outcome events", plot.emits), ("condition", plot.when),
+                        ("outcome events", plot.emits), ("condition", plot.when), ("choice", plot.scores()),
                         ("planning action", plot.implements)):  # fmt: skip
         if there:
             raise NotExpressibleError(what, "SCXML has no counterpart", place=plot.place(()))

@@ -114,6 +114,7 @@ class Reactor:
         self.caused_by: dict[str, int] = {}
         self._cancelled: deque[str] = deque()
         self._noted: set[str] = set()
+        self._now: float | None = None
 
     def know_skills(self, skills: Collection[SkillSignature] | None) -> None:
         """Check plots given as data also against the deployed skills; `None` if they are unknown."""
@@ -143,6 +144,12 @@ class Reactor:
                     states[one.what.action_id] = found[0]
         self.tracer.restore(kept.records, states)
 
+    def moment(self) -> float:
+        """Return the second of run time of the last macrostep: that of its first call, so that a replay repeats it."""
+        if self._now is None:
+            self._now = self.trace.now()
+        return self._now
+
     @property
     def finished(self) -> bool:
         """Whether the plot has reached its final state, and its last step had no error."""
@@ -160,9 +167,10 @@ class Reactor:
             InputError: the plot is unknown, or a parameter is missing or unknown.
         """
         self.machine.state = MachineState(serials=serials)
+        self._now = None
         began = self._phases.timer()
         try:
-            step = self.machine.start(plot, arguments, KnowledgeSituation(self.knowledge, self.library))
+            step = self.machine.start(plot, arguments, KnowledgeSituation(self.knowledge, self.library, self.moment))
             if self._phases.timer() - began > self._phases.limit:
                 self._phases.report(step, self._phases.timer() - began)
         except RunawayError as error:
@@ -176,10 +184,11 @@ class Reactor:
 
     def react(self, message: Message) -> tuple[Output, ...]:
         """Execute the macrostep for a message, and return its outputs; an error sets `problem` instead."""
+        self._now = None
         try:
             event = self._received(message)
             before, began = self.machine.state, self._phases.timer()
-            step = self.machine.send(event, KnowledgeSituation(self.knowledge, self.library))
+            step = self.machine.send(event, KnowledgeSituation(self.knowledge, self.library, self.moment))
             if self._phases.timer() - began > self._phases.limit:
                 self._phases.report(step, self._phases.timer() - began)
             said = message.message if isinstance(message, LateMessage) else message
@@ -203,7 +212,7 @@ class Reactor:
 
     def is_enabled(self) -> bool:
         """Return whether a transition without trigger could be taken now, or its guard fails."""
-        return self.machine.is_enabled(KnowledgeSituation(self.knowledge, self.library))
+        return self.machine.is_enabled(KnowledgeSituation(self.knowledge, self.library, self.moment))
 
     def observe(self, message: SkillMessage) -> None:
         """Apply the observations of a message that arrives after the last macrostep."""
@@ -213,20 +222,21 @@ class Reactor:
         """Exit the active states at the end of a run, and return the outputs of exit actions, which stop components."""
         if self.machine.state.root is None:
             return ()
+        self._now = None
         try:
-            return self._commit(self.machine.leave(KnowledgeSituation(self.knowledge, self.library)))
+            return self._commit(self.machine.leave(KnowledgeSituation(self.knowledge, self.library, self.moment)))
         except InputError as error:
             self.problem = self.problem or str(error)
             return ()
 
     def entry_messages(self) -> tuple[SendMessage, ...]:
         """Return the messages that the entry of the active states would send now."""
-        return self.machine.entry_messages(KnowledgeSituation(self.knowledge, self.library))
+        return self.machine.entry_messages(KnowledgeSituation(self.knowledge, self.library, self.moment))
 
     def suspend(self) -> tuple[Output, ...]:
         """Exit the active states without a record or a change of knowledge, and return the outputs of exit actions."""
         try:
-            return self.machine.leave(KnowledgeSituation(self.knowledge, self.library)).output
+            return self.machine.leave(KnowledgeSituation(self.knowledge, self.library, self.moment)).output
         except InputError:  # a value of an exit action cannot be computed
             return ()
 

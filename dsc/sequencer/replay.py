@@ -96,12 +96,14 @@ class _ReplayedRun:
         start = Version(past.state(row.version, past.newest), row.version, 0.0)
         self._knowledge = KnowledgeBase(past.schema, lambda: 0.0, MemoryHistory(start))
         of_run = str(row.header.get("action_ids", ""))
-        self._reactor = Reactor(library, self._knowledge, Trace(lambda: 0.0), run=of_run)
+        self._now = 0.0
+        self._reactor = Reactor(library, self._knowledge, Trace(lambda: self._now), run=of_run)
         self._reactor.know_skills(signatures_in(row.header, runs.form))
         self._started: dict[str, Start] = {}
 
     def take(self, step: StepRow) -> Divergence | None:
         """Repeat one macrostep; return its first result that differs, or `None`."""
+        self._now = step.time
         for change in self._past.changes(self._knowledge.version, step.before):  # changes of other authors
             self._knowledge.apply(change.delta, change.author)
         action_id = step.message.get("action")

@@ -463,8 +463,10 @@ class Sequencer(OutsideInput):
         assert self.store is not None  # noqa: S101
         dispatcher = self.dispatcher
         memories = dispatcher.memories()
-        now, refused = self.clock.now(), dispatcher.outbox.refused()
-        self.store.step(now, message, output, self._reactor, dispatcher.undelivered, refused, memories)
+        refused = dispatcher.outbox.refused()
+        self.store.step(
+            self._reactor.moment(), message, output, self._reactor, dispatcher.undelivered, refused, memories
+        )
 
     # -- from outside ------------------------------------------------------------------------------------
 

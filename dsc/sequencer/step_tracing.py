@@ -7,6 +7,7 @@ from typing import Any
 
 from dsc.engine import steps
 from dsc.engine.machine_state import FrameState
+from dsc.engine.situation import Verdict
 from dsc.events import Event
 from dsc.messages import ParameterMessage
 from dsc.sequencer.relay import InnerRun
@@ -127,6 +128,7 @@ class StepTracer:
         """Record the decisions of dynamic states in this macrostep, with their reasons."""
         for made in step.decisions if self._trace.heard else ():
             decision = made.decision
+            how = {} if decision.by == "order" else {"by": decision.by}
             self._trace.record(
                 "decision",
                 state=made.state,
@@ -134,10 +136,8 @@ class StepTracer:
                 satisfied=decision.satisfied,
                 arguments=dict(decision.arguments),
                 version=decision.version,
-                candidates=[
-                    {"plot": v.plot, "fits": v.fits, "reason": v.reason, "condition": dict(v.explanation)}
-                    for v in decision.verdicts
-                ],
+                candidates=[_candidate(one) for one in decision.verdicts],
+                **how,
             )
 
     def knowledge(self, change: Change) -> None:
@@ -209,6 +209,12 @@ class StepTracer:
                     self.known_plots.add(digest)
                     words = {"words": bound.plot.words._asdict()} if any(bound.plot.words) else {}
                     self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form(), **words)
+
+
+def _candidate(verdict: Verdict) -> dict[str, Any]:
+    score = {} if verdict.score is None else {"score": verdict.score}
+    reason, condition = verdict.reason, dict(verdict.explanation)
+    return {"plot": verdict.plot, "fits": verdict.fits, "reason": reason, "condition": condition, **score}
 
 
 def _micro(micro: steps.Microstep) -> dict[str, Any]:

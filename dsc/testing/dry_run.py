@@ -174,7 +174,7 @@ class DryRun:
         return self._keep(self.machine.send(event, self._situation()))
 
     def _situation(self) -> KnowledgeSituation:
-        return KnowledgeSituation(self.knowledge, self.library)
+        return KnowledgeSituation(self.knowledge, self.library, lambda: self.now)
 
     def _keep(self, step: Step) -> Step:
         self.steps.append(step)

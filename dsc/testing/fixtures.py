@@ -88,6 +88,7 @@ def ends_with(
             "emits": original.emits,
             "outputs": {name: _output(output) for name, output in original.outputs.items()},
             "when": original.when,
+            **original.scores(),
             "implements": original.implements,
             "effects": original.effects,
             "confirm": original.confirm,

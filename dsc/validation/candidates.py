@@ -45,8 +45,9 @@ def review_candidates(subject: Subject) -> Iterator[Finding]:
         if not isinstance(state, DynamicState) or len(state.dynamic) > MOST:
             continue
         plots = [subject.library.plot(one) for one in state.dynamic]
+        yield from _without_score(subject, name, state, path, plots)
         conditions = {plot.name: _condition(plot, state.arguments) for plot in plots}
-        for message in (*_never_chosen(conditions), *_overlapping(conditions)):
+        for message in (*_never_chosen(conditions, state), *_overlapping(conditions, state)):
             yield _unclear(subject, name, path, message, "make their conditions exclude each other")
         for message in _values_without_candidate(conditions, plots) if state.goal is None else ():
             yield _unclear(subject, name, path, message, "add a candidate for it")
@@ -82,19 +83,33 @@ def _condition(plot: ActionPlot, given: Iterable[str]) -> Expression:
     return substitute(plot.when or TRUE, own)
 
 
-def _never_chosen(conditions: Conditions) -> Iterator[str]:
+def _without_score(
+    subject: Subject, name: str, state: DynamicState, path: Path, plots: Sequence[ActionPlot]
+) -> Iterator[Finding]:
+    """Yield warnings about candidates without the term by which their state chooses."""
+    for number, plot in enumerate(plots):
+        if state.choose != "order" and state.choose not in plot.scores():
+            message = (
+                f"state '{name}' chooses by {state.choose}, and the candidate '{plot.name}' has no `{state.choose}`"
+            )
+            fix = f"write `{state.choose}` in the plot; without it, the candidate comes last"
+            yield subject.finding((*path, "dynamic", number), "candidates", message, fix, level="warning")
+
+
+def _never_chosen(conditions: Conditions, state: DynamicState) -> Iterator[str]:
     earlier: list[Expression] = []
     for name, condition in conditions.items():
         if contradictory(condition):
             yield f"the candidate '{name}' is never chosen: its condition cannot hold"
-        elif earlier and contradictory(condition, *map(Not, earlier)):
+        elif earlier and state.choose == "order" and contradictory(condition, *map(Not, earlier)):
             yield f"the candidate '{name}' is never chosen: whenever it fits, one before it does"
         earlier.append(condition)
 
 
-def _overlapping(conditions: Conditions) -> Iterator[str]:
+def _overlapping(conditions: Conditions, state: DynamicState) -> Iterator[str]:
     """Yield pairs of candidates that overlap although they read equal facts, which suggests exclusive conditions."""
-    for (one, first), (other, second) in combinations(conditions.items(), 2):
+    pairs = combinations(conditions.items(), 2) if state.choose == "order" else ()
+    for (one, first), (other, second) in pairs:
         about = subjects(first)
         nested = implied(first, by=second) or implied(second, by=first)  # a special case may precede the general case
         if about and about == subjects(second) and not nested and not contradictory(first, second):

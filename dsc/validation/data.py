@@ -80,6 +80,8 @@ class _Data:
         yield from self._declarations()
         if self._plot.when is not None:
             yield from self._condition(self._plot.when, _types(self._plot), ("when",))
+        for name, term in self._plot.scores().items():
+            yield from self._term(term, _types(self._plot), (name,), "number")
         for _, state, path in self._subject.states:
             if isinstance(state, State):
                 yield from self._state(state, path)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -199,12 +199,23 @@ class Carrier:
         used = self._usage[names]
         taken = {name for plot in candidates for name in plot.parameters}
         content = {"dynamic": names, "with": {name: value for name, value in bindings.items() if name in taken}}
+        if (choice := _choice(candidates)) is not None:
+            content["choose"] = choice
         return _step(
             step, self._domain, content, None if used.anything else PATIENCE * used.seconds,
             assumed=all(plot.effects == "assumed" for plot in candidates),
             confirm=max(plot.confirm for plot in candidates),
             outcomes=frozenset(event for plot in candidates for event in plot.emits), usage=used,
         )  # fmt: skip
+
+
+def _choice(candidates: Collection[ActionPlot]) -> str | None:
+    """Return the term that all of several candidates declare, by which the step chooses; else `None`: by order."""
+    if len(candidates) > 1:
+        for name in ("utility", "cost", "priority"):
+            if all(name in plot.scores() for plot in candidates):
+                return name
+    return None
 
 
 _carriers: IdentityCache[PlanningDomain, Carrier] = IdentityCache(size=8)

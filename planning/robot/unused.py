@@ -16,7 +16,7 @@ from planning.model.domain import PlanningDomain
 
 _WORD = re.compile(r"[\w-]+")
 _QUOTED = re.compile(r"[\"']([\w-]+)[\"']")
-_CONDITIONS = frozenset({"goal", "when"})
+_CONDITIONS = frozenset({"goal", "when", "priority", "utility", "cost"})
 
 
 def quoted_names(sources: Iterable[str]) -> frozenset[str]:

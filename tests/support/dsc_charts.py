@@ -88,7 +88,10 @@ class FakeSituation:
         self.facts |= set(told.added)
         return told
 
-    def choose(self, state, holder, bindings):
+    def now(self):
+        return 0.0
+
+    def choose(self, state, holder, bindings, failed=()):
         self.asked.append((state, holder, dict(bindings)))
         return self.choices.get(next(iter(state.dynamic), "goal"), Decision(None))
 

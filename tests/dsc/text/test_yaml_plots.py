@@ -120,7 +120,7 @@ BROKEN = [
     (HEAD + "    on_brake: {switch: arm, to: up}", 4, "did you mean 'on_break'?"),
     (HEAD + "    on:\n      e: {to: s, pas: {a: 1}}", 5, "did you mean 'pass'?"),
     (HEAD + "    on:\n      e: {to: s, cleer: s}", 5, "did you mean 'clear'?"),
-    (HEAD + "    choise: [s]", 4, "did you mean 'choice'?"),
+    (HEAD + "    choce: [s]", 4, "did you mean 'choice'?"),
     (HEAD + "    choice: []", 4, "at least one entry is needed; found an empty list"),
     (HEAD + "    choice:\n      - {when: (p), to: s}\n      - {wen: (p), to: s}", 6, "did you mean 'when'?"),
     (HEAD + "    choice:\n      - {when: (p), too: s}\n      - s", 5, "did you mean 'to'?"),
