@@ -67,6 +67,8 @@ export interface DecisionRec extends Rec {
   readonly state: string;
   readonly chosen: string | null;
   readonly satisfied: boolean;
+  /** What it chose by among those that fit, if not by their order. */
+  readonly by?: string;
   readonly arguments?: Named;
   readonly version?: number;
   readonly candidates?: readonly Candidate[];

@@ -70,7 +70,7 @@ const link: Is = (value) => Array.isArray(value) && value.length === 3 && count(
 const SHAPES = new Map<string, readonly (readonly [string, Is])[]>([
   ["plot", [["hash", text], ["plot", plot], ["words", optional(words)]]],
   ["step", [["microsteps", list(micro)], ["variables", optional(dict(dict(any)))]]],
-  ["decision", [["state", text], ["chosen", optional(text)], ["arguments", optional(dict(any))], ["version", optional(number)], ["candidates", optional(list(candidate))]]],
+  ["decision", [["state", text], ["chosen", optional(text)], ["by", optional(text)], ["arguments", optional(dict(any))], ["version", optional(number)], ["candidates", optional(list(candidate))]]],
   ["world", [["version", number], ["nodes", dict(text)], ["facts", facts], ["values", facts]]],
   ["knowledge", [["version", number], ["author", text], ["nodes", optional(dict(text))], ["removed_nodes", optional(texts)],
     ["added", optional(facts)], ["removed", optional(facts)], ["values", optional(facts)]]],

@@ -37,25 +37,26 @@ export function Decision({ rec }: { rec: DecisionRec }) {
       <Head rec={rec}>
         <button className="link" onClick={() => session.select({ kind: "state", path: rec.state })}>{inPath(rec, rec.state)}</button>
         {rec.satisfied ? " had nothing to do: its goal holds." : rec.chosen === null ? ": no candidate fits." : <>{" chose "}<b>{rec.chosen}</b></>}
+        {rec.by && <span className="quiet">{` by ${rec.by}`}</span>}
         {rec.version !== undefined && <span className="quiet">{` · knowledge version ${rec.version}`}</span>}
       </Head>
       <Values values={rec.arguments ?? {}} />
       {rec.chosen === "achieve" && <p className="quiet">No designed candidate fits, and there is a goal: a plan is asked for.</p>}
       <div role="tree" aria-label="Candidates">
-        {(rec.candidates ?? []).map((one) => <CandidateView key={one.plot} one={one} chosen={one.plot === rec.chosen} />)}
+        {(rec.candidates ?? []).map((one) => <CandidateView key={one.plot} one={one} chosen={one.plot === rec.chosen} by={rec.by} />)}
       </div>
     </div>
   );
 }
 
-function CandidateView({ one, chosen }: { one: Candidate; chosen: boolean }) {
+function CandidateView({ one, chosen, by }: { one: Candidate; chosen: boolean; by: string | undefined }) {
   const verdict = chosen ? "chosen" : one.fits ? "fits" : "rejected";
   return (
     <div className={`candidate ${verdict}`} aria-label={`${one.plot}: ${verdict}`}>
       <div className="head">
         <b>{one.plot}</b>
         <span className={`badge ${one.fits ? "" : "bad"}`}>{verdict}</span>
-        {one.score !== undefined && <span className="quiet">{`score ${one.score}`}</span>}
+        {one.score !== undefined && <span className="quiet">{`${by ?? "score"} ${one.score}`}</span>}
       </div>
       {one.condition.text === undefined ? <p className="quiet">{one.reason}</p> : <Tree why={one.condition} decider={deciding(one.condition)} />}
     </div>

@@ -17,6 +17,7 @@ from dsc.events import Event
 from dsc.testing import Crashes, one_history, replays, violations
 from dsc.trace import Record
 from dsc.validation.library import validate_plot
+from dsc.validation.review import review_plot
 from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
@@ -99,7 +100,8 @@ def test_mistakes_in_scores_are_found(text, said):
           fine: {final: true}
     """)
     library = Library([holder, plot(FIRST % text)])
-    found = [one for each in library for one in validate_plot(each, library, SCHEMA, thorough=True)]
+    found = [one for each in library for one in validate_plot(each, library, SCHEMA)]
+    found += review_plot(holder, library)
     assert any(said in str(one.error) for one in found), [str(one) for one in found]
 
 
