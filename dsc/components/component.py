@@ -153,12 +153,14 @@ class Component(ComponentHooks, RestartHooks):
     A subclass declares skills and ports by decorators, and overrides `ComponentHooks` and `RestartHooks`.
 
     Attributes:
+        is_remote: whether another program hosts the component.
         activations: the activations of the component's events.
         parameter_class: the class in the annotation of `parameters`.
         pushes: the push ports, by name; see `dsc.components.streams`.
         requirements: the required ports, by name; see `dsc.components.clients` and `Stream`.
     """
 
+    is_remote: ClassVar[bool] = False
     parameter_class: ClassVar[type[Parameters]] = Parameters
     _ports: ClassVar[Mapping[str, Push | Requirement]] = {}
     _required: ClassVar[Mapping[str, Service]] = {}
@@ -227,8 +229,9 @@ class Component(ComponentHooks, RestartHooks):
         port = self.requirements.get(name)
         if port is None:
             return name
-        if port.provider is None and port.source is not None:
-            return port.source.partition(".")[0]  # it may be deployed later
+        named = port.target or port.source
+        if port.provider is None and named is not None:
+            return named.partition(".")[0]  # it may be deployed later
         return port.require_wired().component.name
 
     async def reach(self, name: str) -> Component:  # noqa: ARG002
@@ -376,9 +379,7 @@ class Component(ComponentHooks, RestartHooks):
             "needs": list(self.needed()),
             "skills": sorted(self.skills()),
             "pushes": sorted(self.pushes),
-            "wires": {
-                name: None if port.provider is None else port.provider.name for name, port in self.requirements.items()
-            },
+            "wires": {name: port.provider_name() for name, port in self.requirements.items()},
             "steps": asdict(self.life.steps),
             "program": program_use(),
         }

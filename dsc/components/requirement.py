@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 from dsc.calls import SkillCall
-from dsc.components.life_cycle import LifeCycle
+from dsc.components.life_cycle import Announcer, LifeCycle
 from dsc.components.services import Service
 from dsc.data_types import data_type
 from dsc.errors import NoAnswerError, NotWiredError
@@ -20,6 +20,8 @@ from knowledge_base.language.checking.inputs import shown
 from knowledge_base.tracebacks import calling_place
 
 _Result = TypeVar("_Result")
+USUAL = ""
+"""Target of a required port whose wire no client changes."""
 _HERE = str(Path(__file__).parent)
 
 
@@ -29,6 +31,7 @@ class Server(Protocol):
     name: str
     life: LifeCycle
     pushes: dict[str, Any]
+    is_remote: ClassVar[bool]
 
     @property
     def mode(self) -> str:
@@ -85,9 +88,13 @@ class Requirement:
         name: the port as `component.port`, for messages and profiles.
         place: the line of the declaration, for messages.
         provider: the present provider; `None` if the port is not wired.
+        is_hosted: whether another program hosts the component, and wires the port unless a run changes the wire.
+        target: the provider that the host of the component connects: the source, unless a client changes the wire.
+        redirections: announces a change of `target`.
     """
 
     what: ClassVar[str] = "a required port"
+    is_hosted: ClassVar[bool] = False
 
     def __init__(self, service: Service, source: str | None = None, *, optional: bool = False) -> None:
         if source is not None and not (isinstance(source, str) and all(source.split("."))):
@@ -98,18 +105,44 @@ class Requirement:
         self.name = ""
         self.place = calling_place(_HERE)
         self.provider: Provider | None = None
+        self.redirections = Announcer()
+        self._redirect: str | None = USUAL
         self._runs = 0
         self._pending: set[asyncio.Future[None]] = set()
 
     def __getstate__(self) -> dict[str, object]:
         """Return the state for pickling, without provider and pending calls, which stay in this process."""
-        return {**self.__dict__, "provider": None, "_runs": 0, "_pending": set()}
+        fresh: dict[str, object] = {
+            "provider": None,
+            "redirections": Announcer(),
+            "_redirect": USUAL,
+            "_runs": 0,
+            "_pending": set(),
+        }
+        return {**self.__dict__, **fresh}
 
     def of(self, component: str, port: str) -> Self:
         """Return the port of one component."""
         own = copy(self)
         own.name = f"{component}.{port}"
         return own
+
+    @property
+    def target(self) -> str | None:
+        """The provider that the host connects, as `component.port` or `component`; `None` without a wire."""
+        return self.source if self._redirect == USUAL else self._redirect
+
+    def redirect(self, to: str | None) -> None:
+        """Change the target, for a client of the host: a provider, `None` for no wire, or `USUAL` for the source."""
+        self._redirect = to
+        self.redirections.announce()
+
+    def require_reachable(self, provider: Provider) -> None:
+        """Raise `InputError` if the program of the component cannot reach the provider."""
+
+    def provider_name(self) -> str | None:
+        """Return the name of the present provider; `None` if the port is not wired."""
+        return None if self.provider is None else self.provider.name
 
     def join(self) -> None:
         """Count a run that uses the port."""

@@ -263,12 +263,16 @@ class Stream(Requirement):
             self._timer = None
         if provider is not None:
             provider.component.pushes[provider.port].leave(self.receive)
-            for coming in self._waiting:
-                if not coming.done():
-                    coming.set_exception(NotWiredError(f"the wire of '{self.name}' to '{provider.name}' was cut"))
+            self.end_waits(provider.name)
+
+    def end_waits(self, provider: str) -> None:
+        """End pending `next` with `NotWiredError`, as the wire to a provider was cut."""
+        for coming in self._waiting:
+            if not coming.done():
+                coming.set_exception(NotWiredError(f"the wire of '{self.name}' to '{provider}' was cut"))
 
     def _origin(self) -> str:
-        named = self.source if self.provider is None else self.provider.name
+        named = self.target if self.provider is None else self.provider.name
         return f"'{self.name}', which is not wired" if named is None else f"'{named}'"
 
 

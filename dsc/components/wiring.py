@@ -32,7 +32,7 @@ def choose_sources(components: Iterable[Component], wiring: Mapping[str, str]) -
     Raises:
         UnknownNameError: no component requires such a port.
     """
-    ports = {port.name: port for one in components for port in one.requirements.values()}
+    ports = {port.name: port for one in components for port in one.requirements.values() if not port.is_hosted}
     for name, provider in wiring.items():
         if name not in ports:
             raise UnknownNameError(f"there is no required port '{name}'", found=name, valid=ports)
@@ -63,6 +63,8 @@ def wiring_errors(components: Iterable[Component]) -> Iterator[tuple[Requirement
     deployed = {component.name: component for component in components}
     for component in deployed.values():
         for port in component.requirements.values():
+            if port.is_hosted:
+                continue
             try:
                 provider = provider_for(port, component, deployed)
             except InputError as error:
@@ -87,8 +89,8 @@ def required_port(
     owner = components[component]
     owner.interface().require_port(component, port)
     required = owner.requirements[port]
-    if to is not None:
-        provider_for(required, owner, components, to)
+    if to is not None and (provider := provider_for(required, owner, components, to)) is not None:
+        required.require_reachable(provider)
     return owner, required
 
 
@@ -169,9 +171,7 @@ class Wiring(Announcer):
     def wires(self) -> dict[str, dict[str, str | None]]:
         """Return the providers of required ports by component and port; the provider of a cut wire is `None`."""
         return {
-            owner.name: {
-                port: None if one.provider is None else one.provider.name for port, one in owner.requirements.items()
-            }
+            owner.name: {port: one.provider_name() for port, one in owner.requirements.items()}
             for owner in self._components.values()
             if owner.requirements
         }
@@ -223,11 +223,16 @@ class Wiring(Announcer):
                     self._connect(port, owner)
 
     def _connect(self, port: Requirement, owner: Component) -> None:
+        changes = self.changes.get(port.name)
+        if port.is_hosted and not changes:
+            if port in self._joined:
+                self._leave(port)
+                self.announce()
+            return
         if port not in self._joined:
             self._joined[port] = owner
             port.join()
-        before = port.provider
-        changes = self.changes.get(port.name)
+        before = port.provider_name()
         chosen = changes[-1][1] if changes else None
         provider = None
         if not changes or chosen is not None:
@@ -236,7 +241,7 @@ class Wiring(Announcer):
             port.disconnect()
         else:
             port.connect(provider)
-        if provider != before:
+        if port.provider_name() != before:
             self.announce()
 
     def _provider(self, port: Requirement, owner: Component, chosen: str | None) -> Provider | None:

@@ -123,6 +123,7 @@ def choose(
         return Decision(None, satisfied=True, version=version)
     arguments = {name: _argument(term, world, bindings) for name, term in state.arguments.items()}
     verdicts, own = [], {}
+    fitting: list[Verdict] = []
     for name in state.dynamic:
         plot = plots.plot(name)
         own[name] = {key: value for key, value in arguments.items() if key in plot.parameters}
@@ -132,7 +133,8 @@ def choose(
         if verdict.fits and state.choose != "order":
             verdict = replace(verdict, score=_score(plot, state.choose, own[name], world))
         verdicts.append(verdict)
-    fitting = [one for one in verdicts if one.fits]
+        if verdict.fits:
+            fitting.append(verdict)
     best = fitting[:1] if state.choose == "order" else sorted(fitting, key=partial(_rank, by=state.choose))
     chosen = best[0].plot if best else None
     chosen_arguments = own[chosen] if chosen is not None else {}

@@ -228,6 +228,14 @@ class _Work:
         following = configuration_of(
             self.compiled, tuple(sorted(self.present)), frozenset(self.waiting), history
         )  # fmt: skip
+        continues, ends = [], []
+        for part in parts:
+            if part.edge is not None:
+                state = self.compiled.nodes[part.edge.source].state
+                if part.edge.keeps:
+                    continues.append(part.edge.source)
+                if isinstance(state, DynamicState) and state.exclude is not None:
+                    ends.append(part.edge)
         silent = all(one.quiet for one in exits)
         stays = not keeps and not following.spontaneous
         return CompiledReaction(
@@ -236,15 +244,9 @@ class _Work:
             entered=tuple([one.node.name for one in entrances if one.node.state is not None]),
             silent=silent and not parts,
             still=silent and stays and bool(parts) and all(part.quiet for part in parts),
-            continues=tuple([part.edge.source for part in parts if part.edge is not None and part.edge.keeps]),
-            candidate_ends=tuple(
-                [part.edge for part in parts if part.edge is not None and self._excludes(part.edge.source)]
-            ),
+            continues=tuple(continues),
+            candidate_ends=tuple(ends),
         )  # fmt: skip
-
-    def _excludes(self, node: int) -> bool:
-        state = self.compiled.nodes[node].state
-        return isinstance(state, DynamicState) and state.exclude is not None
 
     def _exits(self, left: set[int], own: set[int]) -> tuple[Exit, ...]:
         """Return the exits, inner nodes first and later nodes before earlier nodes; interrupt nodes outside `own`."""

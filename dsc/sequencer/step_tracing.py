@@ -7,7 +7,6 @@ from typing import Any
 
 from dsc.engine import steps
 from dsc.engine.machine_state import FrameState
-from dsc.engine.situation import Verdict
 from dsc.events import Event
 from dsc.messages import ParameterMessage
 from dsc.sequencer.relay import InnerRun
@@ -136,7 +135,11 @@ class StepTracer:
                 satisfied=decision.satisfied,
                 arguments=dict(decision.arguments),
                 version=decision.version,
-                candidates=[_candidate(one) for one in decision.verdicts],
+                candidates=[
+                    {"plot": v.plot, "fits": v.fits, "reason": v.reason, "condition": dict(v.explanation)}
+                    | ({} if v.score is None else {"score": v.score})
+                    for v in decision.verdicts
+                ],
                 **how,
             )
 
@@ -209,12 +212,6 @@ class StepTracer:
                     self.known_plots.add(digest)
                     words = {"words": bound.plot.words._asdict()} if any(bound.plot.words) else {}
                     self._trace.record("plot", name=bound.plot.name, hash=digest, plot=bound.plot.to_form(), **words)
-
-
-def _candidate(verdict: Verdict) -> dict[str, Any]:
-    score = {} if verdict.score is None else {"score": verdict.score}
-    reason, condition = verdict.reason, dict(verdict.explanation)
-    return {"plot": verdict.plot, "fits": verdict.fits, "reason": reason, "condition": condition, **score}
 
 
 def _micro(micro: steps.Microstep) -> dict[str, Any]:

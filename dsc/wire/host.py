@@ -11,6 +11,7 @@ import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from dsc.components.frames import encoded
 from dsc.components.hooks import GRACE, abandon, cancel_once, contained, reason_of
 from dsc.components.life_cycle import Life
 from dsc.components.parameters import Configuration
+from dsc.components.requirement import USUAL
 from dsc.components.turns import turn_of
 from dsc.errors import NotAliveError, PreemptedError, ProgrammingError
 from dsc.outcomes import Outcome
@@ -28,9 +30,10 @@ from dsc.run_log import run_logger
 from dsc.wire.endpoint import Endpoint, Transport
 from dsc.wire.heartbeat import BEAT, Heartbeat
 from dsc.wire.publication import HostedStreams, Publisher
+from dsc.wire.remote_ports import requirement_form
 from knowledge_base.errors import InputError
 from knowledge_base.exchange import delta_form, delta_of
-from knowledge_base.language.checking.inputs import require_delta, require_time, shown
+from knowledge_base.language.checking.inputs import require_delta, require_text, require_time, shown
 
 _LOG = run_logger(__package__)
 
@@ -67,6 +70,7 @@ class Host:
         self.endpoint.answer("be active", self._be_active)
         self.endpoint.answer("switch", self._switch)
         self.endpoint.answer("bind", self._bind)
+        self._wires = HostedWires(component, self.endpoint)
         self._answer("set", "configure", lambda said: component.configure(said["parameter"], said["value"]))
         self._answer("set all", "configure_all", component.configure_all)
         self._answer("take", "take", lambda said: component.receive(said["port"], said["message"]))
@@ -79,6 +83,8 @@ class Host:
         self._tasks = [loop.create_task(self._heart.run()), loop.create_task(self._claim())]
         self._changed()
         component.life.listen(self._changed)
+        for port in component.requirements.values():
+            port.redirections.listen(self._changed)
 
     def _answer(self, kind: str, hook: str, call: Callable[[Any], Awaitable[Any]]) -> None:
         """Answer calls of that kind with the result of a hook."""
@@ -94,6 +100,8 @@ class Host:
     async def close(self) -> None:
         """Stop all services without a message, then the component; clients treat the component as failed."""
         self._component.life.leave(self._changed)
+        for port in self._component.requirements.values():
+            port.redirections.leave(self._changed)
         await self._claims.close()
         await self.endpoint.close()
         await self._actions.close()
@@ -156,6 +164,7 @@ class Host:
             "messages": messages,
             "skills": skills,
             "pushes": pushes,
+            "requires": {name: requirement_form(port) for name, port in self._component.requirements.items()},
             "concurrent": self._component.concurrent,
             "parameters": parameters_form(self._component.configuration),
             "domain": _domain_of(self._component),
@@ -191,6 +200,41 @@ class Host:
         with contained(f"{self._component.name}.switch", self._component.device_errors):
             await self._component.change_mode(said["mode"])
         return self._condition.newest
+
+
+class HostedWires:
+    """Handler of the calls `wire` at an endpoint: clients change the wires of a component while they run.
+
+    Args:
+        component: the hosted component.
+        endpoint: its address.
+    """
+
+    def __init__(self, component: Component, endpoint: Endpoint) -> None:
+        self._component = component
+        self._endpoint = endpoint
+        self._clients: dict[str, str] = {}  # the client of each changed port
+        self._watches: dict[str, Callable[[], None]] = {}
+        endpoint.answer("wire", self._wire)
+
+    async def _wire(self, sender: str, said: dict[str, Any]) -> None:
+        port, to = said["port"], said["to"]
+        self._component.interface().require_port(self._component.name, port)
+        if to is not None:
+            require_text(to, "the provider of a wire")
+        self._clients[port] = sender
+        if sender not in self._watches:
+            self._watches[sender] = self._endpoint.watch(sender, partial(self._note_presence, sender))
+        self._component.requirements[port].redirect(to)
+
+    def _note_presence(self, client: str, present: bool) -> None:  # noqa: FBT001
+        """Restore the wires that a client has changed, when it is gone."""
+        if present:
+            return
+        self._watches.pop(client)()
+        for port in [port for port, changed_by in self._clients.items() if changed_by == client]:
+            del self._clients[port]
+            self._component.requirements[port].redirect(USUAL)
 
 
 def parameters_form(configuration: Configuration) -> dict[str, Any]:

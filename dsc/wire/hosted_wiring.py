@@ -1,4 +1,4 @@
-"""Wiring of hosted components: their required ports use components of the same program, and of others (S0.17).
+"""Wiring of hosted components: their required ports use components of the same program, and of others (S0.17, S1.18).
 
 Streams are not wired here: each host subscribes to them, see `dsc.wire.publication.HostedStreams`.
 """
@@ -27,8 +27,9 @@ PAUSE = 1.0
 class HostedWiring:
     """The wires of hosted components, while `run` runs.
 
-    Each required port has a source, see `dsc.components.wiring.name_sources`. A port whose provider is missing is not
-    wired yet; its calls end with `NotWiredError`. Providers may start later, and may restart.
+    Each required port is wired to its `target`: its source, see `dsc.components.wiring.name_sources`, unless a client
+    changes the wire. A port whose provider is missing is not wired yet; its calls end with `NotWiredError`. Providers
+    may start later, and may restart.
 
     Args:
         components: the hosted components of this program.
@@ -38,48 +39,67 @@ class HostedWiring:
     def __init__(self, components: Iterable[Component], transport: Transport) -> None:
         self._hosted = {one.name: one for one in components}
         self._transport = transport
+        self._remote: dict[str, asyncio.Task[RemoteComponent]] = {}
 
     async def run(self) -> None:
         """Wire all ports, until cancelled."""
-        ports: dict[str, list[tuple[Requirement, Component]]] = {}
-        for owner in self._hosted.values():
-            for port in owner.requirements.values():
-                if port.source is not None and not isinstance(port, Stream):
-                    ports.setdefault(port.source.partition(".")[0], []).append((port, owner))
-        async with asyncio.TaskGroup() as group:
-            for name, clients in ports.items():
-                group.create_task(self._serve(name, clients))
-
-    async def _serve(self, name: str, clients: list[tuple[Requirement, Component]]) -> None:
-        """Wire the ports to the component of that name, until cancelled."""
-        provider = self._hosted.get(name) or await self._find(name)
-        fitting = [port for port, owner in clients if _connect(port, owner, provider)]
-        provider.watch(watching=True)
         try:
-            await asyncio.Event().wait()
+            async with asyncio.TaskGroup() as group:
+                for owner in self._hosted.values():
+                    for port in owner.requirements.values():
+                        if not isinstance(port, Stream):
+                            group.create_task(self._keep_wired(port, owner))
         finally:
-            provider.watch(watching=False)
-            for port in fitting:
-                port.leave()
+            for finding in self._remote.values():
+                if finding.done() and not finding.cancelled():
+                    finding.result().watch(watching=False)
+                finding.cancel()
+
+    async def _keep_wired(self, port: Requirement, owner: Component) -> None:
+        """Wire a port to its target, also after changes of the target, until cancelled."""
+        port.join()
+        try:
+            while True:
+                changed = asyncio.Event()
+                port.redirections.listen(changed.set)
+                wiring = asyncio.get_running_loop().create_task(self._wire(port, owner))
+                try:
+                    await changed.wait()
+                finally:
+                    port.redirections.leave(changed.set)
+                    wiring.cancel()
+        finally:
+            port.leave()
+
+    async def _wire(self, port: Requirement, owner: Component) -> None:
+        """Wire a port to its target, when the program of the target is found; log the reason if it does not fit."""
+        if port.target is None:
+            port.disconnect()
+            return
+        provider = await self._provider(port.target.partition(".")[0])
+        try:
+            found = provider_for(port, owner, {provider.name: provider}, port.target)
+        except InputError as error:
+            _LOG.warning("port '%s' is not wired: %s", port.name, error)
+            return
+        if found is not None:
+            port.connect(found)
+
+    async def _provider(self, name: str) -> Component:
+        """Return a component of this program, or of another one; all ports share the connection to it."""
+        if name in self._hosted:
+            return self._hosted[name]
+        if name not in self._remote:
+            self._remote[name] = asyncio.get_running_loop().create_task(self._find(name))
+        return await asyncio.shield(self._remote[name])
 
     async def _find(self, name: str) -> RemoteComponent:
         while True:
             try:
-                return await RemoteComponent.connect(name, self._transport)
+                found = await RemoteComponent.connect(name, self._transport)
             except (NoAnswerError, RefusedError) as error:
                 _LOG.info("component '%s' is not there yet: %s", name, error)
-            await asyncio.sleep(PAUSE)
-
-
-def _connect(port: Requirement, owner: Component, provider: Component) -> bool:
-    """Wire a port; return whether the provider fits, and log the reason if not."""
-    try:
-        found = provider_for(port, owner, {provider.name: provider})
-    except InputError as error:
-        _LOG.warning("port '%s' is not wired: %s", port.name, error)
-        return False
-    if found is None:
-        return False
-    port.join()
-    port.connect(found)
-    return True
+                await asyncio.sleep(PAUSE)
+            else:
+                found.watch(watching=True)
+                return found

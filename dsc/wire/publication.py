@@ -183,18 +183,41 @@ class HostedStreams:
             port.listen(publisher.put)
         self._tasks: list[asyncio.Task[None]] = []
         for stream in component.requirements.values():
-            if not isinstance(stream, Stream) or stream.source is None:
-                continue
-            source, _, name = stream.source.partition(".")
-            subscription = Subscription(endpoint, source, name, stream.receive, stream.service.gives)
-            stream.problem = lambda subscription=subscription: subscription.problem  # type: ignore[misc]
-            self._tasks.append(asyncio.get_running_loop().create_task(subscription.run()))
+            if isinstance(stream, Stream):
+                self._tasks.append(asyncio.get_running_loop().create_task(_follow(stream, endpoint)))
 
     def close(self) -> list[asyncio.Task[None]]:
         """Stop publishing; return the subscription tasks, which the caller must cancel."""
         for port, publisher in self._publishing:
             port.leave(publisher.put)
         return self._tasks
+
+
+async def _follow(stream: Stream, endpoint: Endpoint) -> None:
+    """Subscribe to the target of a hosted stream, also after its changes, until cancelled."""
+    while True:
+        target, changed = stream.target, asyncio.Event()
+        stream.redirections.listen(changed.set)
+        running: list[asyncio.Task[None]] = []
+        if target is not None:
+            running.append(asyncio.get_running_loop().create_task(_subscribe(stream, target, endpoint)))
+        try:
+            await changed.wait()
+        finally:
+            stream.redirections.leave(changed.set)
+            for task in running:
+                task.cancel()
+            if target is not None:
+                endpoint.deafen(_kind(*target.split(".", 1)))
+        if target is not None:
+            stream.end_waits(target)
+
+
+async def _subscribe(stream: Stream, target: str, endpoint: Endpoint) -> None:
+    publisher, _, port = target.partition(".")
+    subscription = Subscription(endpoint, publisher, port, stream.receive, stream.service.gives)
+    stream.problem = lambda: subscription.problem
+    await subscription.run()
 
 
 class RemotePush(Push):

@@ -15,7 +15,7 @@ import secrets
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 from dsc.calls import Ended, SkillCall, Status
 from dsc.components.component import Component
@@ -31,6 +31,7 @@ from dsc.wire.endpoint import AGAIN, RESOLUTION, WITHIN, Endpoint, Transport
 from dsc.wire.heartbeat import Heartbeat
 from dsc.wire.host import CONDITION, outcome_of
 from dsc.wire.publication import RemotePush, Subscription
+from dsc.wire.remote_ports import RemoteWires, requirement_of
 from knowledge_base.errors import InputError, described, text_of
 from knowledge_base.language.checking.inputs import require_text
 
@@ -57,6 +58,7 @@ class RemoteComponent(Component):
         self._heart = Heartbeat(endpoint, lambda: [name], _ignore, root=True)
         self._domain: str | None = None
         self._plots: tuple[ActionPlot, ...] = ()
+        self._wires = RemoteWires(endpoint, name)
         self._messages: Mapping[str, SkillSignature] | None = None
         self._values_there: dict[str, Any] = {}
         self._profile: dict[str, Any] | None = None  # values of this program's profile; `None` before the first start
@@ -70,6 +72,8 @@ class RemoteComponent(Component):
         self._watching: tuple[asyncio.Task[None], ...] = ()
         self._end_watch: Callable[[], None] = _do_nothing
         self._program = ""  # the host's life
+
+    is_remote: ClassVar[bool] = True
 
     def remember(self) -> str:
         """Return the name of this program's run, by which the host identifies its actions."""
@@ -100,6 +104,8 @@ class RemoteComponent(Component):
             remote.concurrent = bool(said["concurrent"])
             for port, form in said["pushes"].items():
                 remote.pushes[port] = RemotePush(endpoint, name, port, form["values"])
+            for port, form in said["requires"].items():
+                remote.requirements[port] = requirement_of(f"{name}.{port}", form, remote._wires)
             remote._take_parameters(said["parameters"])
             remote.modes = tuple(said["modes"])  # type: ignore[misc]  # a class declares them; a client receives them
             if said["messages"] is not None:
@@ -132,8 +138,9 @@ class RemoteComponent(Component):
         return self._plots
 
     def interface(self) -> Interface:
-        """Return the parameters, modes, messages and push ports at the time of the connection."""
-        return replace(super().interface(), messages=self._messages)
+        """Return the parameters, modes, messages and ports at the time of the connection."""
+        requires = {port: one.service for port, one in self.requirements.items()}
+        return replace(super().interface(), messages=self._messages, requires=requires)
 
     def skills(self) -> dict[str, SkillSignature]:
         """Return the signatures at the time of the connection."""
@@ -232,6 +239,7 @@ class RemoteComponent(Component):
                 if self._is_silent:
                     self._is_silent = False
                     self._follow(self._condition.value)
+                    self._wires.repeat()
                     self._releasing = loop.create_task(self._release())
                 await self._wait_for_presence(left)
                 continue
@@ -261,6 +269,8 @@ class RemoteComponent(Component):
             case _:
                 raise InputError(f"the condition of '{self.name}' cannot be read: {text_of(condition, repr)}")
         restarted, self._program = self._program not in {"", program}, program
+        if restarted:
+            self._wires.send_all()
         if restarted and self._watching and self.life.state in {Life.INIT, Life.ALIVE} and not self.life.starting:
             self.life.become(Life.FATAL_ERROR, f"the program of '{self.name}' was restarted")
         self._follow(condition)

@@ -315,6 +315,42 @@ def test_hosted_components_use_components_of_other_programs(cell):
     assert "the call of 'cartographer.energy' to 'accumulator.remaining' has no answer within 1 s" in ended
 
 
+SURVEY_BEHIND = """
+from dsc import parse_plot
+from planning import Bundle
+
+survey = parse_plot('''
+plot: survey_behind
+outputs: {metres: number}
+states:
+  map:
+    entry: [{switch: cartographer, to: mapping}, {wire: cartographer.scan, to: rear.echo}]
+    on: {done: over}
+    states:
+      wait: {after: {seconds: 2, to: ask}}
+      ask:
+        entry: {trigger: cartographer.survey}
+        on: {surveyed: {to: known, assign: {metres: ?event.metres}}}
+      known: {final: true}
+  over: {final: true}
+''')
+robot = Bundle("behind", remote=("cartographer", "front", "rear"), plots=(survey,), main="survey_behind")
+"""
+
+
+def test_a_run_changes_the_wire_of_a_hosted_component(cell, tmp_path):
+    strangers = Path(__file__).parents[3] / "examples" / "strangers"
+    cell.host(target=strangers / "robot.py")
+    target = tmp_path / "behind.py"
+    target.write_text(SURVEY_BEHIND)
+    report = json.loads(cell.said("run", target, "--json").splitlines()[-1])
+    assert report["outputs"] == {"metres": 2.0}
+    cell.said("call", "cartographer", "--switch", "mapping")
+    deadline = time.monotonic() + 20.0
+    while "metres: 1.0" not in (said := cell.said("call", "cartographer.survey", "--within", "5")):
+        assert time.monotonic() < deadline, said  # the host has wired the front laser again
+
+
 def test_hosted_components_are_monitored(cell, tmp_path):
     strangers = Path(__file__).parents[3] / "examples" / "strangers"
     cell.host(target=strangers / "robot.py")
