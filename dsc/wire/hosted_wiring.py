@@ -40,6 +40,7 @@ class HostedWiring:
         self._hosted = {one.name: one for one in components}
         self._transport = transport
         self._remote: dict[str, asyncio.Task[RemoteComponent]] = {}
+        self._watched: dict[str, Component] = {}
 
     async def run(self) -> None:
         """Wire all ports, until cancelled."""
@@ -51,9 +52,9 @@ class HostedWiring:
                             group.create_task(self._keep_wired(port, owner))
         finally:
             for finding in self._remote.values():
-                if finding.done() and not finding.cancelled():
-                    finding.result().watch(watching=False)
                 finding.cancel()
+            for provider in self._watched.values():
+                provider.watch(watching=False)
 
     async def _keep_wired(self, port: Requirement, owner: Component) -> None:
         """Wire a port to its target, also after changes of the target, until cancelled."""
@@ -84,6 +85,9 @@ class HostedWiring:
             return
         if found is not None:
             port.connect(found)
+            if provider.name not in self._watched:
+                self._watched[provider.name] = provider
+                provider.watch(watching=True)
 
     async def _provider(self, name: str) -> Component:
         """Return a component of this program, or of another one; all ports share the connection to it."""
@@ -96,10 +100,7 @@ class HostedWiring:
     async def _find(self, name: str) -> RemoteComponent:
         while True:
             try:
-                found = await RemoteComponent.connect(name, self._transport)
+                return await RemoteComponent.connect(name, self._transport)
             except (NoAnswerError, RefusedError) as error:
                 _LOG.info("component '%s' is not there yet: %s", name, error)
-                await asyncio.sleep(PAUSE)
-            else:
-                found.watch(watching=True)
-                return found
+            await asyncio.sleep(PAUSE)
