@@ -213,7 +213,10 @@ _KIND_OF_KEY = {"use": "submachine", "dynamic": "dynamic", "goal": "dynamic", "s
 
 def _kind(value: Any) -> str:
     keys = value if isinstance(value, Mapping) else getattr(type(value), "model_fields", ())
-    return next((kind for key, kind in _KIND_OF_KEY.items() if key in keys), "simple")
+    for key, kind in _KIND_OF_KEY.items():
+        if key in keys:
+            return kind
+    return "simple"
 
 
 def _as_state(value: Any) -> Any:

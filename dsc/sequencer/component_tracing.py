@@ -27,12 +27,12 @@ class ComponentTracer:
         """Record later changes, until `close`."""
         self._wires = self._wiring.wires()
         self._wiring.listen(self._note_wires)
-        self._activation.listen(self._note_waits)
+        self._activation.waits.listen(self._note_waits)
 
     def close(self) -> None:
         """Record no further change."""
         self._wiring.leave(self._note_wires)
-        self._activation.leave(self._note_waits)
+        self._activation.waits.leave(self._note_waits)
 
     def record_wires(self) -> None:
         """Record the wires of all components, for the start of a run."""
@@ -47,7 +47,6 @@ class ComponentTracer:
 
     def _note_waits(self) -> None:
         before, self._waiting = self._waiting, self._activation.waiting
-        if before is not self._waiting:
-            for name in {**before, **self._waiting}:
-                if before.get(name) != self._waiting.get(name):
-                    self._trace.record("component", component=name, waits=self._waiting.get(name))
+        for name in {**before, **self._waiting}:
+            if before.get(name) != self._waiting.get(name):
+                self._trace.record("component", component=name, waits=self._waiting.get(name))

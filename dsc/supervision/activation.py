@@ -35,6 +35,7 @@ class ComponentActivation(Announcer):
         registry: the deployed components.
         concerned: names of the components that participate.
         waiting: the reasons of the components in use that wait for resources, by name.
+        waits: announces changes of `waiting`.
     """
 
     def __init__(self, registry: ComponentRegistry, used: Callable[[], Iterable[str]]) -> None:
@@ -43,6 +44,7 @@ class ComponentActivation(Announcer):
         self._used = used
         self.concerned: set[str] = set()
         self.waiting: dict[str, str] = {}
+        self.waits = Announcer()
         self._room: Room | None = None
         self._in_order: list[str] = []  # the components in use, the earliest first
         self._rank_of: Callable[[str], Rank] = lambda _: ORDINARY
@@ -212,6 +214,7 @@ class ComponentActivation(Announcer):
                 yield name
         if before != self.waiting:
             super().announce()
+            self.waits.announce()
 
     def _require(self, name: str, needing: Component | None, required: dict[str, Component | None]) -> None:
         """Add a component together with the component that needs it, then the component's own dependencies."""
