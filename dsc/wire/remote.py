@@ -177,6 +177,8 @@ class RemoteComponent(Component):
         self._is_silent = False
         await self._release()
         self._require_alive(condition)
+        if self.life.state is Life.FATAL_ERROR:  # the host was gone during this start, and has returned
+            self.life.become(Life.INIT)
 
     def watch(self, watching: bool) -> None:  # noqa: FBT001
         """Begin or end to query the host about the component's life, mode and needs; an active component is queried."""

@@ -343,3 +343,12 @@ TestLives = Lives.TestCase
 TestLives.settings = settings(max_examples=60, stateful_step_count=10, deadline=None)
 TestHostedLives = HostedLives.TestCase
 TestHostedLives.settings = settings(max_examples=12, stateful_step_count=10, deadline=None)
+
+
+def test_a_device_that_fails_after_a_short_absence_of_its_host_is_reported():
+    lives = HostedLives()
+    lives.begin()
+    lives.restart_host(seconds=0.1)  # while the client starts the component
+    assert lives.device.life.state is Life.ALIVE
+    lives.lose(seconds=0.0)
+    lives.teardown()
