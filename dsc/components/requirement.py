@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Coroutine, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
@@ -137,6 +137,19 @@ class Requirement:
         self._redirect = to
         self.redirections.announce()
 
+    async def follow_target(self, serve: Callable[[str | None], Coroutine[Any, Any, None]]) -> None:
+        """Run `serve` with the target, and again with each later target, until cancelled."""
+        while True:
+            changed = asyncio.Event()
+            self.redirections.listen(changed.set)
+            serving = asyncio.get_running_loop().create_task(serve(self.target))
+            try:
+                await changed.wait()
+            finally:
+                self.redirections.leave(changed.set)
+                serving.cancel()
+                await asyncio.wait([serving])
+
     def require_reachable(self, provider: Provider) -> None:
         """Raise `InputError` if the program of the component cannot reach the provider."""
 
@@ -149,10 +162,14 @@ class Requirement:
         self._runs += 1
 
     def leave(self) -> None:
-        """Count the end of a run; the last run disconnects the port."""
+        """Count the end of a run; the last run releases the port."""
         self._runs -= 1
         if self._runs == 0:
-            self.disconnect()
+            self.release()
+
+    def release(self) -> None:
+        """End the wires of all runs."""
+        self.disconnect()
 
     def connect(self, provider: Provider) -> None:
         """Use the service of a provider from now on."""

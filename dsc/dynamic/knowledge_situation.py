@@ -135,8 +135,8 @@ def choose(
         verdicts.append(verdict)
         if verdict.fits:
             fitting.append(verdict)
-    best = fitting[:1] if state.choose == "order" else sorted(fitting, key=partial(_rank, by=state.choose))
-    chosen = best[0].plot if best else None
+    best = min(fitting, key=partial(_rank, by=state.choose), default=None)
+    chosen = None if best is None else best.plot
     chosen_arguments = own[chosen] if chosen is not None else {}
     if chosen is None and goal is not None:
         chosen = ACHIEVE
@@ -168,7 +168,7 @@ def _score(plot: ActionPlot, by: Choice, arguments: Mapping[str, Any], world: Wo
 
 
 def _rank(verdict: Verdict, by: Choice) -> float:
-    """Return a number that is smallest for the candidate to choose; a sort keeps the order of equal ones."""
+    """Return a number that is smallest for the candidate to choose; `min` takes the first of equal ones."""
     if verdict.score is None:
         return math.inf
     return verdict.score if by == "cost" else -verdict.score

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable
+from functools import partial
 
 from dsc.components.component import Component
 from dsc.components.requirement import Requirement
@@ -60,26 +61,18 @@ class HostedWiring:
         """Wire a port to its target, also after changes of the target, until cancelled."""
         port.join()
         try:
-            while True:
-                changed = asyncio.Event()
-                port.redirections.listen(changed.set)
-                wiring = asyncio.get_running_loop().create_task(self._wire(port, owner))
-                try:
-                    await changed.wait()
-                finally:
-                    port.redirections.leave(changed.set)
-                    wiring.cancel()
+            await port.follow_target(partial(self._wire, port, owner))
         finally:
             port.leave()
 
-    async def _wire(self, port: Requirement, owner: Component) -> None:
+    async def _wire(self, port: Requirement, owner: Component, target: str | None) -> None:
         """Wire a port to its target, when the program of the target is found; log the reason if it does not fit."""
-        if port.target is None:
+        if target is None:
             port.disconnect()
             return
-        provider = await self._provider(port.target.partition(".")[0])
+        provider = await self._provider(target.partition(".")[0])
         try:
-            found = provider_for(port, owner, {provider.name: provider}, port.target)
+            found = provider_for(port, owner, {provider.name: provider}, target)
         except InputError as error:
             _LOG.warning("port '%s' is not wired: %s", port.name, error)
             return

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from dsc.components.component import Component
@@ -184,7 +185,8 @@ class HostedStreams:
         self._tasks: list[asyncio.Task[None]] = []
         for stream in component.requirements.values():
             if isinstance(stream, Stream):
-                self._tasks.append(asyncio.get_running_loop().create_task(_follow(stream, endpoint)))
+                following = stream.follow_target(partial(_subscribe, stream, endpoint))
+                self._tasks.append(asyncio.get_running_loop().create_task(following))
 
     def close(self) -> list[asyncio.Task[None]]:
         """Stop publishing; return the subscription tasks, which the caller must cancel."""
@@ -193,31 +195,19 @@ class HostedStreams:
         return self._tasks
 
 
-async def _follow(stream: Stream, endpoint: Endpoint) -> None:
-    """Subscribe to the target of a hosted stream, also after its changes, until cancelled."""
-    while True:
-        target, changed = stream.target, asyncio.Event()
-        stream.redirections.listen(changed.set)
-        running: list[asyncio.Task[None]] = []
-        if target is not None:
-            running.append(asyncio.get_running_loop().create_task(_subscribe(stream, target, endpoint)))
-        try:
-            await changed.wait()
-        finally:
-            stream.redirections.leave(changed.set)
-            for task in running:
-                task.cancel()
-            if target is not None:
-                endpoint.deafen(_kind(*target.split(".", 1)))
-        if target is not None:
-            stream.end_waits(target)
-
-
-async def _subscribe(stream: Stream, target: str, endpoint: Endpoint) -> None:
+async def _subscribe(stream: Stream, endpoint: Endpoint, target: str | None) -> None:
+    """Subscribe to the target of a hosted stream, until cancelled; a change of the target cuts the wire."""
+    if target is None:
+        return
     publisher, _, port = target.partition(".")
     subscription = Subscription(endpoint, publisher, port, stream.receive, stream.service.gives)
     stream.problem = lambda: subscription.problem
-    await subscription.run()
+    try:
+        await subscription.run()
+    finally:
+        endpoint.deafen(_kind(publisher, port))
+        if stream.target != target:
+            stream.end_waits(target)
 
 
 class RemotePush(Push):

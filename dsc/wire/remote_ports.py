@@ -56,12 +56,10 @@ class RemoteRequirement(Requirement):
         super().disconnect()
         self._change(None)
 
-    def leave(self) -> None:
-        """End the change of a run; after the last one, the host wires the source again."""
-        self._runs -= 1
-        if self._runs == 0:
-            self.provider = None
-            self._change(USUAL)
+    def release(self) -> None:
+        """Let the host wire the source again."""
+        self.provider = None
+        self._change(USUAL)
 
     def _change(self, to: str | None) -> None:
         if to != self._redirect:
