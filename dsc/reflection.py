@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from dsc.dynamic.library import Library
+from dsc.dynamic.steps import candidates_of
 from dsc.model.actions import Trigger
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import Handler, Rule
@@ -52,7 +53,7 @@ def design_facts(library: Library, skills: Iterable[SkillSignature] = ()) -> Del
     """
     nodes: dict[str, str] = {}
     facts: dict[Fact, None] = {}
-    for said in (*_skills(skills), *(one for plot in library for one in _plot(plot))):
+    for said in (*_skills(skills), *(one for plot in library for one in _plot(plot, library))):
         if isinstance(said, Fact):
             facts[said] = None
         else:
@@ -73,7 +74,7 @@ def _skills(skills: Iterable[SkillSignature]) -> Iterator[_Said]:
         yield from (fact("emits", skill, event) for event in one.outcomes)
 
 
-def _plot(plot: ActionPlot) -> Iterator[_Said]:
+def _plot(plot: ActionPlot, library: Library) -> Iterator[_Said]:
     name = f"plot:{plot.name}"
     yield name, "action-plot"
     yield from (fact("emits", name, event) for event in plot.emits)
@@ -87,9 +88,9 @@ def _plot(plot: ActionPlot) -> Iterator[_Said]:
         yield from _handler(name, f"handler:{plot.name}.{number}", handler)
     for state_name, state, _ in plot.walk():
         if isinstance(state, DynamicState):
-            for candidate in state.dynamic:
-                yield from _part(name, candidate)
-                yield fact("candidate", name, f"plot:{candidate}", state_name)
+            for candidate in candidates_of(state, library):
+                yield from _part(name, candidate.name)
+                yield fact("candidate", name, f"plot:{candidate.name}", state_name)
         if isinstance(state, SubmachineState) and not state.use.startswith("?"):
             yield from _part(name, state.use)
         if isinstance(state, State):

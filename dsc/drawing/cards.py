@@ -18,6 +18,7 @@ from dsc.drawing.captions import (
 )
 from dsc.drawing.layout import LINE_HEIGHT, Box, BoxKind, Text, TextStyle, column, pack, shorten, text_width
 from dsc.dynamic.library import Library
+from dsc.dynamic.steps import candidates_of
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, FinalState, HistoryState, State, SubmachineState
 from dsc.model.transitions import Connector, SelectState
@@ -203,7 +204,10 @@ def action_rows(state: State, emits: Container[str]) -> list[CardRow]:
 
 def _choices(state: DynamicState, library: Library | None) -> list[CardRow]:
     rows = []
-    for name in state.dynamic:
+    if state.offer is not None:
+        rows.append(_row(f"plots that offer {state.offer}{choice_text(state)}"))
+    offering = [] if library is None else [one.name for one in candidates_of(state, library)]
+    for name in state.candidates or offering:
         plot = _known(name, library)
         condition = f" [{to_text(plot.when)}]" if plot is not None and plot.when is not None else ""
         term = None if plot is None else plot.scores().get(state.choose)

@@ -102,7 +102,8 @@ def _kind(state: AnyState) -> str:  # noqa: PLR0911  # a table by kind
         case SubmachineState():
             return f"use {content_text(state.use, state.arguments)}"
         case DynamicState():
-            return f"dynamic [{', '.join(state.dynamic)}]{choice_text(state)}"
+            content = f"offers {state.offer}" if state.offer is not None else f"[{', '.join(state.candidates)}]"
+            return f"dynamic {content}{choice_text(state)}"
         case CompositeState() | OrthogonalState():
             return type(state).__name__.removesuffix("State").lower()
         case _:

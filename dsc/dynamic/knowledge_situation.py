@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.steps import Plots
+from dsc.dynamic.steps import Plots, candidates_of
 from dsc.engine.exclusion import Excluded, FailedCandidate
 from dsc.engine.situation import Bindings, Decision, Verdict
 from dsc.model.data_forms import (
@@ -94,6 +94,8 @@ class KnowledgeSituation:
         return choose(state, holder, bindings, self._world, self._library, self._version, excluded)
 
 
+NOT_INSTALLED = "not installed"
+"""Reason of the verdict on a listed candidate that the library lacks (S0.4)."""
 ACHIEVE = "achieve"
 """Name of the library's plot for a goal without a fitting candidate; this plot plans, executes and replans."""
 
@@ -114,7 +116,7 @@ def choose(
     a goal, the plot `achieve` is chosen.
 
     Raises:
-        UnknownNameError: a candidate is not in the library, or a variable has no value.
+        UnknownNameError: a variable has no value.
     """
     goal = state.goal
     if goal is not None:
@@ -124,8 +126,8 @@ def choose(
     arguments = {name: _argument(term, world, bindings) for name, term in state.arguments.items()}
     verdicts, own = [], {}
     fitting: list[Verdict] = []
-    for name in state.dynamic:
-        plot = plots.plot(name)
+    for plot in candidates_of(state, plots):
+        name = plot.name
         own[name] = {key: value for key, value in arguments.items() if key in plot.parameters}
         verdict = judge(plot, own[name], world)
         if verdict.fits and excluded is not None and (reason := excluded.reason(name, own[name])):
@@ -135,6 +137,7 @@ def choose(
         verdicts.append(verdict)
         if verdict.fits:
             fitting.append(verdict)
+    verdicts += [Verdict(name, fits=False, reason=NOT_INSTALLED) for name in state.candidates if name not in plots]
     best = min(fitting, key=partial(_rank, by=state.choose), default=None)
     chosen = None if best is None else best.plot
     chosen_arguments = own[chosen] if chosen is not None else {}

@@ -182,7 +182,7 @@ def _read(form: Mapping[str, Any]) -> ActionPlot:
         raise InputError(f"the value to be bound is not a plot: {error}") from error
 
 
-_ROLE = ("when", "priority", "utility", "cost", "implements", "effects", "confirm")
+_ROLE = ("when", "offers", "priority", "utility", "cost", "implements", "effects", "confirm")
 """Fields of a plot's role as a candidate or planning action; a substitute without a role has the original's role."""
 
 

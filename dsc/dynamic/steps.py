@@ -49,9 +49,36 @@ class Plots(Protocol):
         """Yield all plots."""
         ...
 
+    def __contains__(self, name: object) -> bool:
+        """Return whether there is a plot of that name."""
+        ...
+
     def plot(self, name: str) -> ActionPlot:
         """Return the plot of that name; raise `UnknownNameError` if there is none."""
         ...
+
+
+def candidates_of(state: DynamicState, plots: Plots) -> list[ActionPlot]:
+    """Return the candidates of a dynamic state; a listed plot that is not installed is omitted (S0.4)."""
+    if state.offer is not None:
+        return [plot for plot in plots if state.offer in plot.offers]
+    return [plots.plot(name) for name in state.candidates if name in plots]
+
+
+def is_open(state: AnyState, plots: Plots) -> bool:
+    """Return whether plots that arrive later may become the content of a state, as data or as candidates."""
+    if isinstance(state, SubmachineState):
+        return state.use.startswith("?")
+    if not isinstance(state, DynamicState):
+        return False
+    return state.offer is not None or any(name not in plots for name in state.candidates)
+
+
+def offers_for(plot: ActionPlot, plots: Plots) -> list[ActionPlot]:
+    """Return the plots that the dynamic states of a plot find by what they offer."""
+    states = [state for _, state, _ in plot.walk()]
+    wanted = {state.offer for state in states if isinstance(state, DynamicState)}
+    return [one for one in plots if not wanted.isdisjoint(one.offers)]
 
 
 def outputs_of(state: AnyState, plots: Plots) -> Mapping[str, str] | None:
@@ -66,7 +93,7 @@ def outputs_of(state: AnyState, plots: Plots) -> Mapping[str, str] | None:
         return None if state.use.startswith("?") else _outputs(plots.plot(state.use))
     if not isinstance(state, DynamicState) or state.goal is not None:
         return {}
-    first, *others = [set(_outputs(plots.plot(name)).items()) for name in state.dynamic] or [set()]
+    first, *others = [set(_outputs(plot).items()) for plot in candidates_of(state, plots)] or [set()]
     return dict(sorted(first.intersection(*others)))
 
 
@@ -87,8 +114,8 @@ def outcomes_of(state: AnyState, plots: Plots) -> Outcomes:
     if not isinstance(state, DynamicState):
         return {}
     found: dict[str, Mapping[str, str] | None] = {}
-    for candidate in state.dynamic:
-        found.update(plots.plot(candidate).emits)
+    for candidate in candidates_of(state, plots):
+        found.update(candidate.emits)
     if state.goal is None:
         return {**found, NO_CANDIDATE: {}}
     return {**found, NO_PLAN: {"reason": "text", "kind": NO_PLAN_KINDS}, GAVE_UP: {"reason": "text"}}
@@ -120,7 +147,7 @@ def contents_of(step: Step, plots: Plots) -> list[ActionPlot]:
         UnknownNameError: the step refers to a missing plot.
     """
     if isinstance(step, DynamicState):
-        return [plots.plot(name) for name in step.dynamic]
+        return candidates_of(step, plots)
     return [] if step.use.startswith("?") else [plots.plot(step.use)]
 
 

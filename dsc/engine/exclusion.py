@@ -75,7 +75,7 @@ def with_end(
         now: second of run time.
     """
     is_failure = trigger in ended.emits or trigger in FAILURES or trigger == _TIMEOUT
-    if state.exclude is None or ended.name not in state.dynamic or not (is_failure or trigger == DONE):
+    if state.exclude is None or not state.admits(ended.name, ended.offers) or not (is_failure or trigger == DONE):
         return variables
     arguments = {parameter: values[parameter] for parameter in ended.parameters if parameter in values}
     before = failures_of(name, variables)

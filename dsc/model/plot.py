@@ -15,7 +15,7 @@ from dsc.model.declarations import PlotParameter, PlotVariable, TypeText
 from dsc.model.language import ConditionField, TermField, Written, constant
 from dsc.model.ranges import Who, refuse_change
 from dsc.model.reading import LOCATED, FormPath
-from dsc.model.rules import Handler, Rule, told_apart
+from dsc.model.rules import Handler, Names, Rule, told_apart
 from dsc.model.states import (
     AnyState,
     CompositeState,
@@ -68,6 +68,7 @@ class ActionPlot(Written):
         when: condition under which the plot fits as a candidate of a dynamic state (bottom-up, S0.4).
         priority, utility, cost: terms by which dynamic states may choose among candidates that fit, see `choose`
             of `DynamicState` (S0.14).
+        offers: names under which dynamic states find the plot as a candidate, see `Offers` (S0.4).
         implements: name of the planning action that the plot executes; both must have equal names of parameters.
         effects: treatment of the planning action's effects: `observed` before the next step, or `assumed`.
         confirm: seconds to wait until the effects are observed.
@@ -92,6 +93,7 @@ class ActionPlot(Written):
     priority: TermField | None = None
     utility: TermField | None = None
     cost: TermField | None = None
+    offers: Names = ()
     implements: str | None = None
     effects: Literal["observed", "assumed"] = "observed"
     confirm: float = Field(default=5.0, gt=0, strict=True)
@@ -201,7 +203,7 @@ class ActionPlot(Written):
         return next(state for found, state, _ in self.walk() if found == name)
 
     def uses(self) -> frozenset[str]:
-        """Return the names of all plots to which this plot refers."""
+        """Return the names of all plots to which this plot refers by name."""
         return frozenset(name for _, name in self.references())
 
     def references(self) -> Iterator[tuple[Path, str]]:
@@ -210,7 +212,7 @@ class ActionPlot(Written):
             if isinstance(state, SubmachineState) and not state.use.startswith("?"):
                 yield (*path, "use"), state.use
             elif isinstance(state, DynamicState):
-                yield from (((*path, "dynamic", number), name) for number, name in enumerate(state.dynamic))
+                yield from (((*path, "dynamic", number), name) for number, name in enumerate(state.candidates))
         for group, reactions in (("rules", [r.do for r in self.rules]), ("handlers", [h.do for h in self.handlers])):
             for number, do in enumerate(reactions):
                 if do.use is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
@@ -153,11 +153,22 @@ class Exclusion(Frozen):
     seconds: float = Field(gt=0, strict=True)
 
 
+class Offers(Frozen):
+    """The candidates of a dynamic state that declare themselves: all plots of the library that offer this name.
+
+    Attributes:
+        offers: the name that the candidates have in their own `offers`.
+    """
+
+    offers: str
+
+
 class DynamicState(State):
     """A state that chooses its content on its entry (S0.4), and may request the content from a planner (S0.12).
 
     Attributes:
-        dynamic: names of candidate plots, in order of preference; each candidate declares its condition in `when`.
+        dynamic: names of candidate plots, in order of preference; each candidate declares its condition in `when`. With
+            `Offers`, the candidates are the plots that offer a name, in the order of the library.
         choose: the choice among several candidates that fit (S0.14): the first one in `order`, the one of the largest
             `priority` or `utility`, or of the smallest `cost`; of equal ones the first.
         exclude: exclusion of candidates that have failed; by default none.
@@ -167,12 +178,26 @@ class DynamicState(State):
         budget: bounds of planning.
     """
 
-    dynamic: tuple[str, ...] = ()
+    dynamic: tuple[str, ...] | Offers = ()
     choose: Choice = "order"
     exclude: Exclusion | None = None
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
     goal: ConditionField | None = None
     budget: Budget = Budget()
+
+    @property
+    def candidates(self) -> tuple[str, ...]:
+        """The names of the candidates that the state lists; empty with `Offers`."""
+        return () if isinstance(self.dynamic, Offers) else self.dynamic
+
+    @property
+    def offer(self) -> str | None:
+        """The name that the candidates offer; `None` for a list of candidates."""
+        return self.dynamic.offers if isinstance(self.dynamic, Offers) else None
+
+    def admits(self, plot: str, offers: Container[str]) -> bool:
+        """Return whether a plot of that name, which offers these names, is a candidate of the state."""
+        return self.offer in offers if isinstance(self.dynamic, Offers) else plot in self.dynamic
 
 
 class FinalState(Frozen):

@@ -9,6 +9,7 @@ from typing import Any
 
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
+from dsc.dynamic.steps import offers_for
 from dsc.engine.machine_state import MachineState
 from dsc.errors import ChangedError
 from dsc.events import Event
@@ -178,6 +179,7 @@ def _reachable(first: str, library: Library) -> set[str]:
         found.add(name)
         plot = library.plot(name)
         agenda += plot.uses()
+        agenda += [one.name for one in offers_for(plot, library)]
         states = [state for _, state, _ in plot.walk()]
         if any(isinstance(state, DynamicState) and state.goal is not None for state in states):
             agenda.append(ACHIEVE)

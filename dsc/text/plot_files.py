@@ -57,15 +57,15 @@ def plot_to_yaml(plot: ActionPlot) -> str:
 
 _ORDER = (
     "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs",
-    "receives", "emits", "seconds", "set", "switch", "send", "to", "pass", "before", "when", "utility", "cost", "of",
-    "interrupt", "listen", "trigger", "use", "dynamic", "choose", "exclude", "assign", "tell", "emit", "command",
-    "with", "as", "within", "goal", "budget", "clear", "do", "then", "limit", "rule", "choice", "select", "cases",
-    "else", "entry", "at_least", "initial", "final", "states", "regions", "on", "after", "every", "always", "exit",
-    "on_break", "rules", "handlers",
+    "receives", "emits", "seconds", "set", "switch", "send", "to", "pass", "before", "when", "offers", "utility",
+    "cost", "of", "interrupt", "listen", "trigger", "use", "dynamic", "choose", "exclude", "assign", "tell", "emit",
+    "command", "with", "as", "within", "goal", "budget", "clear", "do", "then", "limit", "rule", "choice", "select",
+    "cases", "else", "entry", "at_least", "initial", "final", "states", "regions", "on", "after", "every", "always",
+    "exit", "on_break", "rules", "handlers",
 )  # fmt: skip
 """Keys of a plot file in the order in which they are written."""
 _SINGLE = frozenset({
-    "entry", "exit", "on_break", "before", "after", "every", "always", "event", "clear", "command",
+    "entry", "exit", "on_break", "before", "after", "every", "always", "event", "clear", "command", "offers",
 })  # fmt: skip
 """Keys of lists that may be written as their only element; `event` stands for the transitions of an event."""
 _NAMES = {
@@ -157,10 +157,10 @@ class Neighbours:
 
 
 def _holding(texts: dict[Path, str | InputError], names: set[str], *, actions: bool) -> Iterator[Path]:
-    """Yield the files whose text may contain a plot in `names` or, with `actions`, an implementation of an action."""
+    """Yield the files that may contain a plot in `names` or, with `actions`, one that implements or offers anything."""
     for file, text in texts.items():
         if isinstance(text, str) and (
-            not names.isdisjoint(_DECLARES.findall(text)) or (actions and "implements" in text)
+            not names.isdisjoint(_DECLARES.findall(text)) or (actions and ("implements" in text or "offers" in text))
         ):
             yield file
 

@@ -111,7 +111,9 @@ def _title(name: str, state: AnyState) -> str:
             return f"{name} ^{event}"
         case SubmachineState(use=use):
             return f"{name} = {use}"
-        case DynamicState(dynamic=candidates):
+        case DynamicState(offer=str(offer)):
+            return f"{name} = one that offers {offer}"
+        case DynamicState(candidates=candidates):
             return f"{name} = one of {', '.join(candidates) or 'the planned plots'}"
         case _:
             return name

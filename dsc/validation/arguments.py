@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from dsc.dynamic.steps import Step, concerns, contents_of, entered_by
+from dsc.dynamic.steps import Step, concerns, contents_of, entered_by, is_open
 from dsc.errors import Finding
 from dsc.model.actions import Assign, ExternalAction, Internal, flat
 from dsc.model.declarations import PlotParameter
@@ -162,7 +162,7 @@ def _known(subject: Subject, state: Step, given: Iterable[str], path: Path) -> I
     if isinstance(state, SubmachineState):
         for used in contents:
             yield from _unknown(subject, used, given, path)
-    else:
+    elif not is_open(state, subject.library):  # a candidate that arrives later may have the parameter
         message = "no candidate has a parameter '{}'"
         yield from _untaken(subject, contents, given, path, "candidates-conform", message)
 

@@ -7,6 +7,7 @@ from itertools import combinations
 
 from dsc.data_types import data_type
 from dsc.dynamic.library import Library
+from dsc.dynamic.steps import candidates_of
 from dsc.errors import Finding
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import DynamicState
@@ -42,9 +43,9 @@ Conditions = Mapping[str, Expression]
 def review_candidates(subject: Subject) -> Iterator[Finding]:
     """Yield warnings about the candidates of dynamic states, and about the candidates for steps of plans."""
     for name, state, path in subject.steps:
-        if not isinstance(state, DynamicState) or len(state.dynamic) > MOST:
+        plots = candidates_of(state, subject.library) if isinstance(state, DynamicState) else []
+        if not isinstance(state, DynamicState) or len(plots) > MOST:
             continue
-        plots = [subject.library.plot(one) for one in state.dynamic]
         yield from _without_score(subject, name, state, path, plots)
         conditions = {plot.name: _condition(plot, state.arguments) for plot in plots}
         for message in (*_never_chosen(conditions, state), *_overlapping(conditions, state)):

@@ -8,13 +8,13 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 from dsc.dynamic.responses import limit_of
-from dsc.dynamic.steps import Step, answerable, answers_in_plans, concerns, is_planned, outcomes_of
+from dsc.dynamic.steps import Step, answerable, answers_in_plans, concerns, is_open, is_planned, outcomes_of
 from dsc.errors import Finding
 from dsc.events import DONE, EXECUTIVES, NO_CANDIDATE, RESERVED, SKILL_FAILURES, TIMERS
 from dsc.model.actions import Trigger
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.rules import GIVE_UP, RESUME, Rule
-from dsc.model.states import AnyState, FinalState, State, SubmachineState
+from dsc.model.states import AnyState, FinalState, State
 from dsc.model.transitions import Connector
 from dsc.validation.reach import check_completion, circle_of
 from dsc.validation.rules import unknown_skill
@@ -141,7 +141,9 @@ def _outcomes(
             why, fix = _not_always(subject.plot, event)
             message = f"state '{name}' may not handle its outcome '{event}': {why}"
         else:
-            message = f"state '{name}' does not handle its outcome '{event}'"
+            sources = subject.contents(name) if is_open(subject.state(name), subject.library) else []
+            whose = "".join(f" of plot '{one.name}'" for one in sources if event in one.emits)
+            message = f"state '{name}' does not handle its outcome '{event}'{whose}"
             fix = f"add `{event}: STATE` under `on`, or a rule"
         yield subject.finding((*path, "on", event), "every-outcome-is-wired", message, fix)
 
@@ -246,7 +248,7 @@ def skill_events(state: State, skills: Skills, pattern: str | None = None) -> se
 
 
 def _known_events(subject: Subject, state: State, path: Path, traffic: _Traffic) -> Iterator[Finding]:
-    if isinstance(state, SubmachineState) and state.use.startswith("?"):
+    if is_open(state, subject.library):  # its plot is known later, and may fire the event
         return
     if subject.skills is None and any(isinstance(a, Trigger) for a in state.entry):
         return

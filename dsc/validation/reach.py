@@ -8,7 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 from itertools import chain
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.steps import Step, concerns
+from dsc.dynamic.steps import Step, candidates_of, concerns
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model.actions import Trigger
@@ -77,7 +77,7 @@ def check_reach(subject: Subject) -> Iterator[Finding]:
     """
     yield from _circle(subject)
     for name, state, path in subject.steps:
-        if isinstance(state, DynamicState) and not state.dynamic and state.goal is None:
+        if isinstance(state, DynamicState) and not state.candidates and state.offer is None and state.goal is None:
             message = f"the dynamic state '{name}' has nothing to choose from"
             fix = "name candidates, or a `goal`"
             yield subject.finding((*path, "dynamic"), "something-to-choose", message, fix)
@@ -177,7 +177,7 @@ def check_completion(subject: Subject, wired: Mapping[str, AnyState]) -> Iterato
         after = wired[name]
         if not isinstance(after, State):
             continue
-        if DONE not in after.on and _completes(state, silent):
+        if DONE not in after.on and _completes(state, subject.library, silent):
             message = f"state '{name}' does not handle its completion"
             yield subject.finding((*path, "on"), "completion-is-wired", message, "add `done: STATE` under `on`")
         elif isinstance(state, State) and DONE in state.on and (endless := _endless(state, subject.library)):
@@ -185,12 +185,12 @@ def check_completion(subject: Subject, wired: Mapping[str, AnyState]) -> Iterato
             yield subject.finding((*path, "on", DONE), "done-can-fire", message, "remove `done`, or add an end")
 
 
-def _completes(state: AnyState, silent: Callable[[str], bool]) -> bool:
+def _completes(state: AnyState, library: Library, silent: Callable[[str], bool]) -> bool:
     match state:
         case SubmachineState(use=use):
             return use.startswith("?") or silent(use)
-        case DynamicState(dynamic=candidates, goal=goal):
-            return goal is not None or any(map(silent, candidates))
+        case DynamicState():
+            return state.goal is not None or any(silent(one.name) for one in candidates_of(state, library))
         case CompositeState(states=inside):
             return _has_end(inside)
         case OrthogonalState(regions=regions):
@@ -213,8 +213,9 @@ def _endless(state: State, library: Library) -> str | None:
             return next(endless, None)
         case SubmachineState(use=use):
             return None if use.startswith("?") or _has_end(library.plot(use).states) else f"plot '{use}'"
-        case DynamicState(dynamic=candidates, goal=None):
-            return None if any(_has_end(library.plot(one).states) for one in candidates) else "each candidate"
+        case DynamicState(goal=None):
+            candidates = candidates_of(state, library)
+            return "each candidate" if candidates and not any(_has_end(one.states) for one in candidates) else None
         case _:
             return None
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 
-from dsc.dynamic.steps import answerable
+from dsc.dynamic.steps import answerable, candidates_of
 from dsc.engine.situation import asked_states
 from dsc.engine.tables import compile_plot
 from dsc.errors import Finding
@@ -122,9 +123,15 @@ def _uses(subject: Subject, state: AnyState, path: Path) -> Iterator[Finding]:
     elif isinstance(state, SubmachineState) and state.use not in library:
         yield subject.unknown_plot((*path, "use"), state.use)
     elif isinstance(state, DynamicState):
-        for number, name in enumerate(state.dynamic):
+        for number, name in enumerate(state.candidates):
             if name not in library:
-                yield subject.unknown_plot((*path, "dynamic", number), name)
+                yield _missing_candidate(subject, state, (*path, "dynamic", number), name)
+
+
+def _missing_candidate(subject: Subject, state: DynamicState, path: Path, name: str) -> Finding:
+    """Return the finding about a listed candidate that is not installed: an error only if it leaves no candidate."""
+    finding = subject.unknown_plot(path, name)
+    return replace(finding, level="warning") if candidates_of(state, subject.library) else finding
 
 
 def _histories(subject: Subject) -> Iterator[Finding]:

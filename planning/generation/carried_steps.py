@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dsc.dynamic.library import Library
+from dsc.dynamic.steps import offers_for
 from dsc.events import SKILL_FAILURES
 from dsc.model.actions import Configure, Switch, Trigger, component_of, flat
 from dsc.model.plot import ActionPlot
@@ -68,7 +69,8 @@ def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] =
         plot = waiting.pop()
         if plot.name not in found:
             found[plot.name] = plot
-            waiting += [library.plot(name) for name in sorted(plot.uses())]
+            waiting += [library.plot(name) for name in sorted(plot.uses()) if name in library]
+            waiting += offers_for(plot, library)
     actions = [action for plot in found.values() for action in _actions(plot)]
     actions += [one for rule in applied for one in rule.do.command if isinstance(one, Configure | Switch)]
     names = {name for action in actions if (name := component_of(action)) is not None}

@@ -364,7 +364,7 @@ class _Robot:
         if plot is None or not isinstance(first, DynamicState) or first.goal is None:
             return None, None
         place = plot.place(("states", initial_of(plot), "goal"))
-        if not first.dynamic:
+        if not first.candidates and first.offer is None:
             return first.goal, place
         values = {name: one.default for name, one in plot.parameters.items()}
         values |= {name: one.initial for name, one in plot.variables.items()}

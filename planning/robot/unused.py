@@ -27,7 +27,7 @@ def quoted_names(sources: Iterable[str]) -> frozenset[str]:
 def unused_plots(plots: Collection[ActionPlot], main: str | None, quoted: Collection[str]) -> Iterator[Finding]:
     """Yield a warning for each candidate, a plot with `when`, that implements no action and is named nowhere else.
 
-    A plot without `when` may be run by its name.
+    A plot without `when` may be run by its name, and one with `offers` may be found by a plot that arrives later.
 
     Args:
         plots: the plots of the robot.
@@ -37,7 +37,7 @@ def unused_plots(plots: Collection[ActionPlot], main: str | None, quoted: Collec
     words = {plot.name: {text for _, text in _texts(plot.to_form())} for plot in plots}
     for plot in plots:
         others = set[str]().union(*(found for name, found in words.items() if name != plot.name))
-        is_candidate = plot.when is not None and plot.implements is None
+        is_candidate = plot.when is not None and plot.implements is None and not plot.offers
         if is_candidate and plot.name not in {main, *quoted, *others}:
             message = f"nothing chooses the plot '{plot.name}', which has a condition `when`"
             error = SchemaError(message, place=plot.place(("plot",)), found=plot.name)

@@ -146,7 +146,6 @@ def test_what_the_macrostep_told_counts_for_the_choice(kb):
 @pytest.mark.parametrize(
     ("dynamic", "candidate"),
     [
-        ("dynamic: [nowhere]", ANYHOW),
         ("dynamic: [anyhow], with: {item: ?nope}", ANYHOW),
         ("dynamic: [anyhow]", ANYHOW),
         ("dynamic: [above]", ABOVE),
