@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from dsc.engine.plot_changes import ActivePlots
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
+from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
 from knowledge_base.facts import Delta, Value
 
@@ -80,6 +82,19 @@ class WireMessage:
 
 
 @dataclass(frozen=True, slots=True)
+class PlotsMessage:
+    """A change of the plots of a run.
+
+    Attributes:
+        plots: the new plots by name; `None` removes a plot.
+        active: the treatment of running plots that are replaced, see `ActivePlots`.
+    """
+
+    plots: Mapping[str, ActionPlot | None]
+    active: ActivePlots
+
+
+@dataclass(frozen=True, slots=True)
 class LateMessage:
     """A message from outside that was scheduled; `number` distinguishes it from other scheduled messages."""
 
@@ -87,7 +102,7 @@ class LateMessage:
     number: int
 
 
-FromOutside = Event | KnowledgeMessage | ParameterMessage | WireMessage
+FromOutside = Event | KnowledgeMessage | ParameterMessage | WireMessage | PlotsMessage
 """Messages from outside of the run."""
 Message = SkillMessage | TimerMessage | FromOutside | LateMessage | SendLater
 """Messages that the sequencer handles; a `SendLater` is the chart's own delayed event."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from copy import copy
 from typing import Any
 
 from dsc.annotations import FoundRecords, add_records
@@ -36,6 +37,7 @@ class Library:
     Attributes:
         records: the records that types of plots may name: those that plots or components declare.
         conversions: the functions that terms of the plots may call.
+        changes: the number of changes of the plots.
     """
 
     def __init__(self, plots: Iterable[ActionPlot] = (), conversions: Iterable[Conversion[..., Any]] = ()) -> None:
@@ -44,6 +46,7 @@ class Library:
         self._bound: dict[str, CompiledPlot] = {}
         self._made: dict[str, ActionPlot] = {}
         self.records: FoundRecords = {}
+        self.changes = 0
         self.conversions = conversions_by_name(conversions)
         for one in self.conversions.values():
             self.declare(one.records)
@@ -52,6 +55,11 @@ class Library:
             raise InputError(f"a library is made of a list of plots, not of {shown(plots)[:60]}")
         for plot in plots:
             self.add(plot)
+
+    @property
+    def plots(self) -> Mapping[str, ActionPlot]:
+        """The plots by name; a change replaces this mapping, so that caches may identify the content by it."""
+        return self._plots
 
     def __iter__(self) -> Iterator[ActionPlot]:
         """Yield all plots, in the order in which they were added."""
@@ -74,9 +82,39 @@ class Library:
             raise SchemaError(
                 f"two different plots are named '{plot.name}'", place=plot.place(("plot",)), found=plot.name
             )
-        self.declare(plot.types)
-        self._plots[plot.name] = plot
+        self.change({plot.name: plot})
+
+    def copy(self) -> Library:
+        """Return a library with the same plots and tables; later changes of one of the two leave the other unchanged.
+
+        Both share records and conversions.
+        """
+        return copy(self)  # `change` replaces the mappings that both share
+
+    def change(self, plots: Mapping[str, ActionPlot | None]) -> None:
+        """Install, replace and remove plots by name; `None` removes a plot. Running plots keep their tables.
+
+        Raises:
+            SchemaError: a plot declares a record of the library with other fields.
+        """
+        for plot in plots.values():
+            if plot is not None:
+                self.declare(plot.types)
+        present = {**self._plots, **plots}
+        self._plots = {name: plot for name, plot in present.items() if plot is not None}
         self._received = None
+        self.changes += 1
+        if self._compiled or self._bound:
+            named = self._compiled.items()
+            self._compiled = {name: one for name, one in named if self._stays(self._plots.get(name), one)}
+            self._bound = {key: one for key, one in self._bound.items() if self._stays(_read(json.loads(key)), one)}
+
+    def _stays(self, plot: ActionPlot | None, compiled: CompiledPlot) -> bool:
+        """Return whether the tables of a plot still express its expansion."""
+        try:
+            return plot is not None and self.expanded(plot) == compiled.plot
+        except InputError:
+            return False
 
     def declare(self, records: Records) -> None:
         """Add records; raise `SchemaError` for a second record of one name with other fields."""
@@ -106,30 +144,21 @@ class Library:
             UnknownNameError: the library has no plot of that name.
             SchemaError: a host state of the old plot could not contain the new plot; see `substitute_for`.
         """
-        other = substitute_for(self.plot(name), plot)
-        return self._with(other if own.name == name else own for own in self)
+        other = self.copy()
+        other.change({name: substitute_for(self.plot(name), plot)})
+        return other
 
     def with_default(self, plot: str, name: str, value: object, who: Who) -> Library:
         """Return a new library in which a plot's parameter has another default, set by the role `who`.
 
-        The new library shares the tables of all other plots.
+        Both share the tables of all other plots.
 
         Raises:
             UnknownNameError: the library has no such plot, or the plot has no such parameter.
             InputError: the value does not fit the parameter, or `who` may not set the parameter.
         """
-        changed = self.plot(plot).with_default(name, value, who)
-        other = self._with(changed if own.name == plot else own for own in self)
-        compiled = {known: tables for known, tables in self._compiled.items() if known != plot}
-        other._compiled, other._bound, other._made = compiled, self._bound, self._made  # noqa: SLF001  # a library, too
-        return other
-
-    def _with(self, plots: Iterable[ActionPlot]) -> Library:
-        """Return a library of other plots with the same records and conversions."""
-        other = Library((), self.conversions.values())
-        other.records = self.records
-        for plot in plots:
-            other.add(plot)
+        other = self.copy()
+        other.change({plot: self.plot(plot).with_default(name, value, who)})
         return other
 
     def expanded(self, plot: ActionPlot) -> ActionPlot:

@@ -78,6 +78,13 @@ class Execution:
             self._enter(frame, entrance, NOTHING)
         return frame
 
+    def restart_plot(self, before: Frame, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> Frame:
+        """Exit a running plot, enter another one in its place, and return the frame; errors as for `enter_plot`."""
+        fill_parameters(compiled, arguments, self.performer.situation)  # an error leaves the running plot unchanged
+        self.leave_plot(before)
+        before.take_out()
+        return self.enter_plot(compiled, arguments, before.parent, before.host)
+
     def leave_plot(self, frame: Frame) -> None:
         """Exit all states of a plot and of its inner plots."""
         self._exit(frame, leaving_reaction(frame.configuration).exits)
@@ -227,7 +234,7 @@ class Execution:
                 if before is None:
                     self.enter_plot(compiled, passed, frame, name)
                 else:
-                    self._replace_plot(before, compiled, passed)
+                    self.replace_plot(before, compiled, passed, _shared(before, compiled))
                     before = None
             elif isinstance(state, DynamicState):
                 self._bind_decision(frame, name, self._decided(frame, name, state, passed))
@@ -244,17 +251,31 @@ class Execution:
             if event not in edges:
                 raise SchemaError(f"state '{name}' does not handle '{event}' of plot '{inside.plot.name}'", found=event)
 
-    def _replace_plot(self, before: Frame, compiled: CompiledPlot, arguments: Mapping[str, Any]) -> None:
-        """Enter a plot in place of another one; activated states that both have continue, and the others are exited.
+    def replace_plot(
+        self,
+        before: Frame,
+        compiled: CompiledPlot,
+        arguments: Mapping[str, Any],
+        shared: Collection[str],
+        serial: int | None = None,
+    ) -> Frame:
+        """Enter a plot in place of a running one, and return its frame.
 
-        Variables that both plots have keep their values.
+        Variables and outputs that both plots have with one type keep their values.
+
+        Args:
+            before: the running plot.
+            compiled: the new plot.
+            arguments: values for the parameters of the new plot, by name.
+            shared: names of active states that continue in the new plot; the others are exited.
+            serial: number of the new plot instance; by default a new one.
+
+        Raises:
+            InputError: the arguments do not fit the parameters.
         """
         performer, parent = self.performer, before.parent
-        assert parent is not None  # noqa: S101  # only the plot inside a state is replaced
         variables = dict(fill_parameters(compiled, arguments, performer.situation))
-        kept = [name for name in compiled.plot.variables if name in before.compiled.plot.variables]
-        variables.update({name: before.variables[name] for name in kept})
-        shared = _shared(before, compiled)
+        variables.update(_kept_values(before, compiled))
         targets = _together(compiled, [compiled.index[name] for name in shared])
         reaction = continuing_reaction(compiled, targets)
         staying = {one.node.name for one in reaction.parts[0].entrances if one.node.name in shared}
@@ -262,17 +283,19 @@ class Execution:
         before.gone = True
         self._exit(before, [one for one in exits if one.node.name not in staying])
         now = before.frozen()
-        performer.bound.append(PlotBound(parent.prefix + before.host, compiled.plot))
-        performer.serials += 1
+        performer.bound.append(PlotBound("" if parent is None else parent.prefix + before.host, compiled.plot))
+        if serial is None:
+            serial = performer.serials = performer.serials + 1
         activations = {name: serial for name, serial in now.activations.items() if name in staying}
         children = {host: inner for host, inner in now.children.items() if host in staying}
         events = tuple([one for one in now.kept if one[0] in staying])
         configuration = _continuing(reaction.following, before, staying)
-        state = FrameState(performer.serials, compiled, configuration, variables, activations, children, events)
+        state = FrameState(serial, compiled, configuration, variables, activations, children, events)
         frame = Frame(state, parent, before.host)
         for entrance in reaction.parts[0].entrances:
             if entrance.node.name not in staying:
                 self._enter(frame, entrance, NOTHING)
+        return frame
 
     def _decided(self, frame: Frame, name: str, state: DynamicState, passed: Mapping[str, Any]) -> Decision:
         bindings = self.performer.bindings(frame)
@@ -316,6 +339,15 @@ class Execution:
             self.performer.internal.append(Event(DONE_STATE + node.name, outputs, frame=frame.serial))
         elif DONE in node.edges:
             self.performer.internal.append(Event(DONE, outputs, to=frame.activations[node.name], exact=True))
+
+
+def _kept_values(before: Frame, compiled: CompiledPlot) -> dict[str, Any]:
+    """Return the values that a plot keeps in its replacement: of variables and outputs, and failures of candidates."""
+    own, known = before.compiled.plot, compiled.types
+    declared = {**own.variables, **own.outputs}
+    kept = {name: before.variables[name] for name, one in declared.items() if known.get(name) == one.type}
+    others = before.variables.keys() - declared.keys() - own.parameters.keys()
+    return {**kept, **{name: before.variables[name] for name in before.variables if name in others}}
 
 
 def _shared(before: Frame, compiled: CompiledPlot) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from dsc.engine.machine_state import NOTHING, FrameState, MachineState, idle_state
 from dsc.engine.macrostep import Macrostep
+from dsc.engine.plot_changes import ActivePlots, keep_plots
 from dsc.engine.reaction import CompiledReaction
 from dsc.engine.reaction_choice import Choice, Question
 from dsc.engine.situation import Chart, Situation
@@ -112,6 +113,30 @@ class Machine:
     def send(self, event: Event | None, situation: Situation) -> Step:
         """React to one event and store the new state; see `step`."""
         done = step(self.chart, self.state, event, situation)
+        self.state = done.state
+        return done
+
+    def replace_plots(
+        self, library: Chart, before: Mapping[str, Mapping[str, Any]], active: ActivePlots, situation: Situation
+    ) -> Step:
+        """Apply a change of plots to the running ones, and store the new state.
+
+        Args:
+            library: provider of the plots after the change.
+            before: the written forms of the changed plots before the change, by name.
+            active: the treatment of the running ones.
+            situation: the knowledge that conditions and terms read.
+
+        Raises:
+            InputError: a running plot cannot continue, or a parameter of a new plot has no value; the state stays.
+        """
+        form = self.state.to_json()
+        if form["root"] is None:
+            return Step(self.state, None, handled=False)
+        state = MachineState.from_json({**form, "root": keep_plots(form["root"], before)}, library)
+        done = Step(state, None, handled=True)
+        if active != "at_next_entry":
+            done = Macrostep(self.chart, situation, state).replace_plots(before, active)
         self.state = done.state
         return done
 

@@ -317,7 +317,8 @@ def _paths(frame: FrameState, prefix: str) -> Iterator[str]:
 
 def _frame_of(form: _FrameForm, chart: Chart) -> FrameState:
     compiled = chart.compiled(form.plot) if form.form is None else chart.bind(form.form)
-    index = {node.name: node.index for node in compiled.nodes[1:]}  # the data identify a region by its name `#index`
+    index = {node.name: node.index for node in compiled.nodes[1:]}
+    index.update({f"#{node.index}": node.index for node in compiled.nodes if node.state is None})  # in older stores
 
     def placed(names: Iterable[str]) -> tuple[int, ...]:
         unknown = next((name for name in names if name not in index), None)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 from itertools import repeat
+from operator import attrgetter
 from typing import Any
 
 from dsc.engine.execution import Execution
 from dsc.engine.frames import Frame
 from dsc.engine.machine_state import FrameState, MachineState, configuration_of, idle_state
 from dsc.engine.performing import Performer
+from dsc.engine.plot_changes import ActivePlots, replace_plots
 from dsc.engine.reaction import CompiledReaction, ReactionPart, reaction_of, report
 from dsc.engine.reaction_choice import Question, choice_of, settled
 from dsc.engine.situation import Chart, Situation
@@ -26,6 +28,7 @@ from knowledge_base.language.syntax.expression import Expression
 
 MAX_MICROSTEPS = 1000
 """Upper bound of microsteps in one macrostep; a longer macrostep raises `RunawayError`."""
+_is_spontaneous = attrgetter("configuration.spontaneous")
 
 
 class Macrostep:
@@ -65,6 +68,13 @@ class Macrostep:
             self._next_period(event)
         self._rest()
         return self._step(event, handled=handled)
+
+    def replace_plots(self, names: Collection[str], active: ActivePlots) -> Step:
+        """Replace the running plots of these names, and run to completion; errors as for the function."""
+        self._root = replace_plots(self._root, self._execution, names, active)
+        if self._performer.bound:
+            self._performer.end_microstep(None, ())
+        return self.react(None)
 
     def entry_messages(self) -> tuple[SendMessage, ...]:
         """Return the messages that the entry of the active states would send; those without a value are omitted."""
@@ -283,10 +293,6 @@ class Macrostep:
 
 def _is_frame(serial: int | None) -> Callable[[Frame | FrameState], bool]:
     return lambda one: one.serial == serial
-
-
-def _is_spontaneous(one: Frame | FrameState) -> bool:
-    return one.configuration.spontaneous
 
 
 def _part_of(one: Enabled, reaction: CompiledReaction) -> ReactionPart:

@@ -81,7 +81,7 @@ class StateNode:
 
     Attributes:
         index: position of the node in document order.
-        name: name of the state; `#index` for a region.
+        name: name of the state; `#STATE:REGION` for a region.
         around: indices of the outer nodes, innermost first, with the plot last.
         last: index of the last node inside this node; `index` if there is none.
         children: indices of the nodes directly inside.
@@ -271,7 +271,7 @@ class _Layout:
 
     def _add_regions(self, node: StateNode, state: states.OrthogonalState) -> None:
         for name, region in state.regions.items():
-            inner = self._append(f"#{len(self.nodes)}", node, None)
+            inner = self._append(f"#{node.name}:{name}", node, None)
             # SCXML has no element for regions: a region with the name of its only state stands for this state.
             inner.transparent = self._scxml and [*region.states] == [name]
             self._add_states(inner, region)

@@ -6,8 +6,6 @@ one time, by its hash; `{"$form": hash}` replaces each occurrence.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from typing import Any
@@ -22,11 +20,13 @@ from dsc.messages import (
     LateMessage,
     Message,
     ParameterMessage,
+    PlotsMessage,
     SkillMessage,
     TimerMessage,
     WireMessage,
 )
 from dsc.outcomes import Outcome
+from dsc.runs.hashed_forms import Shortener, full, full_value, plot_hashes, plots_of_hashes
 from dsc.runs.tables import Form
 from dsc.skills import SkillSignature
 from knowledge_base.exchange import delta_form, delta_of
@@ -37,44 +37,8 @@ Awaited = Start | StartTimer | SendLater | LateMessage | SetParameter | SwitchMo
 A parameter or mode is effective until it is set again. A message is pending until the component has received it.
 """
 
-_BY_HASH = "$form"
-_MOST_REMEMBERED = 256
 _VISIBILITY = Event._fields[2:]
 _PUBLIC = [Event._field_defaults[name] for name in _VISIBILITY]
-
-
-class Shortener:
-    """Function that replaces plots by hashes; `put` receives the hash and text of each new plot."""
-
-    def __init__(self, put: Callable[[str, str], None]) -> None:
-        self._put = put
-        self._known: dict[int, tuple[Any, str]] = {}  # by identity; the kept value prevents a reuse of its id
-
-    def __call__(self, values: Mapping[str, Any]) -> Form:
-        """Return the values, with plots replaced by hashes."""
-        return {name: self.short(value) if isinstance(value, dict) else value for name, value in values.items()}
-
-    def short(self, value: Any) -> Any:
-        """Return the hash form of a plot, or any other value unchanged."""
-        if not isinstance(value, Mapping) or not ({"plot", "states"} <= value.keys() or _BY_HASH in value):
-            return value
-        return self.reference(value)
-
-    def reference(self, value: Mapping[str, Any]) -> Form:
-        """Store plain data, and return their hash form."""
-        return {_BY_HASH: self.hash(value)}
-
-    def hash(self, value: Mapping[str, Any]) -> str:
-        """Store a plot, or other plain data, and return its hash."""
-        known = self._known.get(id(value))
-        if known is None:
-            text = json.dumps(value)  # the order of states is significant
-            known = value, hashlib.sha256(text.encode()).hexdigest()
-            self._put(known[1], text)
-            if len(self._known) >= _MOST_REMEMBERED:
-                self._known.clear()
-            self._known[id(value)] = known
-        return known[1]
 
 
 SKILLS = "skills"
@@ -92,17 +56,8 @@ def _signature_form(skill: SkillSignature) -> Form:
 
 def signatures_in(header: Mapping[str, Any], form: Callable[[str], Any]) -> list[SkillSignature] | None:
     """Return the deployed skills in a run's header; `None` if it has none."""
-    forms = _full(header.get(SKILLS), form)
+    forms = full_value(header.get(SKILLS), form)
     return None if forms is None else [SkillSignature(**one) for one in forms.values()]
-
-
-def full(values: Mapping[str, Any], form: Callable[[str], Any]) -> Form:
-    """Return the values with hashes replaced by plots; `form` returns the plot of a hash."""
-    return {name: _full(value, form) for name, value in values.items()}
-
-
-def _full(value: Any, form: Callable[[str], Any]) -> Any:
-    return form(value[_BY_HASH]) if isinstance(value, dict) and _BY_HASH in value else value
 
 
 # -- messages ------------------------------------------------------------------------------------------------
@@ -111,7 +66,7 @@ def _full(value: Any, form: Callable[[str], Any]) -> Any:
 def message_form(message: Message, short: Shortener) -> Form:
     """Return a message as plain data; a skill's message refers to its action by the id."""
     match message:
-        case Event() | KnowledgeMessage() | ParameterMessage() | WireMessage():
+        case Event() | KnowledgeMessage() | ParameterMessage() | WireMessage() | PlotsMessage():
             return _outside_form(message, short)
         case SkillMessage():
             outcome = message.outcome
@@ -160,6 +115,8 @@ def _outside_form(message: FromOutside, short: Shortener) -> Form:
             return {"set": _plain(message)}
         case WireMessage():
             return {"wire": _plain(message)}
+        case PlotsMessage():
+            return {"plots": plot_hashes(message.plots, short), "active": message.active}
 
 
 def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOutside:
@@ -170,6 +127,8 @@ def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOuts
             return ParameterMessage(**setting)
         case {"wire": wire}:
             return WireMessage(**wire)
+        case {"plots": plots, "active": active}:
+            return PlotsMessage(plots_of_hashes(plots, find), active)
         case _:
             return _event_of(form["event"], find)
 
@@ -204,7 +163,7 @@ def awaited_of(  # noqa: PLR0911  a table by kind
         case "SendLater":
             return _later_of(form, find)
         case "SetParameter":
-            return SetParameter(**{**form, "value": _full(form["value"], find)})
+            return SetParameter(**{**form, "value": full_value(form["value"], find)})
         case "StartTimer":
             return StartTimer(**form)
         case "SwitchMode":
@@ -282,7 +241,7 @@ def frame_form(serial: int, frames: Mapping[int, Form], find: Callable[[str], An
     """Return the frame with that serial number and all frames inside it, in the form of `FrameState.to_json`."""
     form = dict(frames[serial])
     form["children"] = {host: frame_form(child, frames, find) for host, child in form["children"].items()}
-    form["form"] = _full(form["form"], find)
+    form["form"] = full_value(form["form"], find)
     form["variables"] = full(form["variables"], find)
     return form
 

@@ -18,6 +18,7 @@ from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, SubmachineState
 from dsc.runs.archive import RunArchive, RunRow
 from dsc.runs.encoding import Awaited, awaited_of, events_of, frame_form
+from dsc.runs.hashed_forms import plots_of_hashes
 from dsc.runs.tables import SnapshotRow
 from dsc.trace import Record
 from knowledge_base.errors import Place
@@ -65,6 +66,7 @@ class Kept:
         programming_error: as in `Reactor`.
         outputs: as in `Reactor`.
         settings: the values of `Reactor.settings`.
+        plots: as in `Reactor`.
         pending: pending items, in the order of their requests.
         memory: memories of components, by component name.
         records: trace records so far.
@@ -80,6 +82,7 @@ class Kept:
     programming_error: str | None
     outputs: Mapping[str, Any]
     settings: tuple[ParameterMessage, ...]
+    plots: Mapping[str, ActionPlot | None]
     pending: tuple[Pending, ...]
     memory: Mapping[str, Any]
     records: tuple[Record, ...]
@@ -117,6 +120,9 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
         )
         for place, row in rows
     ]
+    plots = plots_of_hashes(reactor.get("plots", {}), find)
+    library = library.copy()
+    library.change(plots)
     state = {"root": root, "serials": last.serials, "finished": reactor["finished"]}
     return Kept(
         run=run,
@@ -129,6 +135,7 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
         programming_error=reactor["programming_error"],
         outputs=reactor["outputs"],
         settings=tuple([ParameterMessage(**setting) for setting in reactor["settings"]]),
+        plots=plots,
         pending=tuple(pending),
         memory={name: json.loads(memory) for name, memory in now.memory.items()},
         records=tuple(record for step in steps for record in step.records),
@@ -136,8 +143,15 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
 
 
 def require_unchanged(runs: RunArchive, run: RunRow, library: Library, domain: Mapping[str, str]) -> None:
-    """Raise `ChangedError` if a plot that the run may use, or a definition, has changed since the run began."""
-    found = [*_changed_plots(runs, run, library), *_changed_statements(run.domain, domain)]
+    """Raise `ChangedError` if a plot that the run may use, or a definition, has changed since the run began.
+
+    A plot that the run itself has changed may also have the changed form.
+    """
+    plots = [*_changed_plots(runs, run, library, {})]
+    if plots:
+        own = plots_of_hashes(runs.latest_snapshot().reactor.get("plots", {}), runs.form)
+        plots = [*_changed_plots(runs, run, library, own)]
+    found = [*plots, *_changed_statements(run.domain, domain)]
     if found:
         raise ChangedError(found, place=Place(str(runs.path)))
 
@@ -147,21 +161,25 @@ def plots_of(runs: RunArchive, run: RunRow) -> Library:
     return Library(ActionPlot.model_validate(runs.form(digest)) for digest in run.plots.values())
 
 
-def _changed_plots(runs: RunArchive, run: RunRow, library: Library) -> Iterator[str]:
+def _changed_plots(
+    runs: RunArchive, run: RunRow, library: Library, own: Mapping[str, ActionPlot | None]
+) -> Iterator[str]:
+    """Yield the differences between the plots of a program and those of a run, which has itself changed `own`."""
     from dsc.text.plot_difference import differences  # noqa: PLC0415  loads the drawing, too; only a changed plot needs it
 
     before = plots_of(runs, run)
     reachable = _reachable(run.plot, before) | _reachable(run.plot, library)
     for plot in before:
-        if plot.name not in reachable:
+        present = library.plot(plot.name) if plot.name in library else None
+        if plot.name not in reachable or (plot.name in own and own[plot.name] == present):
             continue
-        if plot.name not in library:
+        if present is None:
             yield f"the plot '{plot.name}' is missing"
-        elif plot != library.plot(plot.name):
-            what = ", ".join(map(str, differences(plot, library.plot(plot.name))))
+        elif plot != present:
+            what = ", ".join(map(str, differences(plot, present)))
             yield f"the plot '{plot.name}' has changed: {what or 'its description'}"
     for plot in library:
-        if plot.name in reachable and plot.name not in before:
+        if plot.name in reachable and plot.name not in before and plot != own.get(plot.name):
             yield f"the plot '{plot.name}' is new"
 
 

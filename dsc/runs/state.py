@@ -28,12 +28,15 @@ from dsc.messages import (
     LateMessage,
     Message,
     ParameterMessage,
+    PlotsMessage,
     SkillMessage,
     TimerMessage,
     Told,
     WireMessage,
 )
-from dsc.runs.encoding import Awaited, Shortener, awaited_form, events_form, frame_news
+from dsc.model.plot import ActionPlot
+from dsc.runs.encoding import Awaited, awaited_form, events_form, frame_news
+from dsc.runs.hashed_forms import Shortener, plot_hashes
 from dsc.runs.kept import Kept
 from dsc.runs.tables import Form, SnapshotRow
 from dsc.trace import text_of
@@ -54,6 +57,7 @@ class ReactorState(Protocol):
         outputs: the outputs of the plot, after its end.
         finished: whether the plot has reached its final state without a problem.
         settings: an operator's settings of plot parameters, by plot and parameter.
+        plots: the plots that have changed since the start, by name; `None` for a removed plot.
         caused_by: numbers of the trace records about started skills, by action id.
     """
 
@@ -68,6 +72,7 @@ class ReactorState(Protocol):
     def finished(self) -> bool: ...  # noqa: D102  described above
 
     settings: dict[tuple[str, str], ParameterMessage]
+    plots: Mapping[str, ActionPlot | None]
     caused_by: dict[str, int]
 
 
@@ -125,6 +130,7 @@ class RunState:
         typed = tuple([(one, type(one.value)) for one in settings]) if settings else ()
         remembered = (
             serial, state.finished, frozenset(reactor.in_vain), reactor.problem, reactor.programming_error, typed,
+            reactor.plots,
         )  # fmt: skip
         if remembered != self._remembered or reactor.emitted is not self._emitted:
             self._remembered, self._emitted = remembered, reactor.emitted
@@ -152,7 +158,9 @@ class RunState:
     def take(self, message: Message) -> None:
         """Remove the pending item that the message ends, or count a report of it."""
         match message:
-            case Event() | KnowledgeMessage() | ParameterMessage() | WireMessage():  # no pending item waits for them
+            case (
+                Event() | KnowledgeMessage() | ParameterMessage() | WireMessage() | PlotsMessage()
+            ):  # no pending item waits for them
                 pass
             case SkillMessage(start=start, final=False, conflated=conflated):
                 for place in self._places.get(_key(start), ()):
@@ -298,6 +306,7 @@ def _reactor_form(reactor: ReactorState, short: Shortener) -> Form:
         "programming_error": reactor.programming_error,
         "outputs": dict(reactor.outputs),
         "settings": [asdict(one) for one in reactor.settings.values()],
+        "plots": plot_hashes(reactor.plots, short),
     }
 
 

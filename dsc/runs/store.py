@@ -15,7 +15,8 @@ from dsc.dynamic.library import Library
 from dsc.engine.steps import Output, SendMessage, Start
 from dsc.messages import LateMessage, Message, Told
 from dsc.runs.archive import RunArchive, archive, unfinished
-from dsc.runs.encoding import SKILLS, Shortener, message_form, signature_forms
+from dsc.runs.encoding import SKILLS, message_form, signature_forms
+from dsc.runs.hashed_forms import Shortener
 from dsc.runs.kept import Kept, read, require_unchanged
 from dsc.runs.state import ReactorState, RunState
 from dsc.runs.tables import CHAIN, FORMAT, TABLES, require_tables_of_runs

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, get_args
 
 from dsc.calls import OBSERVED, RECORDED
 from dsc.components.component import Component
@@ -13,6 +13,7 @@ from dsc.components.hooks import is_own, running_task
 from dsc.components.wiring import required_port
 from dsc.data_types import WORDS, Records, check_all, data_type, objects_in
 from dsc.dynamic.library import Library
+from dsc.engine.plot_changes import ActivePlots
 from dsc.engine.steps import NO_CHANGE, Start
 from dsc.events import NO_ATTRIBUTES, PROGRAMMING_ERROR, RESERVED, SKILL_ERROR, TIMED_OUT, Event
 from dsc.messages import KnowledgeMessage, ParameterMessage, SkillMessage, WireMessage
@@ -25,7 +26,7 @@ from dsc.skills import SkillSignature
 from dsc.trace import Trace
 from knowledge_base.errors import HistoryError, InputError, SchemaError, UnknownNameError, described
 from knowledge_base.facts import Delta
-from knowledge_base.language.checking.inputs import require, require_delta, require_text, shown
+from knowledge_base.language.checking.inputs import require, require_delta, require_several, require_text, shown
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.store import KnowledgeBase
 
@@ -327,6 +328,27 @@ def checked_setting(
         raise UnknownNameError(f"there is no component or plot '{owner}'", found=owner, valid=valid)
     assert value is None or isinstance(value, str | int | float | bool)  # noqa: S101  # as every value of a range is
     return ParameterMessage(owner, name, value, of_plot=owner not in components)
+
+
+def plots_by_name(plots: object) -> dict[str, ActionPlot]:
+    """Return one plot, or several plots, by name; raise `InputError` for any other value, or two of one name."""
+    several = [plots] if isinstance(plots, ActionPlot) else plots
+    require_several(several, "the plots")
+    assert isinstance(several, Iterable)  # noqa: S101  # as required
+    found: dict[str, ActionPlot] = {}
+    for plot in several:
+        require(plot, ActionPlot, "a plot is an ActionPlot, as load_plot and parse_plot give it")
+        if plot.name in found:
+            raise SchemaError(f"two plots are named '{plot.name}'", found=plot.name)
+        found[plot.name] = plot
+    return found
+
+
+def require_active(active: object) -> None:
+    """Raise `InputError` for an unknown treatment of running plots."""
+    valid = get_args(ActivePlots)
+    if active not in valid:
+        raise UnknownNameError(f"`active` is one of {', '.join(valid)}", found=str(active), valid=valid)
 
 
 def checked_wire(port: str, to: str | None, components: Mapping[str, Component]) -> WireMessage:

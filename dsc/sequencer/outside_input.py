@@ -1,15 +1,20 @@
-"""Input from outside of a run: events, changes of knowledge, an operator's settings and wires."""
+"""Input from outside of a run: events, changes of knowledge and of plots, an operator's settings and wires."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from threading import Lock
 
 from dsc.dynamic.library import Library
+from dsc.engine.plot_changes import ActivePlots
 from dsc.events import Event
-from dsc.messages import FromOutside
+from dsc.messages import FromOutside, PlotsMessage
+from dsc.model.plot import ActionPlot
 from dsc.sequencer import message_checks
 from dsc.sequencer.dispatcher import Dispatcher
-from knowledge_base.errors import InputError
+from dsc.validation import raise_findings, validate_library
+from knowledge_base.errors import InputError, SchemaError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 
@@ -21,6 +26,11 @@ class OutsideInput(ABC):
     knowledge: KnowledgeBase
     dispatcher: Dispatcher
     _over: bool
+
+    def __init__(self) -> None:
+        self.check_plots: Callable[[Library], None] = self._require_valid
+        self._changes: list[PlotsMessage] = []  # handed in and not taken yet
+        self._handing_in = Lock()
 
     @abstractmethod
     def _hand_in(self, message: FromOutside, after: float) -> None:
@@ -95,3 +105,79 @@ class OutsideInput(ABC):
             StoreError: the store cannot be written.
         """
         self._hand_in(message_checks.checked_wire(port, to, self.dispatcher.components), after)
+
+    def install(self, plots: ActionPlot | Iterable[ActionPlot]) -> None:
+        """Install plots in the run, from any thread (S0.19); later entries of its states may use them.
+
+        All plots of the run are checked together as before a run. A store keeps the plots.
+
+        Raises:
+            SchemaError: the run has a plot of this name.
+            PlotError: the plots do not pass the validator; the run is unchanged.
+            InputError: a value is not a plot, or the run has ended.
+        """
+        new = message_checks.plots_by_name(plots)
+        with self._handing_in:
+            library = self._coming()
+            for name in new:
+                if name in library:
+                    raise SchemaError(f"there is already a plot '{name}': `replace` replaces it", found=name)
+            self._hand_in_plots(library, PlotsMessage(new, "at_next_entry"))
+
+    def replace(self, plots: ActionPlot | Iterable[ActionPlot], *, active: ActivePlots = "at_next_entry") -> None:
+        """Replace plots of the run by others of the same names, from any thread (S2.8).
+
+        A change with which a running plot cannot continue, e.g. as a parameter has no value, is refused when the run
+        takes it; the record `plots` then has the reason. A replaced plot has the defaults of the new plot.
+
+        Args:
+            plots: the new plots.
+            active: the treatment of running plots, see `ActivePlots`.
+
+        Raises:
+            UnknownNameError: the run has no plot of this name.
+            PlotError: the plots do not pass the validator; the run is unchanged.
+            InputError: a value is not a plot, `active` is unknown, or the run has ended.
+        """
+        message_checks.require_active(active)
+        new = message_checks.plots_by_name(plots)
+        with self._handing_in:
+            library = self._coming()
+            for name in new:
+                library.plot(name)
+            self._hand_in_plots(library, PlotsMessage(new, active))
+
+    def remove(self, *names: str) -> None:
+        """Remove plots from the run, from any thread; running ones end as usual.
+
+        Raises:
+            UnknownNameError: the run has no plot of this name.
+            PlotError: another plot needs a plot of this name; the run is unchanged.
+            InputError: the run has ended.
+        """
+        with self._handing_in:
+            library = self._coming()
+            for name in names:
+                library.plot(name)
+            self._hand_in_plots(library, PlotsMessage(dict.fromkeys(names), "at_next_entry"))
+
+    def _coming(self) -> Library:
+        """Return a copy of the plots after all changes that were handed in."""
+        if self._over:
+            raise InputError("the run has ended and receives nothing")
+        library = self.library.copy()
+        for message in self._changes:
+            library.change(message.plots)
+        return library
+
+    def _hand_in_plots(self, library: Library, message: PlotsMessage) -> None:
+        library.change(message.plots)
+        self.check_plots(library)
+        self._changes.append(message)
+        self._hand_in(message, 0.0)
+
+    def _require_valid(self, library: Library) -> None:
+        """Raise `PlotError` if plots do not fit each other, the knowledge, or the deployed components."""
+        dispatcher = self.dispatcher
+        declared = {name: one.interface() for name, one in dispatcher.components.items()}
+        raise_findings(validate_library(library, self.knowledge.schema, dispatcher.skills(), declared))

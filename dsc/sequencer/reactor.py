@@ -32,10 +32,12 @@ from dsc.messages import (
     LateMessage,
     Message,
     ParameterMessage,
+    PlotsMessage,
     SkillMessage,
     TimerMessage,
     WireMessage,
 )
+from dsc.model.plot import ActionPlot
 from dsc.runs.kept import Kept
 from dsc.sequencer.checked_plots import CheckedPlots
 from dsc.sequencer.phase_watch import PhaseWatch, described
@@ -63,7 +65,7 @@ class Reactor:
     """Executor of one macrostep for each message, in a live run and in the replay of a recorded run.
 
     Args:
-        library: the plots.
+        library: the plots at the start of the run.
         knowledge: the world model.
         trace: receives the records.
         phases: measures the phases of a macrostep.
@@ -71,6 +73,8 @@ class Reactor:
 
     Attributes:
         machine: the chart's state.
+        library: the present plots of the run.
+        plots: the plots that have changed since the start, by name; `None` for a removed plot.
         emitted: the latest outcome events of the plot, in order, see `MOST_EMITTED`.
         problem: the reason to end the run, or the error of its last step; `None` without either.
         programming_error: the programming error that is this reason, else `None`.
@@ -95,10 +99,11 @@ class Reactor:
     ) -> None:
         self._phases = phases or PhaseWatch()
         self._run = run
-        self.library = library
+        self.library = library.copy()
+        self.plots: Mapping[str, ActionPlot | None] = {}
         self.knowledge = knowledge
         self._skills: Collection[SkillSignature] | None = None
-        self.machine = Machine(CheckedPlots(library, knowledge.schema))
+        self.machine = Machine(CheckedPlots(self.library, knowledge.schema))
         self.trace = trace
         self.tracer = StepTracer(trace)
         trace.blame = lambda error: self._note(error, "a listener of the trace")
@@ -119,11 +124,13 @@ class Reactor:
     def know_skills(self, skills: Collection[SkillSignature] | None) -> None:
         """Check plots given as data also against the deployed skills; `None` if they are unknown."""
         self._skills = skills
-        self._check_with(self.library)
+        self._change_library({})
 
-    def _check_with(self, library: Library) -> None:
-        self.library = library
-        self.machine.chart = CheckedPlots(library, self.knowledge.schema, self._skills)
+    def _change_library(self, plots: Mapping[str, ActionPlot | None]) -> None:
+        """Change the plots of the library; plots given as data are checked again."""
+        if plots:
+            self.library.change(plots)
+        self.machine.chart = CheckedPlots(self.library, self.knowledge.schema, self._skills)
 
     def restore(self, kept: Kept) -> None:
         """Restore the state after the last macrostep of an interrupted run."""
@@ -133,6 +140,8 @@ class Reactor:
         self.problem = kept.problem
         self.programming_error = kept.programming_error
         self.outputs = kept.outputs
+        self.plots = kept.plots
+        self._change_library(kept.plots)
         for setting in kept.settings:
             self._set_default(setting)
         self.caused_by = {one.what.action_id: one.cause for one in kept.pending if isinstance(one.what, Start)}
@@ -188,10 +197,13 @@ class Reactor:
         try:
             event = self._received(message)
             before, began = self.machine.state, self._phases.timer()
-            step = self.machine.send(event, KnowledgeSituation(self.knowledge, self.library, self.moment))
+            said = message.message if isinstance(message, LateMessage) else message
+            if isinstance(said, PlotsMessage):
+                step = self._change_plots(said)
+            else:
+                step = self.machine.send(event, KnowledgeSituation(self.knowledge, self.library, self.moment))
             if self._phases.timer() - began > self._phases.limit:
                 self._phases.report(step, self._phases.timer() - began)
-            said = message.message if isinstance(message, LateMessage) else message
             if isinstance(said, ParameterMessage) and not said.of_plot:
                 step = step._replace(output=(SetParameter(said.owner, said.name, said.value), *step.output))
             elif isinstance(said, WireMessage):
@@ -254,7 +266,7 @@ class Reactor:
                 self._set_default(message)
                 self.trace.cause = self.tracer.set_default(message)
             return None
-        if isinstance(message, WireMessage):
+        if isinstance(message, WireMessage | PlotsMessage):
             self.trace.cause = None
             return None
         if isinstance(message, TimerMessage):
@@ -269,7 +281,25 @@ class Reactor:
     def _set_default(self, setting: ParameterMessage) -> None:
         """Change the default of a plot's parameter for later entries."""
         self.settings[setting.owner, setting.name] = setting
-        self._check_with(self.library.with_default(setting.owner, setting.name, setting.value, "operator"))
+        plot = self.library.plot(setting.owner).with_default(setting.name, setting.value, "operator")
+        self._change_library({setting.owner: plot})
+
+    def _change_plots(self, message: PlotsMessage) -> Step:
+        """Change the plots of the run; a change with which a running plot cannot continue is refused."""
+        situation = KnowledgeSituation(self.knowledge, self.library, self.moment)
+        before = {name: self.library.plot(name) if name in self.library else None for name in message.plots}
+        forms = {name: plot.to_form() for name, plot in before.items() if plot is not None}
+        self._change_library(message.plots)
+        try:
+            step = self.machine.replace_plots(self.library, forms, message.active, situation)
+        except InputError as error:
+            self._change_library(before)
+            self.trace.cause = self.tracer.plots(message, before, str(error))
+            return Step(self.machine.state, None, handled=False)
+        self.plots = {**self.plots, **message.plots}
+        self.settings = {key: one for key, one in self.settings.items() if key[0] not in message.plots}
+        self.trace.cause = self.tracer.plots(message, before)
+        return step
 
     def _due(self, message: TimerMessage) -> Event:
         self.trace.cause = None

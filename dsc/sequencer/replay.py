@@ -9,7 +9,8 @@ from pathlib import Path
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output, Start
 from dsc.runs.archive import RunArchive, RunRow, StepRow, archive
-from dsc.runs.encoding import full, message_of, signatures_in
+from dsc.runs.encoding import message_of, signatures_in
+from dsc.runs.hashed_forms import full
 from dsc.runs.kept import plots_of
 from dsc.sequencer.reactor import Reactor
 from dsc.trace import Trace, text_of

@@ -15,7 +15,7 @@ from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output, Start
 from dsc.errors import ProgrammingError
-from dsc.messages import FromOutside, KnowledgeMessage, LateMessage, Message, SkillMessage
+from dsc.messages import FromOutside, KnowledgeMessage, LateMessage, Message, PlotsMessage, SkillMessage
 from dsc.run_log import logged_run
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
@@ -45,7 +45,7 @@ class Sequencer(OutsideInput):
     """Executor of one plot, from its start to its end.
 
     Args:
-        library: all plots that the run may use.
+        library: all plots that the run may use; later changes of it concern later runs.
         knowledge: the world model. Only the plot's `tell`s, observations of components, and changes from outside modify
             it.
         components: the components, whose names plots use.
@@ -87,17 +87,18 @@ class Sequencer(OutsideInput):
         failures: Collection[str] = (),
     ) -> None:
         message_checks.require_parts(library, knowledge, clock, trace, store)
-        self.library = library
+        super().__init__()
         self.knowledge = knowledge
         self.trace = trace or Trace(clock.now)
         self._reactor: Reactor = Reactor(library, knowledge, self.trace, phases, run="" if clock.simulated else run_id)
+        self.library = self._reactor.library
         self.clock = clock
         self.store = store
         self.on_signal: OnSignal = "suspend"
         if store is not None:
             self.trace.listen(store.receive)
         self._inbox = Inbox()
-        self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id, library)
+        self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id, self.library)
         self._tracer = ComponentTracer(self.trace, self.dispatcher.wiring, self.dispatcher.activation)
         self._open_ended = open_ended
         self._over = False
@@ -411,6 +412,8 @@ class Sequencer(OutsideInput):
         elif isinstance(message, SkillMessage):
             self.dispatcher.report_taken(message.start)
         self.dispatcher.dispatch_all(output)
+        if isinstance(message, PlotsMessage):
+            self._changes.pop(0)
 
     def _validated(self, message: SkillMessage) -> SkillMessage:
         return message_checks.validated_in_world(message, self.knowledge, self.dispatcher.signature)

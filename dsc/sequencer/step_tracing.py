@@ -8,7 +8,8 @@ from typing import Any
 from dsc.engine import steps
 from dsc.engine.machine_state import FrameState
 from dsc.events import Event
-from dsc.messages import ParameterMessage
+from dsc.messages import ParameterMessage, PlotsMessage
+from dsc.model.plot import ActionPlot
 from dsc.sequencer.relay import InnerRun
 from dsc.trace import Record, Trace
 from knowledge_base.exchange import delta_form, schema_form, world_form
@@ -154,6 +155,15 @@ class StepTracer:
     def set_default(self, setting: ParameterMessage) -> int:
         """Record an operator's setting of a plot's parameter; return the number of the record."""
         return self._trace.record("action", action="set", port=f"{setting.owner}.{setting.name}", value=setting.value)
+
+    def plots(self, message: PlotsMessage, before: Mapping[str, ActionPlot | None], refused: str | None = None) -> int:
+        """Record a change of plots, whose former versions are `before`; return the number of the record."""
+        changed: dict[str, list[str]] = {"installed": [], "replaced": [], "removed": []}
+        for name, plot in message.plots.items():
+            kind = "removed" if plot is None else "installed" if before[name] is None else "replaced"
+            changed[kind].append(name)
+        how = {} if refused is None else {"refused": refused}
+        return self._trace.record("plots", **{k: v for k, v in changed.items() if v}, active=message.active, **how)
 
     def started(self, start: steps.Start) -> int:
         """Record the start of a skill; return the number of the record."""

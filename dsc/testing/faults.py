@@ -30,6 +30,7 @@ from dsc.messages import (
     LateMessage,
     Message,
     ParameterMessage,
+    PlotsMessage,
     SkillMessage,
     TimerMessage,
     WireMessage,
@@ -308,7 +309,7 @@ def _source(message: Message) -> str:
             return f"author {message.author}"
         case TimerMessage() | SendLater():
             return "timers"
-        case ParameterMessage() | WireMessage():
+        case ParameterMessage() | WireMessage() | PlotsMessage():
             return "operator"
         case Event():
             return "outside"

@@ -164,7 +164,7 @@ class Carrier:
 
     def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule]) -> None:
         self._domain = domain
-        self._library = library
+        self._library = library.copy()
         self.rules = tuple(rules)
         self._usage: dict[tuple[str, ...], Usage] = {}  # most steps share their candidates
         self._carried: dict[tuple[PlanStep, tuple[str, ...]], CarriedStep] = {}
@@ -172,9 +172,9 @@ class Carrier:
     @staticmethod
     def of(domain: PlanningDomain, library: Library, rules: Sequence[Rule]) -> Carrier:
         """Return the carrier of the last plan if the rules are equal, since successive plans share most steps."""
-        known = _carriers.find(domain, library)
+        known = _carriers.find(domain, library.plots)
         if known is None or known.rules != tuple(rules):
-            known = _carriers.keep(domain, library, Carrier(domain, library, rules))
+            known = _carriers.keep(domain, library.plots, Carrier(domain, library, rules))
         return known
 
     def carried(self, step: PlanStep) -> CarriedStep:
@@ -183,7 +183,7 @@ class Carrier:
         Raises:
             UnknownNameError: no plot implements the action, or a plot uses a missing plot.
         """
-        plots = implementing(step, self._library)  # a library may grow, but its plots never change
+        plots = implementing(step, self._library)
         key = step, tuple([plot.name for plot in plots])
         known = self._carried.get(key)
         if known is None:

@@ -137,10 +137,9 @@ class RobotProgram:
         self._started = 0
         self._closed = False
         self.origin = origin
-        skills = [s for c in self.components for s in c.skills().values()]
-        skills += signatures(PlanningComponent, PlanningComponent.name).values()
-        schema = self.domain.schema if knowledge is None else knowledge.schema
-        require_sound(self.library, self.domain, schema, skills, interfaces(self.components))
+        self._schema = self.domain.schema if knowledge is None else knowledge.schema
+        self._require_sound(self.library)
+        self._checked = self.library.changes
         if knowledge is not None:
             self.knowledge = knowledge
         else:  # last, since the caller must close an opened knowledge base
@@ -181,6 +180,18 @@ class RobotProgram:
             configure(parts, profile)
             how["wiring"] |= profile.wiring
         return cls(domain_of(found), known, parts, **how)
+
+    def _require_sound(self, library: Library) -> None:
+        """Raise `PlotError` if plots do not fit each other, the domain, or the components."""
+        skills = [one for component in self.components for one in component.skills().values()]
+        skills += signatures(PlanningComponent, PlanningComponent.name).values()
+        require_sound(library, self.domain, self._schema, skills, interfaces(self.components))
+
+    def _check_added_plots(self) -> None:
+        """Raise `PlotError` if plots that were added since the last check are invalid."""
+        if self.library.changes != self._checked:
+            self._require_sound(self.library)
+            self._checked = self.library.changes
 
     @property
     def name(self) -> str:
@@ -241,6 +252,7 @@ class RobotProgram:
         self, run: str, clock: LoopClock, last: int, store: RunStore | None, *, open_ended: bool, until: float | None
     ) -> tuple[Sequencer, PlanningComponent]:
         """Return a sequencer for the run of that id, with its planning component; `last` is the last kept record."""
+        self._check_added_plots()
         trace = Trace(clock.now, last)
         for listener in self._listeners:
             trace.listen(listener)
@@ -249,8 +261,9 @@ class RobotProgram:
             self.library, self.knowledge, components, clock, trace, open_ended=open_ended, store=store,
             until=math.inf if until is None else until, failures=self.failures, run_id=run,
         )  # fmt: skip
+        sequencer.check_plots = self._require_sound
         planning = PlanningComponent(
-            self.domain, self.library, self.knowledge, self.planner_for(clock), clock, trace,
+            self.domain, sequencer.library, self.knowledge, self.planner_for(clock), clock, trace,
             components=sequencer.dispatcher.components, working_for=sequencer.working_for,
             goals=lambda: self.goals, parallel=self._parallel,
             shared=[component.name for component in components if component.concurrent],

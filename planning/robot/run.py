@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Generator, Mapping
+from collections.abc import Callable, Coroutine, Generator, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Self
 
 from dsc.calls import Outputs
+from dsc.engine.plot_changes import ActivePlots
 from dsc.events import Event
+from dsc.model.plot import ActionPlot
 from dsc.sequencer.run_end import RunEnd
 from dsc.sequencer.sequencer import Sequencer
 from dsc.trace import Listener, Record
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from planning.execution.planning_component import PlanningComponent
+from planning.robot.bundles import Bundle
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +119,18 @@ class Run(Generic[Outputs]):
     def wire(self, port: str, to: str | None, *, after: float = 0.0) -> None:
         """Wire a required port to another provider; errors as for `Sequencer.wire`."""
         self._sequencer.wire(port, to, after=after)
+
+    def install(self, plots: Bundle | ActionPlot | Iterable[ActionPlot]) -> None:
+        """Install plots, or those of a bundle, in the run; errors as for `Sequencer.install`."""
+        self._sequencer.install(plots.plots if isinstance(plots, Bundle) else plots)
+
+    def replace(self, plots: ActionPlot | Iterable[ActionPlot], *, active: ActivePlots = "at_next_entry") -> None:
+        """Replace plots of the run; errors as for `Sequencer.replace`."""
+        self._sequencer.replace(plots, active=active)
+
+    def remove(self, *names: str) -> None:
+        """Remove plots from the run; errors as for `Sequencer.remove`."""
+        self._sequencer.remove(*names)
 
     def cancel(self, reason: str) -> Self:
         """End the run after its exit actions; its end has the reason as its problem. `await` the returned run."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from dsc.components.declarations import Parameter, Type
 from dsc.dynamic.library import Library
+from dsc.events import NO_CANDIDATE
 from dsc.model.plot import ActionPlot
 from dsc.model.ranges import may_change
 from dsc.run_log import run_logger
@@ -52,6 +53,10 @@ def defaults_of(plots: Iterable[ActionPlot]) -> dict[str, Parameter]:
     return found
 
 
+NOTHING_FITS = "nothing_fits"
+"""The outcome of a plot for an action if the condition of no candidate is true."""
+
+
 def plots_of_actions(robot: Robot) -> dict[str, str]:
     """Return the actions by the plots that execute them; add a plot for each action that has several candidates.
 
@@ -73,18 +78,17 @@ def plots_of_actions(robot: Robot) -> dict[str, str]:
 def _choice(name: str, action: PlanningAction, candidates: Sequence[ActionPlot]) -> ActionPlot:
     """Return the plot that executes a planning action by one of its candidates."""
     emits = {event: attributes for plot in candidates for event, attributes in plot.emits.items()}
-    ways: dict[str, Any] = {"done": "over"}
+    ways: dict[str, Any] = {"done": "over", NO_CANDIDATE: {"to": "ended", "emit": NOTHING_FITS}}
     for event, attributes in emits.items():
         ways[event] = {"to": "ended", "emit": event, "with": {name: f"?event.{name}" for name in attributes or ()}}
     taken = {name: one.type for plot in candidates for name, one in plot.parameters.items()}
     names = [one.name for one in action.parameters]
     given = {name: f"?{name}" for name in names if name in taken}
     used = {"dynamic": [plot.name for plot in candidates], "with": given, "on": ways}
-    ended = {"ended": {"final": True}} if emits else {}
     parameters = {one.name: taken.get(one.name) or (one.types or (ROOT_TYPE,))[0] for one in action.parameters}
     return ActionPlot.model_validate({
-        "plot": name, "parameters": parameters, "emits": emits,
-        "states": {"choose": used, "over": {"final": True}, **ended},
+        "plot": name, "parameters": parameters, "emits": {**emits, NOTHING_FITS: None},
+        "states": {"choose": used, "over": {"final": True}, "ended": {"final": True}},
     })  # fmt: skip
 
 

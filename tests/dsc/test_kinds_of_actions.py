@@ -19,7 +19,8 @@ from dsc.messages import LateMessage
 from dsc.model.actions import ExternalAction, Internal
 from dsc.model.language import first_key
 from dsc.model.plot import ActionPlot
-from dsc.runs.encoding import Awaited, Shortener, awaited_form, awaited_of
+from dsc.runs.encoding import Awaited, awaited_form, awaited_of
+from dsc.runs.hashed_forms import Shortener
 from dsc.scxml.writer import to_scxml
 from dsc.text.plot_files import parse_plot, plot_to_yaml
 

@@ -9,18 +9,18 @@ import pytest
 
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
-from dsc.messages import KnowledgeMessage, LateMessage, ParameterMessage, SkillMessage, TimerMessage
+from dsc.messages import KnowledgeMessage, LateMessage, ParameterMessage, PlotsMessage, SkillMessage, TimerMessage
+from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
 from dsc.runs.encoding import (
-    Shortener,
     awaited_form,
     awaited_of,
     events_form,
     events_of,
-    full,
     message_form,
     message_of,
 )
+from dsc.runs.hashed_forms import Shortener, full
 from knowledge_base.facts import Delta, fact
 
 PLOT = {"plot": "made", "states": {}}
@@ -60,6 +60,7 @@ def test_a_plot_among_values_is_put_away_once_and_found_again(forms, short):
         Event("go"),
         Event("go", WITH_PLOT, to=3, exact=True, number=1, frame=2),
         KnowledgeMessage(TOLD, "eve"),
+        PlotsMessage({"made": ActionPlot.model_validate({"plot": "made", "states": {"s": {}}}), "gone": None}, "keep"),
         ParameterMessage("robot", "speed", 2.5, of_plot=False),
         SkillMessage(START, Outcome("did", WITH_PLOT, TOLD), final=True),
         SkillMessage(START, Outcome("progress"), final=False, conflated=4),

@@ -16,7 +16,8 @@ from dsc.engine.steps import Cancel, Revoke, SendLater, SetParameter, Start, Sta
 from dsc.events import Event
 from dsc.messages import ParameterMessage, SkillMessage, TimerMessage
 from dsc.outcomes import Outcome
-from dsc.runs.encoding import Shortener, frame_form
+from dsc.runs.encoding import frame_form
+from dsc.runs.hashed_forms import Shortener
 from dsc.runs.state import RunState
 from dsc.runs.tables import RunSnapshot, SnapshotRow, latest_snapshot
 
@@ -53,6 +54,7 @@ def reactor_of(machine):
         programming_error=None,
         outputs={},
         settings={},
+        plots={},
         caused_by={},
     )
 

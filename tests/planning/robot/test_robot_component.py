@@ -294,7 +294,7 @@ def test_a_state_becomes_the_plot_of_the_robot_that_its_parameter_names(which):
         plot: order
         parameters: {how: plot}
         states:
-          go: {use: ?how, with: {from: hall, to: lab}, on: {done: over}}
+          go: {use: ?how, with: {from: hall, to: lab}, on: {done: over, nothing_fits: over}}
           over: {final: true}
     """
     bases = {"helper": Base(), "other": Base()}
@@ -385,7 +385,7 @@ def test_a_cancelled_skill_ends_the_run_of_the_other_robot():
     order = """
         plot: order
         states:
-          go: {use: helper.drive, with: {from: hall, to: lab}, on: {done: over}, after: {seconds: 0.5, to: over}}
+          go: {use: helper.drive, with: {from: hall, to: lab}, on: {done: over, nothing_fits: over}, after: {seconds: 0.5, to: over}}
           over: {final: true}
     """
     end, records, _boss, helper = ran("order", base=base, plots=[parse_plot(order)])
