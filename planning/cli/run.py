@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from enum import StrEnum
 from functools import partial
 from math import inf
@@ -104,6 +104,9 @@ def run_command(
     monitor: Annotated[
         Path | None, typer.Option(help="Record the values that this monitoring profile (YAML) selects.")
     ] = None,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Change the plots of the run when their files change, for development.")
+    ] = False,
     view: Annotated[bool, typer.Option("--view", help="Show it in the browser while it runs.")] = False,
     port: Port = 0,
     no_open: NoOpen = False,
@@ -155,7 +158,7 @@ def run_command(
         robot = _robot(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
                              durability, target, planner, clock, wire)  # fmt: skip
     follow = partial(_followed, robot, speed=inf if speed is None else speed, until=until,
-                     on_signal=on_signal, quiet=json or quiet, trace=output)  # fmt: skip
+                     on_signal=on_signal, quiet=json or quiet, trace=output, watch=watch)  # fmt: skip
     with wire, robot:
         if monitored is not None:
             robot.monitor(monitored)
@@ -318,6 +321,7 @@ def _followed(
     on_signal: OnSignal,
     quiet: bool,
     trace: Output | None,
+    watch: bool,
     prepare: Callable[[Sequencer], None] | None = None,
 ) -> Report:
     """Run and return the report; print the progress unless `quiet`, and write the trace.
@@ -352,10 +356,26 @@ def _followed(
         if robot.clock == "real":
             stack.enter_context(settled())
             stack.enter_context(unawaited_coroutines())
+        if watch:
+            begin = stack.enter_context(_plot_watch(robot))
+            prepare = begin if prepare is None else partial(_both, prepare, begin)
         report = robot.report(speed=speed, until=until, on_signal=on_signal.value, prepare=prepare)
     if not quiet:
         typer.echo("")  # between the progress and the report
     return report
+
+
+def _plot_watch(robot: Robot) -> AbstractContextManager[Callable[[Sequencer], None]]:
+    """Return a context in which the runs of a robot receive the changes of its plot files."""
+    from planning.robot.plot_watch import PlotFiles, watched_files
+
+    files = PlotFiles(robot.library, None if robot.origin is None else robot.origin.profile)
+    return watched_files(files, partial(typer.echo, err=True))
+
+
+def _both(first: Callable[[Sequencer], None], second: Callable[[Sequencer], None], sequencer: Sequencer) -> None:
+    first(sequencer)
+    second(sequencer)
 
 
 def _print(report: Report, *, as_json: bool) -> None:

@@ -42,6 +42,11 @@ def is_profile(file: Path) -> bool:
     return _has_key(file, "profile") and not is_deployment(file)
 
 
+def is_plot(file: Path) -> bool:
+    """Return whether a file is a plot."""
+    return _has_key(file, "plot")
+
+
 def is_monitoring(file: Path) -> bool:
     """Return whether a file is a monitoring profile."""
     return _has_key(file, "monitor")
