@@ -166,7 +166,7 @@ class OutsideInput(ABC):
         if self._over:
             raise InputError("the run has ended and receives nothing")
         library = self.library.copy()
-        for message in self._changes:
+        for message in [*self._changes]:  # the run takes them in its own thread
             library.change(message.plots)
         return library
 

@@ -394,7 +394,7 @@ class Sequencer(OutsideInput):
         if isinstance(message, SkillMessage):
             message = self._validated(message)
         if self.store is None:
-            output = self._reactor.react(message)
+            output = self._react(message)
         else:
             with self.store.writing:
                 output = self._react_and_keep(message)
@@ -412,8 +412,6 @@ class Sequencer(OutsideInput):
         elif isinstance(message, SkillMessage):
             self.dispatcher.report_taken(message.start)
         self.dispatcher.dispatch_all(output)
-        if isinstance(message, PlotsMessage):
-            self._changes.pop(0)
 
     def _validated(self, message: SkillMessage) -> SkillMessage:
         return message_checks.validated_in_world(message, self.knowledge, self.dispatcher.signature)
@@ -431,8 +429,14 @@ class Sequencer(OutsideInput):
             return False
         return not self.machine.state.finished and self._reactor.problem is None and self._stopped is None
 
-    def _react_and_keep(self, message: Message) -> tuple[Output, ...]:
+    def _react(self, message: Message) -> tuple[Output, ...]:
         output = self._reactor.react(message)
+        if isinstance(message, PlotsMessage):
+            self._changes.pop(0)
+        return output
+
+    def _react_and_keep(self, message: Message) -> tuple[Output, ...]:
+        output = self._react(message)
         self._keep_step(message, output)
         return output
 

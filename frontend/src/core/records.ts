@@ -166,6 +166,14 @@ export interface ObservationRec extends Rec {
   readonly value: Value;
 }
 
+/** A change of the plots of a run. */
+export interface PlotsRec extends Rec {
+  readonly installed?: readonly string[];
+  readonly replaced?: readonly string[];
+  readonly removed?: readonly string[];
+  readonly refused?: string;
+}
+
 export interface EventRec extends Rec {
   readonly name: string;
   readonly source: string;

@@ -2,7 +2,7 @@
 
 import { Fragment } from "react";
 import { endWords } from "../core/ends";
-import { written, type ActionRec, type ComponentRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named, type ObservationRec,
+import { written, type ActionRec, type ComponentRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named, type ObservationRec, type PlotsRec,
   type PlanBrokenRec, type PlanAskedRec, type PlanFoundRec, type PlanNoneRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
 import type { Damaged } from "../core/sound";
 import { wordsIn } from "../core/words";
@@ -43,6 +43,7 @@ function inWords(rec: Rec): string {
       const { component, entry, value: seen } = rec as ObservationRec;
       return `${component}.${entry}: ${jsonOf(seen)}`;
     }
+    case "plots": return changeOfPlots(rec as PlotsRec);
     case "scene": return `${(rec as SceneRec).things.length} things`;
     case "plan.ordered": return `${(rec as PlanFoundRec).plot}, ${(rec as PlanFoundRec).steps.length} steps`;
     case "plan.asked": return `planning … ${shortGoal(rec as PlanAskedRec)}`;
@@ -61,6 +62,12 @@ function inWords(rec: Rec): string {
 function componentNews({ component, wires, waits }: ComponentRec): string {
   if (wires) return Object.entries(wires).map(([port, provider]) => wired(`${component}.${port}`, provider)).join(", ");
   return waits ? `${component} waits: ${waits}` : `${component} waits no longer`;
+}
+
+function changeOfPlots({ installed = [], replaced = [], removed = [], refused }: PlotsRec): string {
+  const parts = Object.entries({ installed, replaced, removed }).filter(([, names]) => names.length);
+  const change = parts.map(([what, names]) => `${what} ${names.join(", ")}`).join("; ");
+  return refused === undefined ? change : `${change}: refused, ${refused}`;
 }
 
 function wired(port: string, provider: string | null): string {

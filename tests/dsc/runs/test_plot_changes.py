@@ -13,6 +13,7 @@ from dsc import Component, Outcome, SkillCall, has_run, is_unfinished, parse_plo
 from dsc.testing import Crashes, one_history, replays, violations
 from dsc.trace import Record
 from knowledge_base.errors import InputError
+from knowledge_base.facts import Delta, fact
 from planning import Bundle, Robot
 
 DOMAIN = "(define (domain d) (:predicates (p)))"
@@ -376,6 +377,26 @@ def test_a_run_that_is_killed_and_resumed_has_an_equal_end(seed, tmp_path):
 
 def entered(records: list[Record]) -> list[tuple[float, str]]:
     return [(one.t, path) for one in records if one.type == "step" for path in one.data.get("entered", ())]
+
+
+def test_changes_that_share_a_commit_with_other_messages_are_known(tmp_path):
+    robot, records = robot_of(store=tmp_path / "run.kb")
+
+    async def main() -> None:
+        run = robot.start("main")
+        await asyncio.sleep(0.5)
+        run.install(parse_plot(JOB))
+        run.change(Delta(added=(fact("p"),)), "test")
+        await asyncio.sleep(0.5)
+        run.remove("job")
+        run.change(Delta(removed=(fact("p"),)), "test")
+        await asyncio.sleep(0.5)
+        run.install(parse_plot(JOB))
+        await run
+
+    with robot:
+        run_simulated(main())
+    assert [next(iter(one.data)) for one in records if one.type == "plots"] == ["installed", "removed", "installed"]
 
 
 def test_a_kept_run_is_resumed_by_a_program_with_the_changed_plots(tmp_path):
