@@ -104,10 +104,9 @@ class Library:
         self._plots = {name: plot for name, plot in present.items() if plot is not None}
         self._received = None
         self.changes += 1
-        if self._compiled or self._bound:
-            named = self._compiled.items()
-            self._compiled = {name: one for name, one in named if self._stays(self._plots.get(name), one)}
-            self._bound = {key: one for key, one in self._bound.items() if self._stays(_read(json.loads(key)), one)}
+        named, bound = self._compiled.items(), self._bound.items()  # copies keep these mappings
+        self._compiled = {name: one for name, one in named if self._stays(self._plots.get(name), one)}
+        self._bound = {key: one for key, one in bound if self._stays(_read(json.loads(key)), one)}
 
     def _stays(self, plot: ActionPlot | None, compiled: CompiledPlot) -> bool:
         """Return whether the tables of a plot still express its expansion."""
