@@ -37,7 +37,6 @@ class Library:
     Attributes:
         records: the records that types of plots may name: those that plots or components declare.
         conversions: the functions that terms of the plots may call.
-        changes: the number of changes of the plots.
     """
 
     def __init__(self, plots: Iterable[ActionPlot] = (), conversions: Iterable[Conversion[..., Any]] = ()) -> None:
@@ -46,7 +45,6 @@ class Library:
         self._bound: dict[str, CompiledPlot] = {}
         self._made: dict[str, ActionPlot] = {}
         self.records: FoundRecords = {}
-        self.changes = 0
         self.conversions = conversions_by_name(conversions)
         for one in self.conversions.values():
             self.declare(one.records)
@@ -103,7 +101,6 @@ class Library:
         present = {**self._plots, **plots}
         self._plots = {name: plot for name, plot in present.items() if plot is not None}
         self._received = None
-        self.changes += 1
         named, bound = self._compiled.items(), self._bound.items()  # copies keep these mappings
         self._compiled = {name: one for name, one in named if self._stays(self._plots.get(name), one)}
         self._bound = {key: one for key, one in bound if self._stays(_read(json.loads(key)), one)}

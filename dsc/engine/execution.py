@@ -286,7 +286,7 @@ class Execution:
         performer.bound.append(PlotBound("" if parent is None else parent.prefix + before.host, compiled.plot))
         if serial is None:
             serial = performer.serials = performer.serials + 1
-        activations = {name: serial for name, serial in now.activations.items() if name in staying}
+        activations = {name: own for name, own in now.activations.items() if name in staying}
         children = {host: inner for host, inner in now.children.items() if host in staying}
         events = tuple([one for one in now.kept if one[0] in staying])
         configuration = _continuing(reaction.following, before, staying)
@@ -346,8 +346,8 @@ def _kept_values(before: Frame, compiled: CompiledPlot) -> dict[str, Any]:
     own, known = before.compiled.plot, compiled.types
     declared = {**own.variables, **own.outputs}
     kept = {name: before.variables[name] for name, one in declared.items() if known.get(name) == one.type}
-    others = before.variables.keys() - declared.keys() - own.parameters.keys()
-    return {**kept, **{name: before.variables[name] for name in before.variables if name in others}}
+    failures = {name: one for name, one in before.variables.items() if name not in {*declared, *own.parameters}}
+    return {**kept, **failures}
 
 
 def _shared(before: Frame, compiled: CompiledPlot) -> list[str]:

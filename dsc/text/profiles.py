@@ -91,10 +91,11 @@ def adapted(plots: Iterable[ActionPlot], profile: Profile | None = None) -> tupl
     for name in profile.plots:
         if name not in names:
             raise unknown_in(profile, "plots", "plot", name, names)
-    return tuple(_adapted(plot, profile) for plot in plots)
+    return tuple(with_profile(plot, profile) for plot in plots)
 
 
-def _adapted(plot: ActionPlot, profile: Profile) -> ActionPlot:
+def with_profile(plot: ActionPlot, profile: Profile) -> ActionPlot:
+    """Return one plot with the profile's values as defaults of its parameters; errors as for `adapted`."""
     for name, value in profile.plots.get(plot.name, {}).items():
         try:
             plot = plot.with_default(name, value, "profile")

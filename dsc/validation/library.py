@@ -35,11 +35,10 @@ def validate_library(
     skills: Iterable[SkillSignature] | None,
     components: Components | None = None,
 ) -> list[Finding]:
-    """Return the findings about the plots of a library that people wrote; see `validate_plot`."""
+    """Return the findings about all plots of a library; see `validate_plot`."""
     _require_parts(library, schema)
     known = None if skills is None else _known(skills)
-    plots = [plot for plot in library if not plot.generated]
-    return [finding for plot in plots for finding in validate_plot(plot, library, schema, known, components)]
+    return [finding for plot in library for finding in validate_plot(plot, library, schema, known, components)]
 
 
 def validate_plot(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from threading import Event, Thread
@@ -12,9 +12,9 @@ from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.sequencer import Sequencer
 from dsc.text.plot_files import parse_plot
-from dsc.text.profiles import Profile, adapted
+from dsc.text.profiles import Profile, with_profile
 from knowledge_base.errors import InputError
-from planning.robot.project_files import is_plot, text_of
+from planning.robot.project_files import YAML, plot_name, text_of
 
 SECONDS = 0.3
 """Real time between two looks at the files."""
@@ -33,59 +33,48 @@ class PlotFiles:
         files = [Path(place.source) for place in places if place is not None and place.source is not None]
         self._folders = sorted({file.parent for file in files if file.is_file() and file.suffix != ".py"})
         self._profile = profile
-        self._texts: dict[Path, str] = {}
-        self._texts = self._read()
-        self._names = {file: plot.name for file, text in self._texts.items() if (plot := _plot_in(file, text))}
+        self._texts = self._read({})
 
     def update(self, sequencer: Sequencer) -> Iterator[str]:
-        """Change the plots of a run as the files have changed; yield a line for each change and each mistake.
-
-        Raises:
-            InputError: the run has ended.
-        """
-        before, self._texts = self._texts, self._read()
+        """Change the plots of a run as the files have changed; yield a line for each change and each mistake."""
+        before, self._texts = self._texts, self._read(self._texts)
         changed = {file: text for file, text in self._texts.items() if before.get(file) != text}
-        plots: dict[Path, ActionPlot] = {}
+        plots: list[ActionPlot] = []
         for file, text in changed.items():
             try:
-                (plots[file],) = adapted([parse_plot(text, str(file))], self._profile)
+                plot = parse_plot(text, str(file))
+                plots.append(plot if self._profile is None else with_profile(plot, self._profile))
             except InputError as error:
                 yield f"not changed: {error}"
         library = sequencer.library
-        new = {file: plot for file, plot in plots.items() if plot.name not in library}
-        edited = {file: plot for file, plot in plots.items() if plot.name in library}
-        yield from self._hand_in("installed", new, lambda: sequencer.install(new.values()))
-        yield from self._hand_in("replaced", edited, lambda: sequencer.replace(edited.values(), active="keep"))
-        for file in before.keys() - self._texts.keys():
-            name = self._names.pop(file, "")
-            if name in library and name not in self._names.values():
-                yield from self._hand_in("removed", {}, partial(sequencer.remove, name), name)
+        new = [plot for plot in plots if plot.name not in library]
+        edited = [plot for plot in plots if plot.name in library]
+        left = {plot_name(file, text) for file, text in self._texts.items()}
+        gone = [plot_name(file, text) for file, text in before.items() if file not in self._texts]
+        removed = [name for name in gone if name is not None and name in library and name not in left]
+        if new:
+            yield _outcome("installed", [plot.name for plot in new], partial(sequencer.install, new))
+        if edited:
+            replace = partial(sequencer.replace, edited, active="keep")
+            yield _outcome("replaced", [plot.name for plot in edited], replace)
+        for name in removed:
+            yield _outcome("removed", [name], partial(sequencer.remove, name))
 
-    def _hand_in(
-        self, what: str, plots: Mapping[Path, ActionPlot], change: Callable[[], None], name: str = ""
-    ) -> Iterator[str]:
-        """Make one change of the run, and yield its line; a mistake leaves the run unchanged."""
-        names = [plot.name for plot in plots.values()] or [name] * bool(name)
-        if not names:
-            return
-        try:
-            change()
-        except InputError as error:
-            yield f"not {what}: {error}"
-        else:
-            self._names.update({file: plot.name for file, plot in plots.items()})
-            yield f"{what}: {', '.join(names)}"
-
-    def _read(self) -> dict[Path, str]:
-        files = [file for folder in self._folders for file in sorted(folder.iterdir()) if is_plot(file)]
-        unfinished = {file: text for file, text in self._texts.items() if file.exists()}  # an editor writes them now
-        return {**unfinished, **{file: text_of(file) for file in files}}
+    def _read(self, before: Mapping[Path, str]) -> dict[Path, str]:
+        """Return the texts of the plot files; a file without a plot that had one is being written by an editor."""
+        files = [file for folder in self._folders for file in sorted(folder.iterdir()) if file.suffix in YAML]
+        texts = {file: text_of(file) for file in files}
+        plots = {file: text for file, text in texts.items() if plot_name(file, text) is not None}
+        return {**{file: text for file, text in before.items() if file in texts}, **plots}
 
 
-def _plot_in(file: Path, text: str) -> ActionPlot | None:
-    with suppress(InputError):
-        return parse_plot(text, str(file))
-    return None
+def _outcome(what: str, names: Iterable[str], change: Callable[[], None]) -> str:
+    """Make one change of the run, and return its line; a mistake leaves the run unchanged."""
+    try:
+        change()
+    except InputError as error:
+        return f"not {what}: {error}"
+    return f"{what}: {', '.join(names)}"
 
 
 @contextmanager

@@ -139,7 +139,7 @@ class RobotProgram:
         self.origin = origin
         self._schema = self.domain.schema if knowledge is None else knowledge.schema
         self._require_sound(self.library)
-        self._checked = self.library.changes
+        self._checked = self.library.plots
         if knowledge is not None:
             self.knowledge = knowledge
         else:  # last, since the caller must close an opened knowledge base
@@ -188,10 +188,12 @@ class RobotProgram:
         require_sound(library, self.domain, self._schema, skills, interfaces(self.components))
 
     def _check_added_plots(self) -> None:
-        """Raise `PlotError` if plots that were added since the last check are invalid."""
-        if self.library.changes != self._checked:
-            self._require_sound(self.library)
-            self._checked = self.library.changes
+        """Raise `PlotError` if plots that were added since the last check are invalid; plans are valid as made."""
+        before, now = self._checked, self.library.plots
+        if now is not before:
+            if any(before.get(name) is not plot and not plot.generated for name, plot in now.items()):
+                self._require_sound(self.library)
+            self._checked = now
 
     @property
     def name(self) -> str:

@@ -29,7 +29,7 @@ _WORD = re.compile(r"[\w-]+")
 _IMPLEMENTS = re.compile(r"^implements:\s*[\"']?([\w.-]+)", re.MULTILINE)
 _DEFINES_PROBLEM = re.compile(r"\(\s*define\s*\(\s*problem\b", re.IGNORECASE)
 _DEFINES_DOMAIN = re.compile(r"\(\s*define\s*\(\s*domain\b", re.IGNORECASE)
-_YAML = frozenset({".yaml", ".yml"})
+YAML = frozenset({".yaml", ".yml"})
 
 
 def is_deployment(file: Path) -> bool:
@@ -42,9 +42,10 @@ def is_profile(file: Path) -> bool:
     return _has_key(file, "profile") and not is_deployment(file)
 
 
-def is_plot(file: Path) -> bool:
-    """Return whether a file is a plot."""
-    return _has_key(file, "plot")
+def plot_name(file: Path, text: str) -> str | None:
+    """Return the name of the plot in a file with this text; `None` for any other file."""
+    found = NAMES_PLOT.search(text) if file.suffix in YAML else None
+    return None if found is None else found[1]
 
 
 def is_monitoring(file: Path) -> bool:
@@ -54,7 +55,7 @@ def is_monitoring(file: Path) -> bool:
 
 def _has_key(file: Path, key: str) -> bool:
     """Return whether a file is YAML whose outermost mapping has a key."""
-    return file.suffix in _YAML and re.search(rf"^{key}:", text_of(file), re.MULTILINE) is not None
+    return file.suffix in YAML and re.search(rf"^{key}:", text_of(file), re.MULTILINE) is not None
 
 
 def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) -> list[Finding]:
@@ -78,7 +79,7 @@ def check_files(files: Iterable[Path]) -> list[Finding]:
             with tolerated():
                 _read(file, texts[file])
     found += [Finding(error, READABLE) for error in errors]
-    plots = [file for file in files if file.suffix in _YAML and NAMES_PLOT.search(texts[file])]
+    plots = [file for file in files if plot_name(file, texts[file]) is not None]
     return found + _validated(plots)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import subprocess
@@ -15,7 +16,9 @@ import pytest
 
 from dsc import Component, Outcome, SkillCall, load_library, run_simulated, skill
 from dsc.sequencer.sequencer import Sequencer
+from dsc.text.profiles import adapted, parse_profile
 from dsc.trace import Record
+from knowledge_base.language.syntax.expression import Constant
 from planning import Robot
 from planning.robot.plot_watch import PlotFiles
 
@@ -64,8 +67,6 @@ def folder(tmp_path):
 
 def edited(folder: Path, *edits) -> tuple[list[str], list[str], list[Record]]:
     """Run with one edit every 2 s, and return the moves, the lines for the author, and the records."""
-    import asyncio
-
     arm, lines, records = Arm(), list[str](), list[Record]()
     robot = Robot("(define (domain d) (:predicates (p)))", load_library(folder), [arm])
     robot.listen(records.append)
@@ -120,6 +121,30 @@ def test_a_new_plot_and_its_user_arrive_together(folder):
     assert lines == ["installed: more", "replaced: main", "removed: part"]
     assert moves[0] == "a"
     assert moves[-1] == "c"
+
+
+def test_an_edited_plot_has_the_values_of_the_profile(folder):
+    part = PART.replace("states:", "parameters: {times: {type: number, default: 1}}\nstates:", 1)
+    main = MAIN.replace("variables:", "parameters: {times: {type: number, default: 1}}\nvariables:", 1)
+    write("part.yaml", part)(folder)
+    write("main.yaml", main)(folder)
+    profile = parse_profile("{profile: fast, plots: {part: {times: 3}, main: {times: 2}}}")
+    robot = Robot("(define (domain d) (:predicates (p)))", adapted(load_library(folder), profile), [Arm()])
+    files, lines = PlotFiles(robot.library, profile), list[str]()
+
+    async def live():
+        sequencers: list[Sequencer] = []
+        run = robot.start("main", prepare=sequencers.append)
+        await asyncio.sleep(0.5)
+        write("part.yaml", part.replace("to: a", "to: b"))(folder)
+        lines.extend(files.update(sequencers[0]))
+        await asyncio.sleep(0.1)
+        default = sequencers[0].library.plot("part").parameters["times"].default
+        await run
+        return default
+
+    assert run_simulated(live()) == Constant(3)
+    assert lines == ["replaced: part"]
 
 
 ROBOT = """
