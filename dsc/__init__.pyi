@@ -39,8 +39,6 @@ from dsc.monitoring.profile import MonitoringProfile as MonitoringProfile
 from dsc.monitoring.profile import load_monitoring as load_monitoring
 from dsc.outcomes import Outcome as Outcome
 from dsc.profiles import configure as configure
-from dsc.reflection import MODELS as MODELS
-from dsc.reflection import design_facts as design_facts
 from dsc.run_log import RunFilter as RunFilter
 from dsc.runs.archive import has_run as has_run
 from dsc.runs.archive import is_unfinished as is_unfinished

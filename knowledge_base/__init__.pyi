@@ -23,6 +23,7 @@ from knowledge_base.facts import Delta as Delta
 from knowledge_base.facts import Fact as Fact
 from knowledge_base.facts import Value as Value
 from knowledge_base.facts import fact as fact
+from knowledge_base.language.checking.relations import declare_relations as declare_relations
 from knowledge_base.language.checking.vocabulary import Signature as Signature
 from knowledge_base.language.evaluation.explanation import Explanation as Explanation
 from knowledge_base.language.evaluation.query_plan import QueryPlan as QueryPlan

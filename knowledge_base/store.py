@@ -27,10 +27,12 @@ from knowledge_base.journal.journal import Journal
 from knowledge_base.language.checking.inputs import require_delta, require_text, require_time, require_version, shown
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.sexpr import read
+from knowledge_base.live_relations import LiveRelations
 from knowledge_base.sources import DataSource, SourceListener, Sources
 from knowledge_base.statements import told
 from knowledge_base.transaction import GroupCommit, Transaction
 from knowledge_base.view import View
+from knowledge_base.world.live_rows import LiveRows, Rows
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
@@ -65,6 +67,7 @@ class KnowledgeBase(View):
         self._watches: WeakSet[Watch] = WeakSet()
         self._closed = False
         self._sources = Sources(start.state, lambda: self._graph, self._installed, self._notifier)
+        self._relations = LiveRelations(start.state, self._installed, self._notifier)
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
@@ -386,6 +389,37 @@ class KnowledgeBase(View):
         with self._lock.changing():
             self._require_free()
             return self._sources.bind(Fact(function, args), reference)
+
+    def subscribe_to_relations(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call `listener` after each change of relations that were read; return a function that ends this.
+
+        The calls come in the threads that renew relations.
+        """
+        return self._relations.subscribe(listener)
+
+    def provide(self, rows: Mapping[str, Rows]) -> Callable[[], None]:
+        """Provide the rows of declared relations, e.g. of a run; return a function that ends this.
+
+        Queries and conditions read the rows; versions, changes, snapshots and past worlds do not contain them. Call
+        `renew_relations` after a change of the rows.
+        """
+        return self._relations.provide(rows)
+
+    @property
+    def live_rows(self) -> LiveRows:
+        """The rows of relations that programs provide."""
+        return self._state.live
+
+    def renew_relations(self, *names: str) -> bool:
+        """Evaluate the installed conditions on relations whose rows have changed; return whether any was read.
+
+        Args:
+            names: the relations with other rows; by default all.
+
+        Raises:
+            ExceptionGroup: at least one listener raised an exception; all other listeners were called nevertheless.
+        """
+        return self._relations.renew(names or tuple(self.live_rows.read))
 
     def sources(self) -> list[DataSource]:
         """Return the open sources in the order of their binding."""

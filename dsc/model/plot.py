@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple, Self
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from dsc.model import relations  # noqa: F401  declares them for all texts
 from dsc.model.declarations import PlotParameter, PlotVariable, TypeText
 from dsc.model.language import ConditionField, TermField, Written, constant
 from dsc.model.ranges import Who, refuse_change

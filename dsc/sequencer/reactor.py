@@ -38,6 +38,8 @@ from dsc.messages import (
     WireMessage,
 )
 from dsc.model.plot import ActionPlot
+from dsc.model.relations import CONFIGURATION, DESIGN
+from dsc.reflection import configuration_rows, design_rows
 from dsc.runs.kept import Kept
 from dsc.sequencer.checked_plots import CheckedPlots
 from dsc.sequencer.phase_watch import PhaseWatch, described
@@ -84,6 +86,8 @@ class Reactor:
             `MOST_UNHEARD`.
         in_vain: activation and number of periods without any effect since the last other message.
         settings: an operator's settings of plots, by plot and parameter.
+        relations: the rows of the relations that conditions read, see `dsc.model.relations`.
+        renewed: whether the last macrosteps may have changed relations that conditions have read.
         caused_by: by action id, the number of the trace record about the start of a skill that may still answer. Of
             cancelled skills, only the latest `MOST_CANCELLED` are kept.
         listeners: functions that are called with each macrostep, before its actions are dispatched.
@@ -100,6 +104,7 @@ class Reactor:
         self._phases = phases or PhaseWatch()
         self._run = run
         self.library = library.copy()
+        self._live = knowledge.live_rows
         self.plots: Mapping[str, ActionPlot | None] = {}
         self.knowledge = knowledge
         self._skills: Collection[SkillSignature] | None = None
@@ -120,6 +125,8 @@ class Reactor:
         self._cancelled: deque[str] = deque()
         self._noted: set[str] = set()
         self._now: float | None = None
+        self.relations = {**design_rows(lambda: self.library), **configuration_rows(lambda: self.machine.state)}
+        self.renewed = False
 
     def know_skills(self, skills: Collection[SkillSignature] | None) -> None:
         """Check plots given as data also against the deployed skills; `None` if they are unknown."""
@@ -131,6 +138,8 @@ class Reactor:
         if plots:
             self.library.change(plots)
         self.machine.chart = CheckedPlots(self.library, self.knowledge.schema, self._skills)
+        if self._live.read:
+            self._renew(DESIGN)
 
     def restore(self, kept: Kept) -> None:
         """Restore the state after the last macrostep of an interrupted run."""
@@ -376,11 +385,24 @@ class Reactor:
         if step.emitted:
             self.emitted = _latest((*self.emitted, *step.emitted))
         self.outputs = step.outputs or self.outputs
+        if step.errors or step.bugs:
+            self._note_errors(step)
+        if self._live.read:
+            self._renew(CONFIGURATION)
+        return step.output
+
+    def _renew(self, names: Iterable[str]) -> None:
+        """Evaluate the conditions on relations whose rows may have changed."""
+        try:
+            self.renewed |= self.knowledge.renew_relations(*names)
+        except ExceptionGroup as errors:
+            self._note(errors, "a listener of the knowledge base")
+
+    def _note_errors(self, step: Step) -> None:
         if step.errors:
             self.problem = self.problem or "; ".join(step.errors)
         if step.bugs:
             self.fail("; ".join(step.bugs))
-        return step.output
 
     def _tell(self, step: Step) -> None:
         """Call the listeners; an `InputError` of a listener ends the run, and every other error only the listener."""

@@ -99,6 +99,7 @@ class _ReplayedRun:
         of_run = str(row.header.get("action_ids", ""))
         self._now = 0.0
         self._reactor = Reactor(library, self._knowledge, Trace(lambda: self._now), run=of_run)
+        self._knowledge.provide(self._reactor.relations)
         self._reactor.know_skills(signatures_in(row.header, runs.form))
         self._started: dict[str, Start] = {}
 

@@ -212,7 +212,11 @@ class Sequencer(OutsideInput):
         """Receive events and changes of knowledge inside the block."""
         self._over = False
         self._reacts = True  # until the start is complete
-        unsubscribe = self.knowledge.subscribe(self._changed), self.knowledge.subscribe_to_sources(self._fed)
+        knowledge = self.knowledge
+        unsubscribe = (
+            knowledge.subscribe(self._changed), knowledge.subscribe_to_sources(self._fed),
+            knowledge.provide(self._reactor.relations), knowledge.subscribe_to_relations(self._wake_for_relations),
+        )  # fmt: skip
         try:
             yield
         finally:
@@ -377,6 +381,10 @@ class Sequencer(OutsideInput):
         """Receive a new value of a source from any thread."""
         self.clock.calls.call(self._wake, source.reference)
 
+    def _wake_for_relations(self) -> None:
+        """Receive a change of relations from any thread."""
+        self.clock.calls.call(self._wake, "relations")
+
     def _wake(self, author: str) -> None:
         """Let waiting guards be evaluated after a change of knowledge that is not the run's own.
 
@@ -412,6 +420,9 @@ class Sequencer(OutsideInput):
         elif isinstance(message, SkillMessage):
             self.dispatcher.report_taken(message.start)
         self.dispatcher.dispatch_all(output)
+        if self._reactor.renewed:
+            self._reactor.renewed = self._reacts = False
+            self._wake("relations")
 
     def _validated(self, message: SkillMessage) -> SkillMessage:
         return message_checks.validated_in_world(message, self.knowledge, self.dispatcher.signature)

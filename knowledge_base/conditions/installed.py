@@ -94,6 +94,15 @@ class Installed:
         """Evaluate the conditions that read a fluent whose source has a new value; the version stays the same."""
         self._evaluate([("said", fluent.predicate, fluent.args, BOTH)])
 
+    def reads(self, name: str) -> bool:
+        """Return whether an installed condition has read a predicate."""
+        return ("said", name) in self._readers
+
+    def renew(self, ended: list[Fact], begun: list[Fact]) -> None:
+        """Evaluate the conditions after a change of relations; the version stays the same."""
+        signs = [*((one, LESS) for one in ended), *((one, MORE) for one in begun)]
+        self._evaluate([("said", one.predicate, one.args, sign) for one, sign in signs])
+
     def _evaluate(self, events: list[Event]) -> None:
         """Update the rows that the events affect, and then the conditions of the changed rows."""
         self._changed.clear()

@@ -15,9 +15,10 @@ from knowledge_base.language.evaluation.compiler import compile_query, compile_t
 from knowledge_base.language.evaluation.lookups import Search, conjuncts
 from knowledge_base.language.evaluation.terms import Bindings, Test
 from knowledge_base.language.syntax.expression import And, Atom, TypedVariable, Variable, free_variables
+from knowledge_base.world.fact_index import FactIndex
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.schema import Schema
-from knowledge_base.world.state import FactIndex, WorldState
+from knowledge_base.world.state import WorldState
 
 ROWS = "installed rows"
 """Name of the predicate for open rows.

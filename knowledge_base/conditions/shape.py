@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from knowledge_base.facts import Value
+from knowledge_base.language.checking.binding import object_variables
 from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
@@ -95,7 +96,7 @@ def _opened(e: Expression, schema: Schema) -> Expression:
         and seen.isdisjoint(names := {v.name for v in e.variables})
         and all(schema.is_type(t, 1) for v in e.variables for t in v.types)
     ):
-        ranges += map(_range, e.variables)
+        ranges += map(_range, object_variables(e.variables, e.body, schema))
         seen |= names
         e = e.body
     return And((*ranges, e)) if ranges else e

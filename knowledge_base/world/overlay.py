@@ -12,7 +12,7 @@ from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, 
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import TypedVariable
 from knowledge_base.spelling import A_NAME_IS, is_name, nearest_name
-from knowledge_base.world.state import FactIndex
+from knowledge_base.world.fact_index import FactIndex
 
 _Key = tuple[str, tuple[Value, ...]]
 

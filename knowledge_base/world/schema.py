@@ -10,6 +10,7 @@ from typing import Any
 from knowledge_base.errors import Place, SchemaError, UnknownNameError
 from knowledge_base.facts import GEOMETRY, UNSET, Content
 from knowledge_base.language.checking.check import check_reads
+from knowledge_base.language.checking.relations import relation, relation_names, require_fact
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature
 from knowledge_base.language.syntax.expression import KEYWORDS, Expression
 from knowledge_base.language.syntax.sexpr import TypedName
@@ -258,13 +259,16 @@ class Schema:
         if found is not None:
             return found
         if name not in self.computed:
+            live = relation(name)
+            if live is not None:
+                return live
             if name in self.functions:
                 hint = f"compare its value: (= ({name} ...) VALUE); a Delta has it among its `values`"
                 raise SchemaError(f"'{name}' is a function; {hint}", place=place)
             if name in self.types:
                 said = f"'{name}' is a type, which a condition tests of one thing: ({name} THING)"
                 raise SchemaError(f"{said}; a new thing gets its type with its name", place=place)
-            valid = (*self.predicates, *self.computed, *self.types, *KEYWORDS)
+            valid = (*self.predicates, *self.computed, *self.types, *KEYWORDS, *relation_names())
             raise UnknownNameError(f"there is no predicate '{name}'", place=place, found=name, valid=valid)
         of = self.computed[name]
         return Signature(of.name, of.parameters, place=of.place)
@@ -286,6 +290,7 @@ class Schema:
             return found
         if name in self.computed:
             raise self.computed[name].refused(place)
+        require_fact(name, place)
         return self.predicate(name, place)
 
     def function(self, name: str, place: Place | None = None) -> Signature:

@@ -62,10 +62,16 @@ def check_action(action: PlanningAction, schema: Schema) -> None:
     timed = action.timed or DurativeParts(start=action.precondition, end_effect=action.effect)
     for condition in (timed.start, timed.over_all, timed.end):
         parts = condition.parts if isinstance(condition, And) else ()
-        _check_all(condition, parts, partial(check, schema=schema, variables=variables, objects=schema.constants))
+        _check_all(
+            condition, parts, partial(check, schema=schema, variables=variables, objects=schema.constants, live=False)
+        )
     for effect in (timed.start_effect, timed.end_effect):
         some = effect.parts if isinstance(effect, AllOf) else ()
-        _check_all(effect, some, partial(check_effect, schema=schema, variables=variables, objects=schema.constants))
+        _check_all(
+            effect,
+            some,
+            partial(check_effect, schema=schema, variables=variables, objects=schema.constants, live=False),
+        )
     if action.duration is not None:
         bounds = Comparison("<=", action.duration.least, action.duration.most)
         with tolerated():

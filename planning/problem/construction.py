@@ -79,7 +79,7 @@ def build_problem(
 
 def check_goal(goal: Expression, world: World) -> None:
     """Raise `InputError` if the goal does not fit the schema or contains a missing object."""
-    check(goal, world.schema, objects=things_of(world))
+    check(goal, world.schema, objects=things_of(world), live=False)
 
 
 @dataclass(frozen=True, slots=True)

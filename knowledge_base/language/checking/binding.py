@@ -19,6 +19,7 @@ from knowledge_base.language.syntax.expression import (
     Expression,
     Or,
     Term,
+    TypedVariable,
     Variable,
     free_variables,
     parts_of,
@@ -45,6 +46,27 @@ def found_variables(e: Expression, schema: Vocabulary, bound: frozenset[str] = _
             return found_variables(body, schema, bound | own) - own
         case _:
             return _NONE
+
+
+def object_variables(
+    variables: tuple[TypedVariable, ...], body: Expression, schema: Vocabulary
+) -> tuple[TypedVariable, ...]:
+    """Return the variables of `(exists variables body)` whose choices are objects.
+
+    A variable without a type has the values in the rows of a live relation instead if `body` finds its values there.
+    """
+    untyped = {v.name for v in variables if not v.types}
+    rows = untyped.intersection(row_variables(body, schema)) if untyped else untyped
+    found = rows and rows.intersection(found_variables(body, schema))
+    return tuple(v for v in variables if v.name not in found) if found else variables
+
+
+def row_variables(e: Expression | Term, schema: Vocabulary) -> Iterator[str]:
+    """Yield the variables that are arguments of live relations."""
+    for part in parts_of(e):
+        yield from row_variables(part, schema)
+    if isinstance(e, Atom) and not schema.is_type(e.predicate, len(e.args)) and schema.predicate(e.predicate).live:
+        yield from (arg.name for arg in e.args if isinstance(arg, Variable))
 
 
 def only_tested(e: Expression, schema: Vocabulary, bound: frozenset[str] = _NONE) -> frozenset[str]:

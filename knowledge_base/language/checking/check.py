@@ -8,10 +8,11 @@ from typing import Literal
 
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import GEOMETRY, Value
-from knowledge_base.language.checking.binding import check_answers, unbound_error
+from knowledge_base.language.checking.binding import check_answers, row_variables, unbound_error
 from knowledge_base.language.checking.vocabulary import Computing, Signature, Vocabulary
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, ForEach, NumericEffect, When, check_depth
 from knowledge_base.language.syntax.expression import (
+    TRUE,
     And,
     Arithmetic,
     Atom,
@@ -38,6 +39,8 @@ def check(
     variables: Mapping[str, str | None] | None = None,
     free: Free = "error",
     objects: Mapping[str, str] | None = None,
+    *,
+    live: bool = True,
 ) -> None:
     """Raise an error with its place unless `e` can be evaluated on worlds of `schema`.
 
@@ -48,6 +51,7 @@ def check(
         free: `error` if other free variables are an error, `answers` if they are the answers of a query.
         objects: the known objects with their types; names in `e` must be among them. With `None`, every name is
             accepted.
+        live: whether `e` may read relations that a running program provides.
 
     Raises:
         UnknownNameError: an undeclared predicate, function, type, variable or object.
@@ -55,7 +59,7 @@ def check(
         InputError: a variable of a query occurs only under `not` or in a comparison; or the nesting is too deep.
     """
     check_depth(e)
-    checker = _Checker(schema, objects, variables or {}, free)
+    checker = _Checker(schema, objects, variables or {}, free, live=live)
     checker.condition(e)
     if free == "answers":
         check_answers(schema.expanded(e), frozenset(variables or ()), schema)
@@ -66,13 +70,15 @@ def check_effect(
     schema: Vocabulary,
     variables: Mapping[str, str | None] | None = None,
     objects: Mapping[str, str] | None = None,
+    *,
+    live: bool = True,
 ) -> None:
     """Raise an error with its place unless `effect` can be applied to worlds of `schema`.
 
     Arguments and errors as for `check`. A type as an effect is a `SchemaError`, since objects keep their type.
     """
     check_depth(effect)
-    _Checker(schema, objects, variables or {}, "error").effect(effect)
+    _Checker(schema, objects, variables or {}, "error", live=live).effect(effect)
 
 
 def check_term(term: Term, schema: Vocabulary, variables: Mapping[str, str | None] | None = None) -> None:
@@ -152,7 +158,10 @@ class _Checker:
         objects: Mapping[str, str] | None,
         variables: Mapping[str, str | None],
         free: Free,
+        *,
+        live: bool = True,
     ) -> None:
+        self.live = live
         self.schema = schema
         self.objects = objects
         self.free = free
@@ -167,7 +176,7 @@ class _Checker:
             case Comparison():
                 self.comparison(e)
             case Exists(variables, body) | Forall(variables, body):
-                with self.inside(variables):
+                with self.inside(variables, body):
                     self.condition(body)
             case And(parts) | Or(parts):
                 for part in parts:
@@ -188,7 +197,7 @@ class _Checker:
                 for part in parts:
                     self.effect(part)
             case ForEach(variables, inner):
-                with self.inside(variables):
+                with self.inside(variables, TRUE):
                     self.effect(inner)
             case When(condition, inner):
                 self.condition(condition)
@@ -217,7 +226,11 @@ class _Checker:
         if self.schema.is_type(atom.predicate, len(atom.args)):
             self.term(atom.args[0])
             return
-        self.arguments(self.schema.predicate(atom.predicate, atom.place), atom)
+        signature = self.schema.predicate(atom.predicate, atom.place)
+        if signature.live and not self.live:
+            message = f"'{atom.predicate}' describes the running program; goals and planning actions cannot read it"
+            raise SchemaError(message, place=atom.place)
+        self.arguments(signature, atom)
 
     def comparison(self, e: Comparison) -> None:
         if e.operator in ("=", "!="):
@@ -254,8 +267,9 @@ class _Checker:
     def arguments(self, signature: Signature, used: Atom | Call) -> None:
         check_arity(signature, len(used.args), used.place)
         for parameter, arg in zip(signature.parameters, used.args, strict=True):
-            self.term(arg)
-            self.fits(arg, parameter, signature)
+            if not (signature.live and isinstance(arg, Constant)):
+                self.term(arg)
+                self.fits(arg, parameter, signature)
 
     def fits(self, arg: Term, parameter: TypedVariable, signature: Signature) -> None:
         wanted = parameter.types or ("object",)
@@ -329,13 +343,16 @@ class _Checker:
         return (*(self.objects or ()), *self.schema.constants)
 
     @contextmanager
-    def inside(self, variables: tuple[TypedVariable, ...]) -> Iterator[None]:
-        """Open the scope of a quantifier for a block."""
+    def inside(self, variables: tuple[TypedVariable, ...], body: Expression) -> Iterator[None]:
+        """Open the scope of a quantifier for a block; values of live relations have any type."""
         for variable in variables:
             for type_name in variable.types:
                 self.schema.require_type(type_name, variable.place)
         outer = self.scope
         self.scope = {**outer, **{v.name: v.types or ("object",) for v in variables}}
+        untyped = {v.name for v in variables if not v.types}
+        if untyped:
+            self.scope.update(dict.fromkeys(untyped.intersection(row_variables(body, self.schema))))
         try:
             yield
         finally:

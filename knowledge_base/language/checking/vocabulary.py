@@ -22,13 +22,19 @@ Read = Term | Atom
 class Signature:
     """The name of a predicate or function, with its parameters in order.
 
-    `result` is the type of a function's value, one of `UNSET`; a predicate has the result `None`.
+    Attributes:
+        name: the name.
+        parameters: the parameters.
+        result: the type of a function's value, one of `UNSET`; `None` for a predicate.
+        place: place of the declaration.
+        live: whether a running program provides the facts; a name without quotes is then also a text.
     """
 
     name: str
     parameters: tuple[TypedVariable, ...] = ()
     result: str | None = None
     place: Place | None = field(default=None, compare=False, repr=False)
+    live: bool = False
 
     @property
     def arity(self) -> int:

@@ -20,6 +20,7 @@ from typing import cast
 
 from knowledge_base.errors import InputError, UserCodeError
 from knowledge_base.facts import Fact
+from knowledge_base.language.checking.binding import object_variables
 from knowledge_base.language.checking.check import check_arity
 from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.lookups import (
@@ -147,18 +148,19 @@ def counterexamples(e: Forall, schema: Vocabulary) -> Search:
 
 
 def _witnessing(e: Exists, schema: Vocabulary) -> list[Conjunct]:
-    return [*_ranges(e.variables, schema), *conjuncts(e.body)]
+    return [*_ranges(e.variables, e.body, schema), *conjuncts(e.body)]
 
 
 def _refuting(e: Forall, schema: Vocabulary) -> list[Conjunct]:
-    return [*_ranges(e.variables, schema), *conjuncts(opposite(e.body))]
+    body = opposite(e.body)
+    return [*_ranges(e.variables, body, schema), *conjuncts(body)]
 
 
-def _ranges(variables: tuple[TypedVariable, ...], schema: Vocabulary) -> list[TypeRange]:
+def _ranges(variables: tuple[TypedVariable, ...], body: Expression, schema: Vocabulary) -> list[TypeRange]:
     for variable in variables:
         for type_name in variable.types:
             schema.require_type(type_name, variable.place)
-    return [TypeRange(v) for v in variables]
+    return [TypeRange(v) for v in object_variables(variables, body, schema)]
 
 
 def _atom(atom: Atom, schema: Vocabulary) -> Test:

@@ -1,75 +1,225 @@
-"""The design is asked about in the same graph and words as the world."""
+"""The relations of a run and of its design in conditions and queries (S1.6, S1.13, S1.17)."""
 
 from __future__ import annotations
 
+import asyncio
+from pathlib import Path
+from typing import Any
+
 import pytest
 
-from domains.clean_up_table.bringup import bundle, deploy
-from dsc.dynamic.library import Library
-from dsc.reflection import MODELS, design_facts
-from dsc.text.plot_files import parse_plot
-from knowledge_base import KnowledgeBase
+from domains.clean_up_table.bringup import deploy
+from dsc import has_run, is_unfinished, parse_plot, replay, run_simulated
+from dsc.testing import Crashes, one_history, replays, violations
+from dsc.trace import Record
+from knowledge_base.errors import InputError
+from planning import PlanningDomain, Robot
+
+DOMAIN = "(define (domain d) (:predicates (p)))"
 
 
-@pytest.fixture(scope="module")
-def kb() -> KnowledgeBase:
+def robot_of(*texts: str, **how: Any) -> tuple[Robot, list[Record]]:
+    robot = Robot(DOMAIN, map(parse_plot, texts), [], **{"clock": "simulated", **how})
+    records: list[Record] = []
+    robot.listen(records.append)
+    return robot, records
+
+
+def asked(robot: Robot, plot: str, at: float, *queries: str) -> list[list[dict[str, Any]]]:
+    """Return the answers of queries at a second of a run."""
+
+    async def main():
+        run = robot.start(plot)
+        await asyncio.sleep(at)
+        answers = [robot.knowledge.query(query) for query in queries]
+        run.cancel("asked")
+        await run
+        return answers
+
+    return run_simulated(main())
+
+
+# -- the design ----------------------------------------------------------------------------------------------
+
+
+def test_the_design_is_asked_during_a_run():
     with deploy() as robot:
-        skills = [signature for component in robot.components for signature in component.skills().values()]
-        kb = KnowledgeBase(robot.domain.schema.merged(MODELS))
-        kb.apply(design_facts(robot.library, skills), author="design")
-    return kb
+        touching, answering, implementing = asked(
+            robot, "clean_up_table", 1.0,
+            "(dsc:touches ?plot arm)", "(dsc:answers clean_up_table grasp_failed ?response)",
+            "(and (dsc:implements ?plot pick-up) (dsc:triggers ?plot ?skill))",
+        )  # fmt: skip
+    assert {"plot": "stack"} in touching
+    assert {"plot": "clean_up_table"} in touching  # by the plots that it uses
+    assert {"plot": "drive_direct"} not in touching
+    assert answering[0] == {"response": "grasp_failed: reposition, retry"}
+    assert {one["plot"] for one in implementing} == {"pick_up_from_above", "pick_up_from_side"}
 
 
-def named(kb: KnowledgeBase, query: str, variable: str) -> set[str]:
-    return {str(answer[variable]) for answer in kb.query(query)}
+DYNAMIC = """
+plot: main
+states:
+  rest: {after: {seconds: 1, to: work}}
+  work: {dynamic: {offers: job}, on: {done: over, no_candidate: over}}
+  over: {final: true}
+"""
+JOB = "{plot: job, offers: job, states: {s: {after: {seconds: 1, to: e}}, e: {final: true}}}"
 
 
-def test_which_plots_carry_out_an_action(kb) -> None:
-    plots = named(kb, "(implements ?p action:pick-up)", "p")
-    assert plots == {"plot:pick_up_from_above", "plot:pick_up_from_side"}
+def test_a_plot_that_arrives_is_part_of_the_design():
+    robot, _ = robot_of(DYNAMIC)
+    query = "(dsc:candidate main work ?plot)"
+
+    async def main():
+        run = robot.start("main")
+        await asyncio.sleep(0.2)
+        assert robot.knowledge.query(query) == []
+        run.install(parse_plot(JOB))
+        await asyncio.sleep(0.1)
+        assert robot.knowledge.query(query) == [{"plot": "job"}]
+        assert (await run).reached
+
+    with robot:
+        run_simulated(main())
 
 
-def test_who_offers_what_may_fail_like_that_and_which_plot_answers(kb) -> None:
-    failing = '(and (emits ?s "grasp_failed") (skill ?s) (offers ?c ?s))'
-    assert named(kb, failing, "c") == {"component:arm"}
-    assert "plot:clean_up_table" in named(kb, '(answers ?p "grasp_failed" ?how)', "p")
-    assert kb.ask(
-        '(forall (?s - skill) (imply (emits ?s "grasp_failed") (exists (?p - action-plot) (triggers ?p ?s))))'
-    )
+# -- the configuration ---------------------------------------------------------------------------------------
 
-
-def test_which_rule_answers_what_and_what_it_leads_to(kb) -> None:
-    answering = '(and (reacts-to ?r "slipped") (stands-in ?r plot:clean_up_table) (leads-to ?r ?next))'
-    (answer,) = kb.query(answering)
-    assert answer["next"] == "replan"
-    assert kb.ask("(runs ?r plot:pick_up_from_above)", {"r": answer["r"]})
-
-
-def test_insertions_and_handlers_are_known_too() -> None:
-    plots = [parse_plot(text) for text in (PATROL, "{plot: wipe, states: {e: {final: true}}}")]
-    kb = KnowledgeBase(MODELS)
-    kb.apply(design_facts(Library(plots)), author="design")
-    assert named(kb, '(and (rule ?r) (concerns ?r "look") (runs ?r plot:wipe))', "r") == {"rule:patrol.1"}
-    assert named(kb, '(and (handler ?h) (reacts-to ?h "low"))', "h") == {"handler:patrol.1"}
-    assert kb.ask("(and (triggers plot:patrol skill:battery.low) (uses plot:patrol plot:wipe))")
-
-
-PATROL = """
-plot: patrol
-states: {look: {use: wipe, on: {done: e}}, e: {final: true}}
-rules: [{before: look, do: {use: wipe}}]
-handlers: [{on: low, listen: {trigger: battery.low}, do: {use: wipe}}]
+NESTED = """
+plot: main
+states:
+  both:
+    on: {done: over}
+    regions:
+      left: {states: {work: {use: part, on: {done: left_over}}, left_over: {final: true}}}
+      right:
+        states:
+          wait: {always: {when: (dsc:active both/work/second), to: saw}}
+          saw: {after: {seconds: 0.5, to: right_over}}
+          right_over: {final: true}
+  over: {final: true}
+"""
+PART = """
+plot: part
+states:
+  first: {after: {seconds: 1, to: second}}
+  second: {after: {seconds: 1, to: end}}
+  end: {final: true}
 """
 
 
-def test_everything_that_a_plot_uses_is_there(kb) -> None:
-    library = Library(bundle().plots)
-    for plot in library:
-        assert named(kb, f"(uses plot:{plot.name} ?part)", "part") == {f"plot:{part}" for part in plot.uses()}
+def test_active_states_and_running_plots_are_asked():
+    robot, _ = robot_of(NESTED, PART)
+    with robot:
+        active, running = asked(robot, "main", 0.5, "(dsc:active ?state)", "(dsc:running ?state ?plot)")
+    assert [one["state"] for one in active] == ["both", "work", "work/first", "wait"]
+    assert running == [{"state": "work", "plot": "part"}]
 
 
-def test_the_design_and_the_world_are_one_graph(kb) -> None:
-    offered = [skill for _, skill, key in kb.graph.out_edges("component:arm", keys=True) if key == "offers"]
-    assert offered
-    assert {kb.graph.nodes[skill]["type"] for skill in offered} == {"skill"}
-    assert set(offered) == named(kb, "(offers component:arm ?s)", "s")
+def test_a_guard_on_the_configuration_is_taken_after_the_change():
+    robot, records = robot_of(NESTED.replace("both/work/second", "work/second"), PART)
+    with robot:
+        assert robot.run("main").reached
+    seen = [one.t for one in records if one.type == "step" and "saw" in str(one.data)]
+    assert seen[0] == 1.0
+
+
+CHOOSING = """
+plot: main
+variables: {n: {type: number, initial: 0}}
+states:
+  quick: {after: {seconds: 1, to: from_quick}}
+  from_quick: {dynamic: [was_quick, other], on: {done: slow, no_candidate: slow}}
+  slow: {after: {seconds: 1, to: from_slow}}
+  from_slow: {dynamic: [was_quick, other], on: {done: over, no_candidate: over}}
+  over: {final: true}
+"""
+WAS_QUICK = "{plot: was_quick, when: (dsc:active quick), states: {s: {final: true}}}"
+OTHER = "{plot: other, states: {s: {final: true}}}"
+
+
+def chosen(records: list[Record]) -> list[Any]:
+    return [one.data["chosen"] for one in records if one.type == "decision"]
+
+
+def test_a_candidate_reads_the_configuration_before_the_macrostep():
+    robot, records = robot_of(CHOOSING, WAS_QUICK, OTHER)
+    with robot:
+        assert robot.run("main").reached
+    assert chosen(records) == ["was_quick", "other"]
+
+
+def test_an_installed_condition_on_the_configuration_fires():
+    robot, _ = robot_of(CHOOSING, WAS_QUICK, OTHER)
+    fired: list[object] = []
+
+    async def main():
+        condition = robot.knowledge.install("(dsc:active slow)")
+        condition.listen(fired.append) if hasattr(condition, "listen") else condition.subscribe(fired.append)
+        return await robot.start("main")
+
+    with robot:
+        assert run_simulated(main()).reached
+    assert len(fired) == 1
+
+
+def test_after_a_run_no_state_is_active():
+    robot, _ = robot_of(CHOOSING, WAS_QUICK, OTHER)
+    with robot:
+        robot.run("main")
+        assert robot.knowledge.query("(dsc:active ?state)") == []
+
+
+# -- mistakes and limits -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("domain", "said"),
+    [
+        ("(:action a :precondition (dsc:active work) :effect (p))", "cannot read it"),
+        ("(:action a :effect (dsc:active work))", "read-only"),
+        ("(:action a :effect (when (dsc:active work) (p)))", "cannot read it"),
+    ],
+)
+def test_planning_does_not_read_the_run(domain, said):
+    with pytest.raises(InputError, match=said):
+        PlanningDomain.parse(f"(define (domain d) (:predicates (p)) {domain})")
+
+
+def test_goals_do_not_read_the_run():
+    robot, _ = robot_of(CHOOSING, WAS_QUICK, OTHER)
+    with robot, pytest.raises(InputError, match="goals and planning actions cannot read it"):
+        robot.achieve("(dsc:active slow)")
+
+
+def test_a_wrong_name_has_its_nearest_valid_name():
+    with pytest.raises(InputError, match="did you mean 'dsc:active'"):
+        robot_of(CHOOSING, WAS_QUICK.replace("dsc:active", "dsc:actve"), OTHER)
+
+
+def test_the_relations_are_read_only():
+    with pytest.raises(InputError, match="read-only"):
+        robot_of(CHOOSING.replace("to: from_quick}", "to: from_quick, tell: (dsc:active quick)}"), WAS_QUICK, OTHER)
+
+
+# -- kept runs -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_run_that_is_killed_and_resumed_chooses_alike(seed, tmp_path):
+    crashes: Crashes[list[Any]] = Crashes(tmp_path, seed, chance=0.2, most=4)
+
+    def live(folder: Path):
+        store = folder / "run.kb"
+        robot, records = robot_of(CHOOSING, WAS_QUICK, OTHER, store=store)
+        with robot:
+            if not has_run(store):
+                robot.run("main", prepare=crashes.watch)
+            elif is_unfinished(store):
+                robot.resume(prepare=crashes.watch)
+            return chosen(records)
+
+    assert crashes.survive(live) in ([], ["was_quick", "other"])
+    assert crashes.problems == []
+    assert violations(crashes.folder / "run.kb", [one_history, replays()]) == []
+    assert replay(crashes.folder / "run.kb").divergence is None

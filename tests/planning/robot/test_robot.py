@@ -6,12 +6,11 @@ from typing import Annotated, Any, ClassVar
 
 import pytest
 
-from dsc import Component, Event, Library, Outcome, SkillCall, Stream, parse_plot, primitive_plot, skill
+from dsc import Component, Event, Outcome, SkillCall, Stream, parse_plot, primitive_plot, skill
 from dsc.components.parameters import Parameters, parameter
 from dsc.errors import PlotError, SkillError
-from dsc.reflection import MODELS, design_facts
 from dsc.trace import Record
-from knowledge_base import Delta, InputError, KnowledgeBase, fact
+from knowledge_base import Delta, InputError, fact
 from planning import Plan, PlanningDomain, PlanStep, Robot
 from planning.model.plan import EngineFailed, PlanFound, ProvenUnsolvable, TimedOut
 
@@ -648,34 +647,6 @@ def test_a_component_whose_parameter_nobody_has_said_is_refused_before_anything_
 
     with pytest.raises(InputError, match=r"component 'laser' needs .<= .rate .most., but most is 20, rate is 30"):
         Robot("(define (domain d))", [], [Bound()], clock="simulated")
-
-
-def test_plots_ask_for_rules_if_the_knowledge_has_the_design():
-    text = """
-    plot: p
-    states:
-      asked: {choice: [{when: (exists (?r - object) (stands-in ?r "plot:p")), to: known}, unknown]}
-      work: {use: part, on: {done: known}}
-      known: {after: {seconds: 2, to: over}}
-      unknown: {on: {done: work}}
-      over: {final: true}
-    rules: [{on: lost, do: {then: continue}}]
-    """
-    plots = [
-        parse_plot(text),
-        parse_plot(
-            "plot: part\nemits: {lost: }\nstates: {a: {after: {seconds: 1, to: e, emit: lost}}, e: {final: true}}"
-        ),
-    ]
-    domain, library, seconds = PlanningDomain.parse("(define (domain d))"), Library(plots), []
-    with pytest.raises(PlotError, match="there is no predicate 'stands-in'"):
-        Robot(domain, library, [], clock="simulated")
-    design = KnowledgeBase(domain.schema.merged(MODELS))
-    design.apply(design_facts(library, []), author="design")
-    with Robot(domain, library, [], design, clock="simulated") as robot:
-        robot.listen(lambda record: seconds.append(record.t))
-        assert robot.run("p").finished
-    assert seconds[-1] == 2.0
 
 
 def test_needs_that_nobody_can_fulfil_are_refused():

@@ -1,0 +1,29 @@
+"""The relations of a run and of its design, which conditions and queries read (S1.6, S1.13, S1.17)."""
+
+from __future__ import annotations
+
+from knowledge_base.language.checking.relations import declare_relations
+
+DESIGN = {
+    "dsc:plot": "plot",
+    "dsc:state": "plot state",
+    "dsc:uses": "plot part",
+    "dsc:candidate": "plot state candidate",
+    "dsc:offers": "plot offer",
+    "dsc:when": "plot condition",
+    "dsc:implements": "plot action",
+    "dsc:emits": "plot event",
+    "dsc:answers": "plot event rule",
+    "dsc:concerns": "plot rule step",
+    "dsc:leads-to": "plot rule next",
+    "dsc:triggers": "plot skill",
+    "dsc:touches": "plot component",
+}
+"""Relations of the design: names, each with its arguments.
+
+The relations of rules and handlers have their labels. `dsc:touches` includes the components of all plots that a plot
+uses, directly or indirectly.
+"""
+CONFIGURATION = {"dsc:active": "state", "dsc:running": "state plot"}
+"""Relations of the active states, by their paths, and of the plots inside them."""
+declare_relations({**DESIGN, **CONFIGURATION})
