@@ -11,10 +11,12 @@ from dsc.engine.machine_state import MachineState
 from dsc.model.actions import Trigger, component_of, flat
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, State
+from knowledge_base.facts import Value
+from knowledge_base.language.syntax.expression import Constant
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.live_rows import Rows
 
-_Row = tuple[str, ...]
+_Row = tuple[Value, ...]
 
 
 def design_rows(library: Callable[[], Library]) -> dict[str, Rows]:
@@ -43,11 +45,13 @@ def design_rows(library: Callable[[], Library]) -> dict[str, Rows]:
     return {name: partial(rows, read) for name, read in of_plot.items()}
 
 
-def configuration_rows(state: Callable[[], MachineState]) -> dict[str, Rows]:
+def configuration_rows(state: Callable[[], MachineState], library: Callable[[], Library]) -> dict[str, Rows]:
     """Return the providers of the relations of the active states."""
     return {
         "dsc:active": lambda: [(path,) for path in state().configuration()],
-        "dsc:running": lambda: _running(state()),
+        "dsc:running": lambda: ((path, plot.name) for path, plot in _plots(state())),
+        "dsc:step": lambda: ((path, _action(step, library())) for path, step in _steps(state())),
+        "dsc:step-argument": lambda: (row for path, step in _steps(state()) for row in _arguments(path, step)),
     }
 
 
@@ -101,11 +105,32 @@ def _components(plot: ActionPlot) -> Iterator[str]:
             yield from (one for one in map(component_of, flat(actions)) if one is not None)
 
 
-def _running(state: MachineState) -> Iterator[_Row]:
+def _plots(state: MachineState) -> Iterator[tuple[str, ActionPlot]]:
+    """Yield the plots that run inside active states, with the paths of the states; outer plots come first."""
     frame = state.root
     waiting = [] if frame is None else [("", frame)]
     while waiting:
         prefix, frame = waiting.pop(0)
         for host, inner in frame.children.items():
-            yield f"{prefix}{host}", inner.compiled.plot.name
+            yield f"{prefix}{host}", inner.compiled.plot
             waiting.append((f"{prefix}{host}/", inner))
+
+
+def _steps(state: MachineState) -> Iterator[tuple[str, DynamicState]]:
+    """Yield the steps of running plans, with the paths of their states."""
+    for host, plot in _plots(state):
+        if plot.generated:
+            yield from (
+                (f"{host}/{name}", one) for name, one, _ in plot.walk() if isinstance(one, DynamicState) and one.dynamic
+            )
+
+
+def _action(step: DynamicState, library: Library) -> str:
+    """Return the planning action of a step, or the name of its only candidate."""
+    candidates = candidates_of(step, library)
+    return next((one.implements for one in candidates if one.implements), step.candidates[0])
+
+
+def _arguments(path: str, step: DynamicState) -> Iterator[_Row]:
+    values = ((name, term.value) for name, term in step.arguments.items() if isinstance(term, Constant))
+    return ((path, name, value) for name, value in values if isinstance(value, Value))

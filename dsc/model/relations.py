@@ -24,6 +24,30 @@ DESIGN = {
 The relations of rules and handlers have their labels. `dsc:touches` includes the components of all plots that a plot
 uses, directly or indirectly.
 """
-CONFIGURATION = {"dsc:active": "state", "dsc:running": "state plot"}
-"""Relations of the active states, by their paths, and of the plots inside them."""
-declare_relations({**DESIGN, **CONFIGURATION})
+CONFIGURATION = {
+    "dsc:active": "state",
+    "dsc:running": "state plot",
+    "dsc:step": "step action",
+    "dsc:step-argument": "step parameter value",
+}
+"""Relations of the active states, by their paths; of the plots inside them; and of the steps of running plans."""
+COMPONENTS = {
+    "dsc:component": "component",
+    "dsc:component-life": "component life",
+    "dsc:component-mode": "component mode",
+    "dsc:component-active": "component",
+    "dsc:component-parameter": "component parameter value",
+    "dsc:skill": "component skill",
+    "dsc:outcome": "skill event",
+    "dsc:wire": "port provider",
+    "dsc:resource": "resource capacity",
+    "dsc:occupies": "component resource amount",
+    "dsc:executes": "state skill",
+    "dsc:waits": "waiter awaited",
+}
+"""Relations of the components of a run: their life cycles, values, skills, wires and resources.
+
+`dsc:executes` and `dsc:waits` have the states whose skills execute, or wait for a component. `dsc:waits` also has the
+components that wait for resources.
+"""
+declare_relations({**DESIGN, **CONFIGURATION, **COMPONENTS})

@@ -15,6 +15,7 @@ from dsc.engine.steps import Start
 from dsc.runs.tables import CHAIN, RunSnapshot, SnapshotRow, latest_snapshot, require_tables_of_runs
 from dsc.trace import Record
 from knowledge_base.errors import Place, StoreError
+from knowledge_base.facts import Value
 from knowledge_base.journal.file import is_there, located, reading
 from knowledge_base.journal.integrity import NOTHING, Ends, Tip, damaged, put_ends, require_link, require_sound
 
@@ -23,6 +24,8 @@ _RUNS = """SELECT run, plot, arguments, version, header, plots, domain, digest, 
 _LAST_BUT_ONE = "SELECT run, steps, seal FROM runs ORDER BY run DESC LIMIT 1 OFFSET 1"
 _STEPS = """SELECT place, run, number, steps.time, before, version, serials, message, configuration, change, records,
     knowledge, steps.digest, changes.digest FROM steps LEFT JOIN changes USING (version)"""
+RELATIONS = "relations"
+"""Key of a message's form for `StepRow.relations`."""
 _DIGEST = "SELECT digest FROM steps WHERE place = ?"
 
 
@@ -68,6 +71,8 @@ class StepRow:
         version: version of the knowledge after the macrostep.
         serials: the last serial number that the run has used.
         message: the handled message, as from `encoding.message_form`; empty for the start and the end of the run.
+        relations: rows of relations that the macrostep has read, and that have changed since the last such row. A
+            replay needs those that other parts than the chart provide, e.g. components.
         configuration: paths of the active states after the macrostep.
         records: trace records since the previous macrostep.
     """
@@ -78,6 +83,7 @@ class StepRow:
     version: int
     serials: int
     message: Mapping[str, Any]
+    relations: Mapping[str, list[list[Value]]]
     configuration: tuple[str, ...]
     records: tuple[Record, ...]
 
@@ -380,8 +386,10 @@ def unfinished(runs: RunArchive) -> RunRow:
 
 
 def _step(row: _StoredStep) -> StepRow:
+    message = json.loads(row.message)
+    relations = message.pop(RELATIONS, {})
     return StepRow(
-        row.number, row.time, row.before, row.version, row.serials, json.loads(row.message),
+        row.number, row.time, row.before, row.version, row.serials, message, relations,
         tuple(json.loads(row.configuration)),
         tuple([Record.from_line(line) for line in row.records.split("\n") if line]),
     )  # fmt: skip

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any, Literal
 
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output, SendMessage, Start
 from dsc.messages import LateMessage, Message, Told
-from dsc.runs.archive import RunArchive, archive, unfinished
+from dsc.runs.archive import RELATIONS, RunArchive, archive, unfinished
 from dsc.runs.encoding import SKILLS, message_form, signature_forms
 from dsc.runs.hashed_forms import Shortener
 from dsc.runs.kept import Kept, read, require_unchanged
@@ -278,6 +278,7 @@ class RunStore:
         undelivered: Collection[Told] = (),
         refused: Collection[Told] = (),
         memories: Iterable[tuple[str, Any]] = (),
+        relations: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         """Write a macrostep.
 
@@ -289,9 +290,12 @@ class RunStore:
             undelivered: earlier commands that components have neither received nor refused yet.
             refused: earlier commands that components refused.
             memories: memories of components, by component name.
+            relations: rows of relations that the macrostep has read, see `StepRow`.
         """
         self._number += 1
         form = {} if message is None else message_form(message, self._short)
+        if relations:
+            form[RELATIONS] = relations
         state, version = reactor.machine.state, self._knowledge.version
         self._state.dispatched(undelivered, refused)
         if message is not None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -71,7 +71,9 @@ class Dispatcher:
         library: the plots, whose records the types of skills may name; it receives the records of skills.
 
     Attributes:
+        components: the deployed components by name.
         activation: keeps required components alive and active.
+        lives: notices failures and restarts of components.
         outbox: one-way outputs to components.
         timers: timeouts, periods, delayed events and scheduled input from outside.
         wiring: the wires between components.
@@ -91,12 +93,12 @@ class Dispatcher:
         self._observer = observer
         self._part_of = part_of
         self._run_id = run_id
-        self._components = {component.name: component for component in require_instances(components)}
-        self.activation = ComponentActivation(ComponentRegistry(self._components), self._in_use)
+        self.components = {component.name: component for component in require_instances(components)}
+        self.activation = ComponentActivation(ComponentRegistry(self.components), self._in_use)
         self.outbox = Outbox(self._refused)
-        self._lives = ComponentLives(self._components.values(), self._failed, self._recovered)
-        self._undeployed = Undeployed(clock, post, self._refused, self._components.keys())
-        self.wiring = Wiring(self._components)
+        self.lives = ComponentLives(self.components.values(), self._failed, self._recovered)
+        self._undeployed = Undeployed(clock, post, self._refused, self.components.keys())
+        self.wiring = Wiring(self.components)
         self.wiring.listen(self.activation.look)
         self._faults: list[str] = []
         self._failures: dict[str, str] = {}  # reasons of the components that have failed and not recovered
@@ -117,7 +119,7 @@ class Dispatcher:
         After the `last` component, a skill or command for a missing component fails without waiting.
         """
         self._undeployed.complete = last
-        self._lives.add(component)
+        self.lives.add(component)
         self.activation.deploy(component)
         self.wiring.deployed(component)
         for held in self._undeployed.release(component.name):
@@ -132,7 +134,7 @@ class Dispatcher:
         """Return the signatures of all deployed skills; `None` if more components may be deployed."""
         if not self._undeployed.complete:
             return None
-        return [skill for component in self._components.values() for skill in component.skills().values()]
+        return [skill for component in self.components.values() for skill in component.skills().values()]
 
     @property
     def is_part(self) -> bool:
@@ -183,7 +185,7 @@ class Dispatcher:
 
     def dispatch(self, output: steps.Output) -> None:
         """Execute one output of the machine; an output for a component that is not deployed waits, or fails."""
-        if isinstance(output, _FOR_COMPONENTS) and output.component not in self._components:
+        if isinstance(output, _FOR_COMPONENTS) and output.component not in self.components:
             within = output.within if isinstance(output, steps.Start) else None
             self._undeployed.hold(output, within or DEFAULT_WITHIN)
             return
@@ -221,16 +223,11 @@ class Dispatcher:
         """Commands that were neither received nor refused yet."""
         return [*self.outbox.undelivered, *self._undeployed.commands] if self._undeployed else self.outbox.undelivered
 
-    @property
-    def components(self) -> Mapping[str, Component]:
-        """The deployed components by name."""
-        return self._components
-
     def component(self, name: str) -> Component:
         """Return the component of that name; raise `UnknownNameError` if it is missing."""
-        if name not in self._components:
-            raise no_component(name, self._components)
-        return self._components[name]
+        if name not in self.components:
+            raise no_component(name, self.components)
+        return self.components[name]
 
     def unfinished(self) -> Iterator[str]:
         """Yield the skills that have not ended, and the components whose `stop` is due, as texts."""
@@ -238,7 +235,7 @@ class Dispatcher:
             yield f"skill {running.describe()} has not ended"
         for name in self._cleanups.pending:
             yield f"a cancelled skill of component '{name}' has not ended"
-        for component in self._components.values():
+        for component in self.components.values():
             if component.life.started:
                 yield f"component '{component.name}' was not stopped"
 
@@ -252,7 +249,7 @@ class Dispatcher:
 
     def signature(self, start: steps.Start) -> SkillSignature:
         """Return the signature of a skill with all known records; `UNKNOWN_SKILL` for a skill that is missing."""
-        component = self._components.get(start.component)
+        component = self.components.get(start.component)
         found = UNKNOWN_SKILL if component is None else component.skills().get(start.skill, UNKNOWN_SKILL)
         if found.records:
             self._library.declare(found.records)
@@ -263,7 +260,7 @@ class Dispatcher:
 
         A component whose `remember` fails is skipped, and keeps its last memory.
         """
-        for component in self._components.values():
+        for component in self.components.values():
             if type(component).remember is not Component.remember:
                 try:
                     with contained(f"{component.name}.remember", component.device_errors):
@@ -285,7 +282,7 @@ class Dispatcher:
             self._free(ended.claim)
         if start.component in self.activation.concerned:
             self.activation.look()
-        component = self._components.get(start.component)
+        component = self.components.get(start.component)
         if component is not None and type(component).forget is not Component.forget:
             task = asyncio.get_running_loop().create_task(self._forget(component, self._part_of + start.action_id))
             self._forget_tasks.add(task)
@@ -337,7 +334,7 @@ class Dispatcher:
 
     def has_turns(self, start: steps.Start) -> bool:
         """Return whether the skill waits for its turn, see `Component.takes_turns`."""
-        component = self._components.get(start.component)
+        component = self.components.get(start.component)
         signature = None if component is None else component.skills().get(start.skill)
         return component is not None and signature is not None and component.takes_turns(signature)
 
@@ -365,7 +362,7 @@ class Dispatcher:
         """
         for running in self._running.values():
             if running.holder is not None:
-                component = self._components[running.start.component]
+                component = self.components[running.start.component]
                 yield f"{running.describe()} waits for {self._missing(running, component)}"
         yield from self._undeployed.describe()
 
@@ -410,7 +407,7 @@ class Dispatcher:
                 failure(task)  # marks the error as retrieved; the skill was cancelled
         await self.activation.close()
         self.wiring.close()
-        unstopped = await self._lives.close(None if self.is_part else self.activation.needed)
+        unstopped = await self.lives.close(None if self.is_part else self.activation.needed)
         problems = [*self.outbox.failures(), *self._undeployed.close(), *self._faults, *unstopped]
         for problem in problems:
             _LOG.warning("%s", problem)  # a cancelled run has no `RunEnd`
@@ -503,7 +500,7 @@ class Dispatcher:
         if holder is not None:
             doing = f", which executes {holder}" if holder else ""
             return f"component '{running.start.component}'{doing}"
-        unconfigured = self.outbox.unconfigured(running.start, running.configuring, self._components)
+        unconfigured = self.outbox.unconfigured(running.start, running.configuring, self.components)
         if unconfigured or component.life.state is Life.ALIVE:
             return unconfigured
         return component.life.describe() + component.life.hook

@@ -125,6 +125,7 @@ class Outbox:
         match told:
             case SetParameter():
                 await component.configure(told.parameter, encoded(told.value))
+                component.life.announce()
             case SwitchMode():
                 await component.change_mode(told.mode)
                 if told.mode == Life.INIT and component.life.state is Life.ALIVE:

@@ -50,6 +50,7 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.tracebacks import raised_at
+from knowledge_base.world.fact_index import Args
 
 MOST_CANCELLED = 1_000
 """Upper bound of the number of cancelled skills whose cause is kept, for the trace of late observations."""
@@ -125,8 +126,12 @@ class Reactor:
         self._cancelled: deque[str] = deque()
         self._noted: set[str] = set()
         self._now: float | None = None
-        self.relations = {**design_rows(lambda: self.library), **configuration_rows(lambda: self.machine.state)}
+        self.relations = {
+            **design_rows(lambda: self.library),
+            **configuration_rows(lambda: self.machine.state, lambda: self.library),
+        }
         self.renewed = False
+        self._told_rows: dict[str, list[Args]] = {}
 
     def know_skills(self, skills: Collection[SkillSignature] | None) -> None:
         """Check plots given as data also against the deployed skills; `None` if they are unknown."""
@@ -139,7 +144,7 @@ class Reactor:
             self.library.change(plots)
         self.machine.chart = CheckedPlots(self.library, self.knowledge.schema, self._skills)
         if self._live.read:
-            self._renew(DESIGN)
+            self.renew(DESIGN)
 
     def restore(self, kept: Kept) -> None:
         """Restore the state after the last macrostep of an interrupted run."""
@@ -388,15 +393,24 @@ class Reactor:
         if step.errors or step.bugs:
             self._note_errors(step)
         if self._live.read:
-            self._renew(CONFIGURATION)
+            self.renew(CONFIGURATION)
         return step.output
 
-    def _renew(self, names: Iterable[str]) -> None:
+    def renew(self, names: Iterable[str]) -> None:
         """Evaluate the conditions on relations whose rows may have changed."""
         try:
             self.renewed |= self.knowledge.renew_relations(*names)
         except ExceptionGroup as errors:
             self._note(errors, "a listener of the knowledge base")
+
+    def new_rows(self) -> dict[str, list[Args]]:
+        """Return the rows of other programs' relations that were read, and have changed, since the last call."""
+        found: dict[str, list[Args]] = {}
+        for name, rows in self._live.take_new().items():
+            listed = [one.args for one in rows]
+            if name not in self.relations and self._told_rows.get(name) != listed:
+                found[name] = self._told_rows[name] = listed
+        return found
 
     def _note_errors(self, step: Step) -> None:
         if step.errors:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from dsc.dynamic.library import Library
@@ -15,7 +16,7 @@ from dsc.runs.kept import plots_of
 from dsc.sequencer.reactor import Reactor
 from dsc.trace import Trace, text_of
 from knowledge_base.exchange import delta_form
-from knowledge_base.facts import Delta
+from knowledge_base.facts import Delta, Value
 from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.history import MemoryHistory, Version
 from knowledge_base.store import KnowledgeBase
@@ -101,6 +102,7 @@ class _ReplayedRun:
         self._reactor = Reactor(library, self._knowledge, Trace(lambda: self._now), run=of_run)
         self._knowledge.provide(self._reactor.relations)
         self._reactor.know_skills(signatures_in(row.header, runs.form))
+        self._rows: dict[str, list[tuple[Value, ...]]] = {}
         self._started: dict[str, Start] = {}
 
     def take(self, step: StepRow) -> Divergence | None:
@@ -108,6 +110,7 @@ class _ReplayedRun:
         self._now = step.time
         for change in self._past.changes(self._knowledge.version, step.before):  # changes of other authors
             self._knowledge.apply(change.delta, change.author)
+        self._provide(step.relations)
         action_id = step.message.get("action")
         if action_id not in (None, *self._started):
             return Divergence(step.number, "what is answered", f"the action {action_id}", "not started at all")
@@ -120,6 +123,16 @@ class _ReplayedRun:
         if recorded != replayed:
             return Divergence(step.number, "what was told", _told(recorded), _told(replayed))
         return None
+
+    def _provide(self, relations: Mapping[str, list[list[Value]]]) -> None:
+        """Provide the rows that other parts than the chart have provided in the run."""
+        for name, rows in relations.items():
+            is_new = name not in self._rows
+            self._rows[name] = [*map(tuple, rows)]
+            if is_new:
+                self._knowledge.provide({name: partial(self._rows.__getitem__, name)})
+        if relations:
+            self._knowledge.renew_relations(*relations)
 
     def _output(self, step: StepRow) -> tuple[Output, ...]:
         if step.message:

@@ -6,6 +6,7 @@ import asyncio
 import math
 from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from typing import Any, cast
 
 from dsc.calls import Outputs, PlotCall
@@ -21,6 +22,7 @@ from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer import message_checks
 from dsc.sequencer.clock import LoopClock
+from dsc.sequencer.component_relations import ComponentRelations
 from dsc.sequencer.component_tracing import ComponentTracer
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.inbox import Inbox, LivelockGuard
@@ -99,6 +101,10 @@ class Sequencer(OutsideInput):
             self.trace.listen(store.receive)
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id, self.library)
+        self._live = knowledge.live_rows
+        self._relations = ComponentRelations(
+            self.dispatcher, lambda: self.machine.state, self._live, self._reactor.renew
+        )
         self._tracer = ComponentTracer(self.trace, self.dispatcher.wiring, self.dispatcher.activation)
         self._open_ended = open_ended
         self._over = False
@@ -213,14 +219,18 @@ class Sequencer(OutsideInput):
         self._over = False
         self._reacts = True  # until the start is complete
         knowledge = self.knowledge
-        unsubscribe = (
+        ends = [
             knowledge.subscribe(self._changed), knowledge.subscribe_to_sources(self._fed),
-            knowledge.provide(self._reactor.relations), knowledge.subscribe_to_relations(self._wake_for_relations),
-        )  # fmt: skip
+            knowledge.subscribe_to_relations(partial(self.clock.calls.call, self._wake, "relations")),
+        ]  # fmt: skip
+        if not self.dispatcher.is_part:  # the run around it provides the relations
+            ends.append(knowledge.provide({**self._reactor.relations, **self._relations.rows}))
+            self._relations.listen()
         try:
             yield
         finally:
-            for end in unsubscribe:
+            self._relations.close()
+            for end in ends:
                 end()
             self._over = True
 
@@ -381,10 +391,6 @@ class Sequencer(OutsideInput):
         """Receive a new value of a source from any thread."""
         self.clock.calls.call(self._wake, source.reference)
 
-    def _wake_for_relations(self) -> None:
-        """Receive a change of relations from any thread."""
-        self.clock.calls.call(self._wake, "relations")
-
     def _wake(self, author: str) -> None:
         """Let waiting guards be evaluated after a change of knowledge that is not the run's own.
 
@@ -420,6 +426,8 @@ class Sequencer(OutsideInput):
         elif isinstance(message, SkillMessage):
             self.dispatcher.report_taken(message.start)
         self.dispatcher.dispatch_all(output)
+        if self._live.read:
+            self._relations.renew()
         if self._reactor.renewed:
             self._reactor.renewed = self._reacts = False
             self._wake("relations")
@@ -482,8 +490,9 @@ class Sequencer(OutsideInput):
         dispatcher = self.dispatcher
         memories = dispatcher.memories()
         refused = dispatcher.outbox.refused()
+        relations = self._live.new and self._reactor.new_rows()
         self.store.step(
-            self._reactor.moment(), message, output, self._reactor, dispatcher.undelivered, refused, memories
+            self._reactor.moment(), message, output, self._reactor, dispatcher.undelivered, refused, memories, relations
         )
 
     # -- from outside ------------------------------------------------------------------------------------
@@ -513,11 +522,13 @@ class Sequencer(OutsideInput):
     def note_wait(self, start: Start, holder: str) -> None:
         """Record that a skill waits for the end of the skill `holder`."""
         self._reactor.tracer.waits(start, holder)
+        self._relations.renew()
         self._keep_wait(start, None)
 
     def note_turn(self, start: Start) -> bool:
         """Record that a skill gets its turn after a wait, and return whether the skill may begin."""
         self._reactor.tracer.turn(start)
+        self._relations.renew()
         return self._keep_wait(start, self.clock.now())
 
     def _keep_wait(self, start: Start, turn: float | None) -> bool:

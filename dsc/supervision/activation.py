@@ -36,6 +36,7 @@ class ComponentActivation(Announcer):
         concerned: names of the components that participate.
         waiting: the reasons of the components in use that wait for resources, by name.
         waits: announces changes of `waiting`.
+        room: the resources of the robot; `None` if they are not limited.
     """
 
     def __init__(self, registry: ComponentRegistry, used: Callable[[], Iterable[str]]) -> None:
@@ -45,7 +46,7 @@ class ComponentActivation(Announcer):
         self.concerned: set[str] = set()
         self.waiting: dict[str, str] = {}
         self.waits = Announcer()
-        self._room: Room | None = None
+        self.room: Room | None = None
         self._in_order: list[str] = []  # the components in use, the earliest first
         self._rank_of: Callable[[str], Rank] = lambda _: ORDINARY
         self._in_mode: dict[str, None] = {}
@@ -64,7 +65,7 @@ class ComponentActivation(Announcer):
 
     def share(self, room: Room, rank_of: Callable[[str], Rank]) -> None:
         """Activate components only if the room has their resources; those of a larger rank come first."""
-        self._room, self._rank_of = room, rank_of
+        self.room, self._rank_of = room, rank_of
         room.listen(self.look)
 
     def deploy(self, component: Component) -> None:
@@ -117,8 +118,8 @@ class ComponentActivation(Announcer):
         for component in self.registry.components.values():
             component.life.leave(self.look)
         self._keep_only({})
-        if self._room is not None:
-            self._room.leave(self.look)
+        if self.room is not None:
+            self.room.leave(self.look)
         if self._released:
             # A task may wait `GRACE` for another component, then `GRACE` for its own.
             _, others = await asyncio.wait(self._released.values(), timeout=2 * GRACE)
@@ -182,7 +183,7 @@ class ComponentActivation(Announcer):
         required: dict[str, Component | None] = {}
         in_mode = [name for name in self._in_mode if self.registry.components[name].mode != NEUTRAL]
         in_use = [name for name in (*sorted(self._used()), *in_mode) if name in self.concerned]
-        for name in in_use if self._room is None else self._with_room(self._room, dict.fromkeys(in_use)):
+        for name in in_use if self.room is None else self._with_room(self.room, dict.fromkeys(in_use)):
             self._require(name, None, required)
         self._keep_only(required)
 
@@ -245,8 +246,8 @@ class ComponentActivation(Announcer):
         def over(task: asyncio.Task[None]) -> None:
             if self._released.get(supervisor.name) is task:
                 del self._released[supervisor.name]
-            if self._room is not None and supervisor.name not in self._supervisors:
-                self._room.release(supervisor.name, id(self))
+            if self.room is not None and supervisor.name not in self._supervisors:
+                self.room.release(supervisor.name, id(self))
 
         del self._supervisors[supervisor.name]
         supervisor.release(after)

@@ -9,7 +9,7 @@ from functools import partial
 
 from dsc.components.component import Component
 from dsc.components.hooks import GRACE, abandon, reason_of
-from dsc.components.life_cycle import Life
+from dsc.components.life_cycle import Announcer, Life
 from knowledge_base.errors import InputError
 
 _READY = frozenset({Life.INIT, Life.ALIVE})
@@ -23,6 +23,9 @@ class ComponentLives:
         components: the components at the start of the run.
         failed: receives each component that enters FatalError.
         recovered: receives each component that can start again after a failure, and then the one that has started.
+
+    Attributes:
+        changes: announces changes of the components, and new components.
     """
 
     def __init__(
@@ -36,6 +39,7 @@ class ComponentLives:
         self._lost: set[Component] = set()
         self._last: dict[Component, Life] = {}
         self._listeners: dict[Component, Callable[[], None]] = {}
+        self.changes = Announcer()
         for component in components:
             self.add(component)
 
@@ -49,6 +53,7 @@ class ComponentLives:
         self._last[component] = component.life.state
         self._listeners[component] = listener = partial(self._look, component)
         component.life.listen(listener)
+        self.changes.announce()
 
     def _look(self, component: Component) -> None:
         before, self._last[component] = self._last[component], component.life.state
@@ -59,6 +64,7 @@ class ComponentLives:
             if component.life.state is Life.ALIVE:
                 self._lost.discard(component)
             self._recovered(component)
+        self.changes.announce()
 
     async def close(self, needed: Callable[[Component], Iterable[str]] | None) -> list[str]:
         """Stop listening; also stop the components that no other run has, each after those that need it.

@@ -84,6 +84,13 @@ class Room(Announcer):
             self.announce()
         return ""
 
+    def short_of(self, component: Component) -> list[str]:
+        """Return the resources that a component lacks in its mode; all its resources if each alone is free."""
+        wanted = amounts_of(component, component.mode)
+        others = [amounts for name, amounts in self.users.items() if name != component.name]
+        used = {name: sum(amounts.get(name, 0.0) for amounts in others) for name in wanted}
+        return [one for one in wanted if used[one] + wanted[one] > self.capacity[one]] or [*wanted]
+
     def release(self, component: str, holder: int) -> None:
         """Free the resources of a component that no other activation tree needs."""
         holders = self._holders.get(component)

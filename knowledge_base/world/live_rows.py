@@ -18,11 +18,13 @@ class LiveRows:
 
     Attributes:
         read: the rows that were read since the last change, by relation.
+        new: the rows that were read since the last `take_new`.
     """
 
     def __init__(self) -> None:
         self._providers: dict[str, list[Rows]] = {}
         self.read: dict[str, FactIndex] = {}
+        self.new: dict[str, FactIndex] = {}
 
     def __bool__(self) -> bool:
         return bool(self._providers)
@@ -50,8 +52,13 @@ class LiveRows:
             for provider in self._providers.get(name, ()):
                 for args in provider():
                     found.add(Fact(name, args))
-            self.read[name] = found
+            self.read[name] = self.new[name] = found
         return found
+
+    def take_new(self) -> dict[str, FactIndex]:
+        """Return the rows that were read since the last call."""
+        new, self.new = self.new, {}
+        return new
 
     def news(self, names: Iterable[str], watched: Callable[[str], bool]) -> tuple[list[Fact], list[Fact]]:
         """Forget rows; return the facts of watched relations that have ended, and those that have begun, since then."""

@@ -9,7 +9,18 @@ from typing import Any
 import pytest
 
 from domains.clean_up_table.bringup import deploy
-from dsc import has_run, is_unfinished, parse_plot, replay, run_simulated
+from dsc import (
+    Component,
+    Outcome,
+    Parameters,
+    SkillCall,
+    has_run,
+    is_unfinished,
+    parse_plot,
+    replay,
+    run_simulated,
+    skill,
+)  # fmt: skip
 from dsc.testing import Crashes, one_history, replays, violations
 from dsc.trace import Record
 from knowledge_base.errors import InputError
@@ -19,7 +30,7 @@ DOMAIN = "(define (domain d) (:predicates (p)))"
 
 
 def robot_of(*texts: str, **how: Any) -> tuple[Robot, list[Record]]:
-    robot = Robot(DOMAIN, map(parse_plot, texts), [], **{"clock": "simulated", **how})
+    robot = Robot(DOMAIN, map(parse_plot, texts), how.pop("components", []), **{"clock": "simulated", **how})
     records: list[Record] = []
     robot.listen(records.append)
     return robot, records
@@ -168,6 +179,118 @@ def test_after_a_run_no_state_is_active():
     with robot:
         robot.run("main")
         assert robot.knowledge.query("(dsc:active ?state)") == []
+
+
+# -- components ----------------------------------------------------------------------------------------------
+
+
+class Moved(Outcome): ...
+
+
+class ArmParameters(Parameters):
+    speed: float = 1.0
+
+
+class Arm(Component):
+    """An arm with modes, whose `move` takes a second, and whose `break_down` ends its life."""
+
+    name = "arm"
+    modes = ("scan", "hold")
+    parameters: ArmParameters
+
+    @skill
+    async def move(self, call: SkillCall) -> Moved:
+        await call.clock.sleep(1)
+        return Moved()
+
+    @skill
+    async def break_down(self, call: SkillCall) -> Moved:
+        await call.clock.sleep(0.5)
+        self.life.fail(RuntimeError("no power"))
+        await call.clock.sleep(0.5)
+        return Moved()
+
+
+WAITING = """
+plot: main
+states:
+  both:
+    on: {done: over}
+    regions:
+      first: {states: {one: {entry: {trigger: arm.move}, on: {moved: first_over}}, first_over: {final: true}}}
+      second: {states: {two: {entry: {trigger: arm.move}, on: {moved: second_over}}, second_over: {final: true}}}
+  over: {final: true}
+"""
+
+
+def test_skills_and_waits_are_asked():
+    robot, _ = robot_of(WAITING, components=[Arm()])
+    with robot:
+        executing, waiting, skills = asked(
+            robot, "main", 0.5, "(dsc:executes ?state ?skill)", "(dsc:waits ?who arm)", "(dsc:outcome ?skill moved)"
+        )
+    assert executing == [{"state": "one", "skill": "arm.move"}]
+    assert waiting == [{"who": "two"}]
+    assert {one["skill"] for one in skills} == {"arm.move", "arm.break_down"}
+
+
+FOLLOWING = """
+plot: main
+states:
+  both:
+    on: {done: over}
+    regions:
+      driving:
+        states:
+          idle: {after: {seconds: 1, to: scanning}}
+          scanning: {entry: [{switch: arm, to: scan}, {set: arm.speed, to: 0.5}], after: {seconds: 1, to: holding}}
+          holding: {entry: [{switch: arm, to: hold}], after: {seconds: 1, to: breaking}}
+          breaking: {entry: {trigger: arm.break_down}, on: {moved: driven, skill_error: driven}}
+          driven: {final: true}
+      watching:
+        states:
+          wait: {always: {when: (dsc:component-mode arm scan), to: scans}}
+          scans: {always: {when: (exists (?value) (and (dsc:component-parameter arm speed ?value) (< ?value 0.6))), to: slow}}
+          slow: {always: {when: (exists (?arm) (dsc:component-mode ?arm hold)), to: holds}}
+          holds: {always: {when: (dsc:component-life arm fatal_error), to: broken}}
+          broken: {final: true}
+  over: {final: true}
+"""
+
+
+def entered(records: list[Record], *states: str) -> list[float]:
+    """Return the seconds at which the states were entered."""
+    steps = [(one.t, micro) for one in records if one.type == "step" for micro in one.data["microsteps"]]
+    return [round(t, 2) for state in states for t, micro in steps if state in micro["entered"]]
+
+
+def test_guards_on_components_are_taken_after_the_change():
+    robot, records = robot_of(FOLLOWING, components=[Arm()])
+    with robot:
+        assert robot.run("main").reached
+    assert entered(records, "scans", "slow", "holds", "broken") == [1.0, 1.0, 2.0, 3.5]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_replay_repeats_what_plots_read_of_components(seed, tmp_path):
+    crashes: Crashes[list[Record]] = Crashes(tmp_path, seed, chance=0.1, most=3)
+
+    def live(folder: Path):
+        store = folder / "run.kb"
+        robot, records = robot_of(FOLLOWING, components=[Arm()], store=store)
+        with robot:
+            if not has_run(store):
+                robot.run("main", prepare=crashes.watch)
+            elif is_unfinished(store):
+                robot.resume(prepare=crashes.watch)
+            return records
+
+    crashes.survive(live)
+    assert crashes.problems == []
+    assert violations(crashes.folder / "run.kb", [one_history, replays()]) == []
+    replayed = replay(crashes.folder / "run.kb")
+    assert replayed.divergence is None
+    assert replayed.steps >= 8
 
 
 # -- mistakes and limits -------------------------------------------------------------------------------------
