@@ -13,7 +13,16 @@ import page
 from knowledge import contenders
 from knowledge.contender import Contender
 from knowledge.questions import question_rows
-from knowledge.updates import FSYNCED, JOURNALED, Sizes, condition_rows, everyday_rows, recovery_rows, size_rows
+from knowledge.updates import (
+    FSYNCED,
+    JOURNALED,
+    Sizes,
+    condition_rows,
+    everyday_rows,
+    recovery_rows,
+    relation_rows,
+    size_rows,
+)
 from rows import ENGINE, Row, table
 from timing import Pace
 
@@ -26,7 +35,8 @@ def rows_of(everyone: list[type[Contender]], *, quick: bool) -> list[Row]:
     pace, sizes = (QUICK, TINY) if quick else (FULL, Sizes())
     asked = [row for size in ((100,) if quick else (10_000, 100_000)) for row in question_rows(everyone, size, pace)]
     watched = condition_rows(pace, sizes)
-    return [*everyday_rows(pace), *asked, *watched, *size_rows(pace, sizes), *recovery_rows(sizes)]
+    live = relation_rows(pace, sizes)
+    return [*everyday_rows(pace), *asked, *watched, *live, *size_rows(pace, sizes), *recovery_rows(sizes)]
 
 
 def main() -> None:

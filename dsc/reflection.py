@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 
 from dsc.dynamic.library import Library
@@ -17,6 +17,8 @@ from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.live_rows import Rows
 
 _Row = tuple[Value, ...]
+Running = tuple[str, ActionPlot]
+"""The path of an active state, and the plot that runs inside it."""
 
 
 def design_rows(library: Callable[[], Library]) -> dict[str, Rows]:
@@ -45,14 +47,33 @@ def design_rows(library: Callable[[], Library]) -> dict[str, Rows]:
     return {name: partial(rows, read) for name, read in of_plot.items()}
 
 
-def configuration_rows(state: Callable[[], MachineState], library: Callable[[], Library]) -> dict[str, Rows]:
-    """Return the providers of the relations of the active states."""
+def configuration_rows(
+    active: Callable[[], Iterable[str]], running: Callable[[], Iterable[Running]], library: Callable[[], Library]
+) -> dict[str, Rows]:
+    """Return the providers of the relations of the active states.
+
+    Args:
+        active: returns the paths of the active states.
+        running: returns the plots that run inside them, as from `running_plots`.
+        library: returns the plots of the run.
+    """
     return {
-        "dsc:active": lambda: [(path,) for path in state().configuration()],
-        "dsc:running": lambda: ((path, plot.name) for path, plot in _plots(state())),
-        "dsc:step": lambda: ((path, _action(step, library())) for path, step in _steps(state())),
-        "dsc:step-argument": lambda: (row for path, step in _steps(state()) for row in _arguments(path, step)),
+        "dsc:active": lambda: ((path,) for path in active()),
+        "dsc:running": lambda: ((path, plot.name) for path, plot in running()),
+        "dsc:step": lambda: (row for path, step in _steps(running()) for row in _actions(path, step, library())),
+        "dsc:step-argument": lambda: (row for path, step in _steps(running()) for row in _arguments(path, step)),
     }
+
+
+def running_plots(state: MachineState) -> Iterator[Running]:
+    """Yield the plots that run inside active states; outer plots come first."""
+    frame = state.root
+    waiting = [] if frame is None else [("", frame)]
+    while waiting:
+        prefix, frame = waiting.pop(0)
+        for host, inner in frame.children.items():
+            yield f"{prefix}{host}", inner.compiled.plot
+            waiting.append((f"{prefix}{host}/", inner))
 
 
 def parts_of(plot: ActionPlot, library: Library) -> list[str]:
@@ -105,30 +126,18 @@ def _components(plot: ActionPlot) -> Iterator[str]:
             yield from (one for one in map(component_of, flat(actions)) if one is not None)
 
 
-def _plots(state: MachineState) -> Iterator[tuple[str, ActionPlot]]:
-    """Yield the plots that run inside active states, with the paths of the states; outer plots come first."""
-    frame = state.root
-    waiting = [] if frame is None else [("", frame)]
-    while waiting:
-        prefix, frame = waiting.pop(0)
-        for host, inner in frame.children.items():
-            yield f"{prefix}{host}", inner.compiled.plot
-            waiting.append((f"{prefix}{host}/", inner))
-
-
-def _steps(state: MachineState) -> Iterator[tuple[str, DynamicState]]:
+def _steps(running: Iterable[Running]) -> Iterator[tuple[str, DynamicState]]:
     """Yield the steps of running plans, with the paths of their states."""
-    for host, plot in _plots(state):
+    for host, plot in running:
         if plot.generated:
             yield from (
                 (f"{host}/{name}", one) for name, one, _ in plot.walk() if isinstance(one, DynamicState) and one.dynamic
             )
 
 
-def _action(step: DynamicState, library: Library) -> str:
-    """Return the planning action of a step, or the name of its only candidate."""
-    candidates = candidates_of(step, library)
-    return next((one.implements for one in candidates if one.implements), step.candidates[0])
+def _actions(path: str, step: DynamicState, library: Library) -> Sequence[_Row]:
+    """Return the planning action of a step, or the plot without one; nothing if the library lacks the plots."""
+    return [(path, one.implements or one.name) for one in candidates_of(step, library)][:1]
 
 
 def _arguments(path: str, step: DynamicState) -> Iterator[_Row]:

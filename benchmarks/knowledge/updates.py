@@ -12,11 +12,11 @@ from tempfile import TemporaryDirectory
 from rows import ENGINE, FLOOR, Cell, Row, Target
 from timing import Pace, measure, ratio
 
-from knowledge.warehouse import Bare, Kept
+from knowledge.warehouse import Bare, Kept, Live
 from knowledge_base import KnowledgeBase
 
 JOURNALED, FSYNCED = "journaled", "fsynced"
-NONE, SOME, SEEN = "without", "with conditions", "with graph"
+NONE, SOME, SEEN, LIVE = "without", "with conditions", "with graph", "live"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +77,27 @@ def condition_rows(pace: Pace, sizes: Sizes) -> list[Row]:
         gc.unfreeze()
         for each in kept.values():
             each.kb.close()
+    return rows
+
+
+def relation_rows(pace: Pace, sizes: Sizes, facts: int = 50) -> list[Row]:
+    """Return the rows of a change in a live relation of a small world, and of the same change of facts."""
+    bare, told, live = Bare(facts), Kept(facts), Live(facts)
+    number, shapes = sizes.conditions[0], sizes.shapes[0]
+    for each in (told, live):
+        each.install(each.conditions(number, shapes))
+    figures = measure({FLOOR: bare.job(), SOME: told.job(), LIVE: live.job()}, pace)
+    floor = Cell(1e6 * median(figures[FLOOR]))
+    about = f"{live.items} rows, {number:,} conditions of {shapes} shapes"
+    rows = [
+        Row(
+            f"{change}, {about}",
+            "µs",
+            {FLOOR: floor, ENGINE: Cell(1e6 * median(figures[name]), ratio(figures, name, FLOOR))},
+        )
+        for change, name in (("update", SOME), ("change of a live relation", LIVE))
+    ]
+    rows[-1].targets.append(Target("x update", 2, ratio(figures, LIVE, SOME)))
     return rows
 
 

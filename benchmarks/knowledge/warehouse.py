@@ -10,7 +10,7 @@ from pathlib import Path
 from timing import Job
 
 from knowledge.floor import Index
-from knowledge_base import Condition, Delta, Fact, KnowledgeBase, Schema, fact
+from knowledge_base import Condition, Delta, Fact, KnowledgeBase, Schema, declare_relations, fact
 
 KINDS = 40
 SCHEMA = Schema.parse(
@@ -144,3 +144,22 @@ class Kept(Warehouse):
 
     def _somewhere(self, n: int) -> int:
         return n * 7919 % min(self.places, self.items)
+
+
+class Live(Kept):
+    """A knowledge base whose program provides the places of the items as a live relation."""
+
+    def __init__(self, facts: int) -> None:
+        super().__init__(facts)
+        self.at = {f"i{n}": f"p{n % self.places}" for n in range(self.items)}
+        declare_relations({"bench:on": "item place"})
+        self.kb.provide({"bench:on": self.at.items})
+
+    def move(self, item: str, old: str, new: str) -> None:  # noqa: ARG002  the program knows the old place
+        """Change one row, and evaluate the conditions."""
+        self.at[item] = new
+        self.kb.renew_relations("bench:on")
+
+    def conditions(self, number: int, shapes: int) -> list[str]:
+        """Return the conditions of `Kept`, on the live relation."""
+        return [text.replace("(on ", "(bench:on ") for text in super().conditions(number, shapes)]

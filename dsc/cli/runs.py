@@ -5,8 +5,9 @@ Function `page` also shows the page of `dsc run --view`: it prints the address b
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from dsc.viewer.live import LivePage
     from dsc.viewer.records import RecordLog
     from dsc.viewer.server import Viewer
+    from knowledge_base.world.live_rows import Rows
 
 app = typer.Typer(
     name="runs", rich_markup_mode=None, no_args_is_help=True, help="Look at runs that were kept with --store."
@@ -35,6 +37,25 @@ MOST_COMPLAINTS = 5
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 picks a free one.")]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
 P = TypeVar("P", "LivePage", "Viewer")
+
+
+def kept_relations(store: Path) -> Mapping[str, Rows]:
+    """Return the relations of the last run in a store, for `dsc kb`; a query of them reads the records of the run."""
+    from dsc.model.relations import RELATIONS
+
+    @cache
+    def rows() -> Mapping[str, Rows]:
+        from dsc.runs.archive import archive
+        from dsc.viewer.recorded_run import TYPES, RecordedRun
+
+        recorded = RecordedRun()
+        with archive(store) as runs:
+            for record in runs.records(runs.run().number):
+                if record.type in TYPES:
+                    recorded.take({"type": record.type, **record.data})
+        return recorded.rows()
+
+    return {name: partial(lambda name: rows()[name](), name) for name in RELATIONS}
 
 
 @app.command("list")

@@ -50,4 +50,5 @@ COMPONENTS = {
 `dsc:executes` and `dsc:waits` have the states whose skills execute, or wait for a component. `dsc:waits` also has the
 components that wait for resources.
 """
-declare_relations({**DESIGN, **CONFIGURATION, **COMPONENTS})
+RELATIONS = {**DESIGN, **CONFIGURATION, **COMPONENTS}
+declare_relations(RELATIONS)

@@ -39,7 +39,7 @@ from dsc.messages import (
 )
 from dsc.model.plot import ActionPlot
 from dsc.model.relations import CONFIGURATION, DESIGN
-from dsc.reflection import configuration_rows, design_rows
+from dsc.reflection import configuration_rows, design_rows, running_plots
 from dsc.runs.kept import Kept
 from dsc.sequencer.checked_plots import CheckedPlots
 from dsc.sequencer.phase_watch import PhaseWatch, described
@@ -128,7 +128,11 @@ class Reactor:
         self._now: float | None = None
         self.relations = {
             **design_rows(lambda: self.library),
-            **configuration_rows(lambda: self.machine.state, lambda: self.library),
+            **configuration_rows(
+                lambda: self.machine.state.configuration(),  # noqa: PLW0108  of the state at the call
+                lambda: running_plots(self.machine.state),
+                lambda: self.library,
+            ),
         }
         self.renewed = False
         self._told_rows: dict[str, list[Args]] = {}

@@ -16,6 +16,7 @@ from typing import Any, Generic, TypeVar
 
 from pydantic_core import from_json
 
+from dsc.viewer.recorded_run import TYPES, RecordedRun
 from dsc.viewer.records import RecordLog
 from knowledge_base.errors import InputError, OutOfBoundsError, UnknownNameError
 from knowledge_base.exchange import delta_of, schema_of, world_of
@@ -96,24 +97,29 @@ class RecordReplay(Generic[_S]):
 
 @dataclass(slots=True)
 class Known:
-    """A world with its version."""
+    """A world with its version, and the run with its active states."""
 
     state: WorldState
     version: int
+    run: RecordedRun
 
 
 def knowledge(log: RecordLog) -> RecordReplay[Known]:
     """Return the replay of the knowledge."""
-    begin = Known(WorldState(Schema()), 0)
+    begin = Known(WorldState(Schema()), 0, RecordedRun())
     return RecordReplay(
-        log, frozenset({"world", "knowledge"}), begin, lambda k: Known(k.state.copy(), k.version), _known
+        log, TYPES | {"knowledge"}, begin, lambda k: Known(k.state.copy(), k.version, k.run.copy()), _known
     )
 
 
 def _known(before: Known, record: Mapping[str, Any]) -> Known:
     data = dict(record)
+    if record["type"] in TYPES:
+        before.run.take(record)
     if record["type"] == "world":
-        return Known(world_of(data, schema_of(data["schema"])), record["version"])
+        return Known(world_of(data, schema_of(data["schema"])), record["version"], before.run)
+    if record["type"] != "knowledge":
+        return before
     before.state.commit(delta_of(data))
     before.version = record["version"]
     return before
@@ -184,6 +190,7 @@ class PageQueries:
 
     def _view(self, asked: Form) -> View:
         known = self._knowledge.at(_seq(asked))
+        known.state.provide(known.run.rows())
         return View(known.state, known.version)
 
 

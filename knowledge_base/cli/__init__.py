@@ -6,6 +6,7 @@ import typer
 
 from knowledge_base.cli import changes, queries
 from knowledge_base.cli.console import register_reader as register_reader
+from knowledge_base.cli.console import register_relations as register_relations
 
 app = typer.Typer(
     rich_markup_mode=None,

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from knowledge_base.facts import Change, Delta
     from knowledge_base.pddl import ProblemText
     from knowledge_base.store import KnowledgeBase
+    from knowledge_base.world.live_rows import Rows
 
 Source = Annotated[
     Path, typer.Argument(metavar="SOURCE", help="A store, a PDDL problem, a world in JSON, or a scenario (YAML).")
@@ -42,11 +43,17 @@ _MOST_DIGITS = 15
 """Maximum number of digits of a version: more than any store needs, and few enough to parse quickly."""
 
 _readers: list[Callable[[Path], KnowledgeBase | None]] = []
+_providers: list[Callable[[Path], Mapping[str, Rows]]] = []
 
 
 def register_reader(reader: Callable[[Path], KnowledgeBase | None]) -> None:
     """Let commands read further sources by `reader`, which returns `None` for a source of another kind."""
     _readers.append(reader)
+
+
+def register_relations(provider: Callable[[Path], Mapping[str, Rows]]) -> None:
+    """Let queries of a store read relations, whose rows `provider` returns."""
+    _providers.append(provider)
 
 
 class Opened(NamedTuple):
@@ -103,7 +110,10 @@ def _opened(source: Path, domain: Path | None) -> Opened:
     from knowledge_base.store import KnowledgeBase
 
     if is_database(source):
-        return Opened(KnowledgeBase.open(None, source, read_only=True))
+        kb = KnowledgeBase.open(None, source, read_only=True)
+        for provider in _providers:
+            kb.provide(provider(source))
+        return Opened(kb)
     for reader in _readers:
         if (world := reader(source)) is not None:
             return Opened(world)

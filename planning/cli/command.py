@@ -16,10 +16,10 @@ from dsc.cli import plots
 from dsc.cli.logs import PROGRAMMING_ERROR
 from dsc.cli.monitor import monitor_command
 from dsc.cli.runs import app as runs_app
-from dsc.cli.runs import view_command
+from dsc.cli.runs import kept_relations, view_command
 from dsc.cli.wire import call_command, ps_command
 from knowledge_base.cli import app as kb_app
-from knowledge_base.cli import register_reader
+from knowledge_base.cli import register_reader, register_relations
 from planning.cli import bundles_command, plan_command
 from planning.cli.check import check_command
 from planning.cli.deployment import app as deployment_app
@@ -74,6 +74,7 @@ app.command("doctor")(doctor_command)
 app.command("bundles")(bundles_command)
 app.command("view")(view_command)
 register_reader(robot_knowledge)
+register_relations(kept_relations)
 plots.register_targets(components_of_target)
 
 
