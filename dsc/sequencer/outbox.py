@@ -58,6 +58,7 @@ class Outbox:
         self._failures: set[tuple[str, int]] = set()  # components and activations of the present macrostep
         self.untaken: dict[str, Delivery] = {}
         self.configuring: Configuring = {}
+        self._open_sets: dict[str, dict[int, Told]] = {}  # parameters of the present macrostep by component
         self._calls: dict[str, tuple[str, asyncio.Task[Any]]] = {}  # hooks that deliveries call, by component
         self._undelivered: dict[int, Told] = {}
         self._refused: deque[Told] = deque(maxlen=_MOST_REFUSED)
@@ -84,10 +85,23 @@ class Outbox:
             self.configuring = {}
         if self._failures:
             self._failures = set()
+        if self._open_sets:
+            self._open_sets = {}
 
     def send(self, component: Component, told: Told) -> None:
-        """Deliver an output to the component, after all earlier outputs."""
-        self._begin(component, _hook_of(told), told, lambda: self._take(component, told))
+        """Deliver an output to the component, after all earlier outputs.
+
+        Consecutive parameters of one entry are one set, as each alone may violate a relation (S1.20).
+        """
+        open_set = self._open_sets.pop(component.name, {})
+        if isinstance(told, SetParameter):
+            is_more = bool(open_set) and _extends(told, open_set.values())
+            outputs = self._open_sets[component.name] = open_set if is_more else {}
+        else:
+            is_more, outputs = False, {}
+        outputs[self._number(told)] = told
+        if not is_more:
+            self._begin(component, _hook_of(told), outputs, lambda: self._take(component, outputs))
         if not isinstance(told, SendMessage):
             self.configuring[component.name] = self.untaken[component.name]
 
@@ -95,7 +109,8 @@ class Outbox:
         """Deliver the state of the life cycle and the settings that were effective before a restart of the program."""
         for one in effective:
             if isinstance(one, SwitchMode) and one.mode in _LIVES:
-                self._begin(component, _hook_of(one), one, partial(_restore_life, component, one.mode))
+                outputs: dict[int, Told] = {self._number(one): one}
+                self._begin(component, _hook_of(one), outputs, partial(_restore_life, component, one.mode))
             else:
                 self._note(component, one, self._number(one))
         self.repeat(component)
@@ -105,7 +120,7 @@ class Outbox:
         settings = self._settings_of(component)
         if settings and not self._closed:
             settings.missing = True
-            self._begin(component, "configure_all", None, lambda: self._configure(component))
+            self._begin(component, "configure_all", {}, lambda: self._configure(component))
 
     def _settings_of(self, component: Component) -> _Settings:
         return self._settings.setdefault(component.name, _Settings())
@@ -121,18 +136,23 @@ class Outbox:
         self._undelivered[self._last] = told
         return self._last
 
-    async def _take(self, component: Component, told: Told) -> None:
-        match told:
-            case SetParameter():
-                await component.configure(told.parameter, encoded(told.value))
+    async def _take(self, component: Component, outputs: Mapping[int, Told]) -> None:
+        """Pass one output to a component, or several parameters as one set."""
+        match [*outputs.values()]:
+            case [SetParameter(parameter=parameter, value=value)]:
+                await component.configure(parameter, encoded(value))
                 component.life.announce()
-            case SwitchMode():
+            case [SwitchMode() as told]:
                 await component.change_mode(told.mode)
                 if told.mode == Life.INIT and component.life.state is Life.ALIVE:
                     self._settings_of(component).missing = True
                     await self._configure(component)
-            case SendMessage():
+            case [SendMessage() as told]:
                 await component.receive(told.port, encoded(told.arguments))
+            case several:
+                values = {one.parameter: one.value for one in several if isinstance(one, SetParameter)}
+                await component.configure_all(encoded(values))
+                component.life.announce()
 
     async def _configure(self, component: Component) -> None:
         """Pass all settings to a component, unless it has them: the parameters as one set, then the mode."""
@@ -152,40 +172,60 @@ class Outbox:
         for number in settings.taken():
             del self._undelivered[number]
 
-    def _begin(self, component: Component, hook: str, told: Told | None, take: Callable[[], Awaitable[None]]) -> None:
-        """Begin the delivery of an output by a call of a hook, or of all settings."""
-        number = 0 if told is None else self._number(told)
-        setting = told if hook in _SETTINGS and not isinstance(told, SendMessage) else None
+    def _begin(
+        self, component: Component, hook: str, outputs: Mapping[int, Told], take: Callable[[], Awaitable[None]]
+    ) -> None:
+        """Begin the delivery of outputs by a call of a hook; without outputs, of all settings."""
+        first = next(iter(outputs.values()), None)
+        are_settings = hook in _SETTINGS and not isinstance(first, SendMessage)
         before = self.untaken.get(component.name)
         failures = self._failures
 
         async def in_order() -> Exception | None:
+            if self._open_sets.get(component.name) is outputs:
+                del self._open_sets[component.name]
             if before is not None and not before.done():  # otherwise it arrives before a skill of this step can end
                 await asyncio.wait([before])
             try:
-                if hook in _LIFE_HOOKS or await _is_ready(component, told):
+                if hook in _LIFE_HOOKS or await _is_ready(component, first):
                     with self._calling(component, hook):
                         await take()
-                    if setting is not None:
-                        self._note(component, setting)
-                    self._undelivered.pop(number, None)
-                elif setting is not None:
-                    self._note(component, setting, number)
+                    self._settle(component, outputs, are_settings=are_settings)
+                elif are_settings:
+                    self._postpone(component, outputs)
             except Exception as error:
-                if told is None:  # the next skill fails with this error
+                if first is None:  # the next skill fails with this error
                     raise
-                if setting is not None and not isinstance(error, ProgrammingError):  # it may succeed later
-                    self._note(component, setting, number)
+                if are_settings and not isinstance(error, ProgrammingError):  # they may succeed later
+                    self._postpone(component, outputs)
                 else:
-                    self._refused.append(told)
-                    del self._undelivered[number]
-                self._report(component, told, error, failures)
+                    self._refuse(outputs)
+                self._report(component, first, error, failures)
                 return error
             if before is not None and (why := failure(before)) is not None:
                 raise why
             return None
 
         self.untaken[component.name] = asyncio.get_running_loop().create_task(in_order())
+
+    def _settle(self, component: Component, outputs: Mapping[int, Told], *, are_settings: bool) -> None:
+        """Note that a component has taken outputs."""
+        for number, told in outputs.items():
+            if are_settings and not isinstance(told, SendMessage):
+                self._note(component, told)
+            self._undelivered.pop(number, None)
+
+    def _postpone(self, component: Component, outputs: Mapping[int, Told]) -> None:
+        """Note settings that a component has not taken."""
+        for number, told in outputs.items():
+            if not isinstance(told, SendMessage):
+                self._note(component, told, number)
+
+    def _refuse(self, outputs: Mapping[int, Told]) -> None:
+        """Note outputs that a component will never take."""
+        for number, told in outputs.items():
+            self._refused.append(told)
+            del self._undelivered[number]
 
     def _report(self, component: Component, told: Told, error: Exception, failures: set[tuple[str, int]]) -> None:
         """Report a failure, unless the same activation knows of another failure of the component in the macrostep."""
@@ -340,6 +380,14 @@ async def _is_ready(component: Component, told: Told | None) -> bool:
         return False
     component.life.require_alive()
     return True
+
+
+def _extends(told: SetParameter, outputs: Iterable[Told]) -> bool:
+    """Return whether a parameter belongs to the same set as these: of the same entry, and with another name."""
+    return all(
+        isinstance(one, SetParameter) and one.activation == told.activation and one.parameter != told.parameter
+        for one in outputs
+    )
 
 
 def _hook_of(told: Told) -> str:
