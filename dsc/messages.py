@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from dsc.engine.plot_changes import ActivePlots
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
@@ -88,10 +89,12 @@ class PlotsMessage:
     Attributes:
         plots: the new plots by name; `None` removes a plot.
         active: the treatment of running plots that are replaced, see `ActivePlots`.
+        components: new components by name, each with its skills as plain data.
     """
 
     plots: Mapping[str, ActionPlot | None]
-    active: ActivePlots
+    active: ActivePlots = "at_next_entry"
+    components: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

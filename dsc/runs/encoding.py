@@ -57,7 +57,12 @@ def _signature_form(skill: SkillSignature) -> Form:
 def signatures_in(header: Mapping[str, Any], form: Callable[[str], Any]) -> list[SkillSignature] | None:
     """Return the deployed skills in a run's header; `None` if it has none."""
     forms = full_value(header.get(SKILLS), form)
-    return None if forms is None else [SkillSignature(**one) for one in forms.values()]
+    return None if forms is None else signatures_of(forms)
+
+
+def signatures_of(forms: Mapping[str, Form]) -> list[SkillSignature]:
+    """Return the skills of forms from `signature_forms`."""
+    return [SkillSignature(**one) for one in forms.values()]
 
 
 # -- messages ------------------------------------------------------------------------------------------------
@@ -116,7 +121,8 @@ def _outside_form(message: FromOutside, short: Shortener) -> Form:
         case WireMessage():
             return {"wire": _plain(message)}
         case PlotsMessage():
-            return {"plots": plot_hashes(message.plots, short), "active": message.active}
+            components = {"components": message.components} if message.components else {}
+            return {"plots": plot_hashes(message.plots, short), "active": message.active, **components}
 
 
 def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOutside:
@@ -128,7 +134,7 @@ def _outside_of(form: Mapping[str, Any], find: Callable[[str], Any]) -> FromOuts
         case {"wire": wire}:
             return WireMessage(**wire)
         case {"plots": plots, "active": active}:
-            return PlotsMessage(plots_of_hashes(plots, find), active)
+            return PlotsMessage(plots_of_hashes(plots, find), active, form.get("components", {}))
         case _:
             return _event_of(form["event"], find)
 

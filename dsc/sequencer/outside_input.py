@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from threading import Lock
 
+from dsc.components.assembly import require_deployed, require_instances
+from dsc.components.component import Component
+from dsc.components.wiring import name_sources, require_wired
 from dsc.dynamic.library import Library
 from dsc.engine.plot_changes import ActivePlots
 from dsc.events import Event
 from dsc.messages import FromOutside, PlotsMessage
 from dsc.model.plot import ActionPlot
+from dsc.profiles import configure
+from dsc.runs.encoding import signature_forms
 from dsc.sequencer import message_checks
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.validation import raise_findings, validate_library
@@ -28,13 +33,18 @@ class OutsideInput(ABC):
     _over: bool
 
     def __init__(self) -> None:
-        self.check_plots: Callable[[Library], None] = self._require_valid
+        self.check_plots: Callable[[Library, Collection[Component]], None] = self._require_valid
         self._changes: list[PlotsMessage] = []  # handed in and not taken yet
+        self._arriving: dict[str, Component] = {}  # handed in during the run
         self._handing_in = Lock()
 
     @abstractmethod
     def _hand_in(self, message: FromOutside, after: float) -> None:
         """Pass a checked message to the run after that number of seconds."""
+
+    @abstractmethod
+    def _hand_in_components(self, components: Collection[Component]) -> None:
+        """Pass checked components to the run."""
 
     def post(self, event: Event, *, after: float = 0.0) -> None:
         """Post an event from outside, e.g. an operator's `stop`, from any thread.
@@ -106,23 +116,35 @@ class OutsideInput(ABC):
         """
         self._hand_in(message_checks.checked_wire(port, to, self.dispatcher.components), after)
 
-    def install(self, plots: ActionPlot | Iterable[ActionPlot]) -> None:
-        """Install plots in the run, from any thread (S0.19); later entries of its states may use them.
+    def install(self, plots: ActionPlot | Iterable[ActionPlot] = (), components: Iterable[Component] = ()) -> None:
+        """Install plots and components in the run, from any thread (S0.19); later entries may use them.
 
-        All plots of the run are checked together as before a run. A store keeps the plots.
+        All plots and components of the run are checked together as before a run. The run wires the components by
+        service, and stops them at its end. A store keeps the plots; a program that resumes the run deploys the
+        components itself.
+
+        Args:
+            plots: the plots.
+            components: the components; the plots that they provide are installed, too.
 
         Raises:
-            SchemaError: the run has a plot of this name.
+            SchemaError: the run has a plot or a component of this name.
             PlotError: the plots do not pass the validator; the run is unchanged.
-            InputError: a value is not a plot, or the run has ended.
+            InputError: a value is not a plot or component, a component lacks a value or a provider, or the run has
+                ended; the run is unchanged.
         """
+        added = require_instances(components)
         new = message_checks.plots_by_name(plots)
+        for plot in (plot for one in added for plot in one.plots()):
+            new.setdefault(plot.name, plot)
         with self._handing_in:
             library = self._coming()
             for name in new:
                 if name in library:
                     raise SchemaError(f"there is already a plot '{name}': `replace` replaces it", found=name)
-            self._hand_in_plots(library, PlotsMessage(new, "at_next_entry"))
+            self._require_deployable(added)
+            skills = {one.name: signature_forms(one.skills().values()) for one in added}
+            self._hand_in_plots(library, PlotsMessage(new, components=skills), added)
 
     def replace(self, plots: ActionPlot | Iterable[ActionPlot], *, active: ActivePlots = "at_next_entry") -> None:
         """Replace plots of the run by others of the same names, from any thread (S2.8).
@@ -161,6 +183,21 @@ class OutsideInput(ABC):
                 library.plot(name)
             self._hand_in_plots(library, PlotsMessage(dict.fromkeys(names), "at_next_entry"))
 
+    def _require_deployable(self, added: Collection[Component]) -> None:
+        """Raise an error unless components can be deployed in addition to the present ones, whose wires stay."""
+        deployed = {**self.dispatcher.components, **self._arriving}
+        for one in added:
+            if one.name in deployed:
+                raise SchemaError(f"there is already a component '{one.name}'", found=one.name)
+        configure(added)
+        present = [*deployed.values(), *added]
+        require_deployed(present)
+        name_sources(deployed.values(), deployed.values())
+        require_wired(present)
+        room = self.dispatcher.activation.room
+        if room is not None:
+            room.require(added)
+
     def _coming(self) -> Library:
         """Return a copy of the plots after all changes that were handed in."""
         if self._over:
@@ -170,14 +207,19 @@ class OutsideInput(ABC):
             library.change(message.plots)
         return library
 
-    def _hand_in_plots(self, library: Library, message: PlotsMessage) -> None:
+    def _hand_in_plots(self, library: Library, message: PlotsMessage, added: Collection[Component] = ()) -> None:
         library.change(message.plots)
-        self.check_plots(library)
+        self.check_plots(library, [*self._arriving.values(), *added])
+        self._arriving.update({one.name: one for one in added})
         self._changes.append(message)
+        self._hand_in_components(added)
         self._hand_in(message, 0.0)
 
-    def _require_valid(self, library: Library) -> None:
-        """Raise `PlotError` if plots do not fit each other, the knowledge, or the deployed components."""
-        dispatcher = self.dispatcher
-        declared = {name: one.interface() for name, one in dispatcher.components.items()}
-        raise_findings(validate_library(library, self.knowledge.schema, dispatcher.skills(), declared))
+    def _require_valid(self, library: Library, added: Collection[Component]) -> None:
+        """Raise `PlotError` if plots do not fit each other, the knowledge, or the deployed and the added components."""
+        present = {**self.dispatcher.components, **{one.name: one for one in added}}
+        skills = self.dispatcher.skills()
+        if skills is not None:
+            skills = [skill for one in present.values() for skill in one.skills().values()]
+        declared = {name: one.interface() for name, one in present.items()}
+        raise_findings(validate_library(library, self.knowledge.schema, skills, declared))

@@ -40,6 +40,7 @@ from dsc.messages import (
 from dsc.model.plot import ActionPlot
 from dsc.model.relations import CONFIGURATION, DESIGN
 from dsc.reflection import configuration_rows, design_rows, running_plots
+from dsc.runs.encoding import signatures_of
 from dsc.runs.kept import Kept
 from dsc.sequencer.checked_plots import CheckedPlots
 from dsc.sequencer.phase_watch import PhaseWatch, described
@@ -304,6 +305,9 @@ class Reactor:
 
     def _change_plots(self, message: PlotsMessage) -> Step:
         """Change the plots of the run; a change with which a running plot cannot continue is refused."""
+        if message.components and self._skills is not None:
+            new = [skill for forms in message.components.values() for skill in signatures_of(forms)]
+            self.know_skills([*self._skills, *new])
         situation = KnowledgeSituation(self.knowledge, self.library, self.moment)
         before = {name: self.library.plot(name) if name in self.library else None for name in message.plots}
         forms = {name: plot.to_form() for name, plot in before.items() if plot is not None}

@@ -504,6 +504,13 @@ class Sequencer(OutsideInput):
         else:
             self.clock.calls.call(self._delay, message, after)
 
+    def _hand_in_components(self, components: Iterable[Component]) -> None:
+        for component in components:
+            self.clock.calls.call(self._deploy, component)
+
+    def _deploy(self, component: Component) -> None:
+        self.dispatcher.deploy(component, last=self.dispatcher.skills() is not None)
+
     def _delay(self, message: FromOutside, after: float) -> None:
         self._last_late += 1
         late, due = LateMessage(message, self._last_late), self.clock.now() + after

@@ -158,7 +158,9 @@ class StepTracer:
 
     def plots(self, message: PlotsMessage, before: Mapping[str, ActionPlot | None], refused: str | None = None) -> int:
         """Record a change of plots, whose former versions are `before`; return the number of the record."""
-        changed: dict[str, list[str]] = {"installed": [], "replaced": [], "removed": []}
+        changed: dict[str, list[str]] = {
+            "installed": [], "replaced": [], "removed": [], "components": [*message.components],
+        }  # fmt: skip
         for name, plot in message.plots.items():
             kind = "removed" if plot is None else "installed" if before[name] is None else "replaced"
             changed[kind].append(name)

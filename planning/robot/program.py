@@ -181,11 +181,12 @@ class RobotProgram:
             how["wiring"] |= profile.wiring
         return cls(domain_of(found), known, parts, **how)
 
-    def _require_sound(self, library: Library) -> None:
-        """Raise `PlotError` if plots do not fit each other, the domain, or the components."""
-        skills = [one for component in self.components for one in component.skills().values()]
+    def _require_sound(self, library: Library, added: Collection[Component] = ()) -> None:
+        """Raise `PlotError` if plots do not fit each other, the domain, or the components of the robot and its run."""
+        components = [*self.components, *added]
+        skills = [one for component in components for one in component.skills().values()]
         skills += signatures(PlanningComponent, PlanningComponent.name).values()
-        require_sound(library, self.domain, self._schema, skills, interfaces(self.components))
+        require_sound(library, self.domain, self._schema, skills, interfaces(components))
 
     def _check_added_plots(self) -> None:
         """Raise `PlotError` if plots that were added since the last check are invalid; plans are valid as made."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Self
 
 from dsc.calls import Outputs
+from dsc.components.component import Component
 from dsc.engine.plot_changes import ActivePlots
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
@@ -17,7 +18,7 @@ from dsc.trace import Listener, Record
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 from planning.execution.planning_component import PlanningComponent
-from planning.robot.bundles import Bundle
+from planning.robot.bundles import Bundle, components_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,9 +121,19 @@ class Run(Generic[Outputs]):
         """Wire a required port to another provider; errors as for `Sequencer.wire`."""
         self._sequencer.wire(port, to, after=after)
 
-    def install(self, plots: Bundle | ActionPlot | Iterable[ActionPlot]) -> None:
-        """Install plots, or those of a bundle, in the run; errors as for `Sequencer.install`."""
-        self._sequencer.install(plots.plots if isinstance(plots, Bundle) else plots)
+    def install(
+        self, plots: Bundle | ActionPlot | Iterable[ActionPlot] = (), components: Iterable[Component] = ()
+    ) -> None:
+        """Install plots and components, or those of a bundle, in the run; errors as for `Sequencer.install`.
+
+        Of a bundle, the components whose names are already deployed are omitted.
+        """
+        if isinstance(plots, Bundle):
+            deployed = self._sequencer.dispatcher.components
+            own = [one for one in components_of([plots]) if one.name not in deployed]
+            self._sequencer.install(plots.plots, [*own, *components])
+        else:
+            self._sequencer.install(plots, components)
 
     def replace(self, plots: ActionPlot | Iterable[ActionPlot], *, active: ActivePlots = "at_next_entry") -> None:
         """Replace plots of the run; errors as for `Sequencer.replace`."""

@@ -169,6 +169,7 @@ export interface ObservationRec extends Rec {
 /** A change of the plots of a run. */
 export interface PlotsRec extends Rec {
   readonly installed?: readonly string[];
+  readonly components?: readonly string[];
   readonly replaced?: readonly string[];
   readonly removed?: readonly string[];
   readonly refused?: string;

@@ -78,7 +78,7 @@ const SHAPES = new Map<string, readonly (readonly [string, Is])[]>([
     ["mode", optional(text)], ["arguments", optional(dict(any))]]],
   ["component", [["component", text], ["wires", optional(dict(optional(text)))], ["waits", optional(text)]]],
   ["observation", [["component", text], ["entry", text]]],
-  ["plots", [["installed", optional(texts)], ["replaced", optional(texts)], ["removed", optional(texts)], ["refused", optional(text)]]],
+  ["plots", [["installed", optional(texts)], ["components", optional(texts)], ["replaced", optional(texts)], ["removed", optional(texts)], ["refused", optional(text)]]],
   ["event", [["name", text], ["source", optional(text)]]],
   ["scene", [["things", list(thing)]]],
   ["rule", [["rule", text], ["state", text]]],

@@ -64,8 +64,8 @@ function componentNews({ component, wires, waits }: ComponentRec): string {
   return waits ? `${component} waits: ${waits}` : `${component} waits no longer`;
 }
 
-function changeOfPlots({ installed = [], replaced = [], removed = [], refused }: PlotsRec): string {
-  const parts = Object.entries({ installed, replaced, removed }).filter(([, names]) => names.length);
+function changeOfPlots({ installed = [], replaced = [], removed = [], components = [], refused }: PlotsRec): string {
+  const parts = Object.entries({ installed, replaced, removed, components }).filter(([, names]) => names.length);
   const change = parts.map(([what, names]) => `${what} ${names.join(", ")}`).join("; ");
   return refused === undefined ? change : `${change}: refused, ${refused}`;
 }
