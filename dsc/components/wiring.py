@@ -172,7 +172,7 @@ class Wiring(Announcer):
         """Return the providers of required ports by component and port; the provider of a cut wire is `None`."""
         return {
             owner.name: {port: one.provider_name() for port, one in owner.requirements.items()}
-            for owner in self._components.values()
+            for owner in [*self._components.values()]  # also for other threads
             if owner.requirements
         }
 

@@ -147,7 +147,7 @@ class Dispatcher:
 
     def running(self) -> tuple[tuple[RunningSkill, str], ...]:
         """Return the running skills, each with the component that it waits for as text; empty if it executes."""
-        return tuple([(one, one.missing()) for one in self._running.values()])
+        return tuple([(one, one.missing()) for one in [*self._running.values()]])  # also for other threads
 
     @property
     def in_use(self) -> frozenset[str]:

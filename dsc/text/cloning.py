@@ -60,8 +60,11 @@ def cloned(plot: ActionPlot, library: Library, prefix: str, *, made: Library | N
 
 def cloned_profile(profile: Profile, prefix: str, names: Container[str]) -> Profile:
     """Return a profile for clones: `prefix` precedes its name and, in its values, the names of the plots in `names`."""
-    plots = {prefix + name if name in names else name: values for name, values in profile.plots.items()}
-    return profile.model_copy(update={"name": prefix + profile.name, "plots": plots})
+    plots, choices = (
+        {prefix + name if name in names else name: values for name, values in group.items()}
+        for group in (profile.plots, profile.choose)
+    )
+    return profile.model_copy(update={"name": prefix + profile.name, "plots": plots, "choose": choices})
 
 
 def _dependencies(plot: ActionPlot, library: Library, *, plans: bool) -> Iterable[ActionPlot]:
@@ -146,8 +149,10 @@ def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Seq
     for profile in profiles:
         target = folder / f"{prefix}{profile.name}"
         read = load_profile(profile)
-        known = {name: values for name, values in read.plots.items() if name in library}
-        adapted(library, read.model_copy(update={"plots": known}))  # a value may not fit, and its plot is cloned
+        known, choices = (
+            {name: values for name, values in group.items() if name in library} for group in (read.plots, read.choose)
+        )
+        adapted(library, read.model_copy(update={"plots": known, "choose": choices}))  # a value may not fit
         text = profile_to_yaml(cloned_profile(read, prefix, names))
         if os.path.lexists(target):
             kept.append(target)

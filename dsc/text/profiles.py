@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from pydantic import Field
 
 from dsc.model.language import Setting, Written
 from dsc.model.plot import ActionPlot
+from dsc.model.reading import FormPath
+from dsc.model.states import Choice, DynamicState
 from dsc.text.yaml import dump, load_document, read_file, read_model
 from knowledge_base.errors import InputError, UnknownNameError
 
@@ -25,6 +28,7 @@ class Profile(Written):
         robot: name of a robot in the world; without it, the world's default robot.
         components: values by component and parameter, within the range that the component's builder declares.
         plots: new defaults by plot and parameter; plots that use the plot may pass another value.
+        choose: choices of dynamic states among candidates that fit, by plot and state, see `DynamicState`.
         wiring: providers of required ports, both as `component.port`, see `dsc.components.wiring`.
     """
 
@@ -33,6 +37,7 @@ class Profile(Written):
     robot: str | None = None
     components: Settings = Field(default_factory=dict)
     plots: Settings = Field(default_factory=dict)
+    choose: dict[str, dict[str, Choice]] = Field(default_factory=dict)
     wiring: dict[str, str] = Field(default_factory=dict)
 
     @property
@@ -78,35 +83,65 @@ def find_profile(name: str, folder: Path) -> Profile:
 
 
 def adapted(plots: Iterable[ActionPlot], profile: Profile | None = None) -> tuple[ActionPlot, ...]:
-    """Return the plots with the profile's values as defaults of their parameters.
+    """Return the plots with the profile's values as defaults of their parameters, and with its choices.
 
     Raises:
-        UnknownNameError: a plot or parameter of the profile does not exist.
+        UnknownNameError: a plot, parameter or dynamic state of the profile does not exist.
         InputError: a value has another type than the parameter or is out of its range, or a profile may not change it.
     """
     plots = tuple(plots)
-    if profile is None or not profile.plots:
+    if profile is None or not (profile.plots or profile.choose):
         return plots
     names = [plot.name for plot in plots]
-    for name in profile.plots:
-        if name not in names:
-            raise unknown_in(profile, "plots", "plot", name, names)
+    for group, settings in (("plots", profile.plots), ("choose", profile.choose)):
+        for name in settings:
+            if name not in names:
+                raise unknown_in(profile, group, "plot", name, names)
     return tuple(with_profile(plot, profile) for plot in plots)
 
 
 def with_profile(plot: ActionPlot, profile: Profile) -> ActionPlot:
-    """Return one plot with the profile's values as defaults of its parameters; errors as for `adapted`."""
+    """Return one plot with the profile's values as defaults, and with its choices; errors as for `adapted`."""
     for name, value in profile.plots.get(plot.name, {}).items():
-        try:
+        with _at(profile, ("plots", plot.name, name)):
             plot = plot.with_default(name, value, "profile")
-        except InputError as error:
-            error.place = profile.place(("plots", plot.name, name))
-            raise
+    for state, choice in profile.choose.get(plot.name, {}).items():
+        with _at(profile, ("choose", plot.name, state)):
+            plot = _with_choice(plot, state, choice)
     return plot
 
 
+def _with_choice(plot: ActionPlot, state: str, choice: Choice) -> ActionPlot:
+    """Return a copy of the plot in which a dynamic state chooses among its candidates by another rule."""
+    paths = {name: path for name, one, path in plot.walk() if isinstance(one, DynamicState)}
+    if state not in paths:
+        raise UnknownNameError(f"plot '{plot.name}' has no dynamic state '{state}'", found=state, valid=paths)
+    copied: ActionPlot = _with(plot, paths[state], {"choose": choice})
+    return copied
+
+
+def _with(part: Any, path: FormPath, update: Mapping[str, Any]) -> Any:
+    """Return a copy of a model in which the part at a path has other fields."""
+    if not path:
+        return part.model_copy(update=update)
+    key, *rest = path
+    if isinstance(part, Mapping):
+        return {**part, key: _with(part[key], tuple(rest), update)}
+    return part.model_copy(update={str(key): _with(getattr(part, str(key)), tuple(rest), update)})
+
+
+@contextmanager
+def _at(profile: Profile, path: FormPath) -> Iterator[None]:
+    """Give errors inside the block the place of a setting."""
+    try:
+        yield
+    except InputError as error:
+        error.place = profile.place(path)
+        raise
+
+
 def unknown_in(profile: Profile | None, group: str, kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:
-    """Return the error for a name under `components` or `plots` of a profile that is not among the valid ones."""
+    """Return the error for a name in a group of a profile that is not among the valid ones."""
     error = UnknownNameError(f"there is no {kind} '{name}'", found=name, valid=valid)
     error.place = None if profile is None else profile.place((group, name))
     return error

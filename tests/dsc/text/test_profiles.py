@@ -97,6 +97,49 @@ def test_values_for_plots_fit_too(plots, said):
     assert error.value.place.line == 3
 
 
+CHOOSING = """
+plot: main
+states:
+  both:
+    on: {done: over}
+    regions:
+      left: {states: {first: {dynamic: [quick, safe], on: {done: left_over, no_candidate: left_over}}, left_over: {final: true}}}
+      right: {states: {wait: {after: {seconds: 1, to: right_over}}, right_over: {final: true}}}
+  over: {final: true}
+"""
+
+
+def test_a_profile_changes_the_choice_of_a_dynamic_state_at_any_depth():
+    plot = parse_plot(CHOOSING, "main.yaml")
+    (changed,) = adapted([plot], of("profile: p\nchoose: {main: {first: utility}}\n"))
+    assert changed.state("first").choose == "utility"
+    assert plot.state("first").choose == "order"
+    assert (
+        changed.to_form() == parse_plot(CHOOSING.replace("[quick, safe],", "[quick, safe], choose: utility,")).to_form()
+    )
+    assert changed.digest != plot.digest
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("choose: {man: {first: cost}}", "sim.yaml:2:10: there is no plot 'man'; did you mean 'main'?"),
+        (
+            "choose: {main: {frst: cost}}",
+            "sim.yaml:2:17: plot 'main' has no dynamic state 'frst'; did you mean 'first'?",
+        ),
+        ("choose: {main: {wait: cost}}", "sim.yaml:2:17: plot 'main' has no dynamic state 'wait'"),
+        (
+            "choose: {main: {first: best}}",
+            "sim.yaml:2:17: it should be 'order', 'priority', 'utility' or 'cost'; found 'best'",
+        ),
+    ],
+)
+def test_a_wrong_choice_in_a_profile_is_refused_with_its_place(text, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        adapted([parse_plot(CHOOSING, "main.yaml")], of(f"profile: p\n{text}\n"))
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
