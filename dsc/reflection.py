@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 
 from dsc.dynamic.library import Library
-from dsc.dynamic.steps import candidates_of
+from dsc.dynamic.steps import candidates_of, is_planned
 from dsc.engine.machine_state import MachineState
 from dsc.model.actions import Trigger, component_of, flat
 from dsc.model.plot import ActionPlot
@@ -114,7 +114,10 @@ def _touches(plot: ActionPlot, library: Library) -> Iterator[_Row]:
         name = waiting.pop()
         if name not in seen and name in library:
             seen[name] = None
-            waiting += parts_of(library.plot(name), library)
+            part = library.plot(name)
+            waiting += parts_of(part, library)
+            if any(is_planned(state) for _, state, _ in part.walk()):
+                waiting += [one.name for one in library if one.implements]
     found = {name: None for one in seen for name in _components(library.plot(one))}
     yield from ((plot.name, component) for component in sorted(found))
 
@@ -124,6 +127,10 @@ def _components(plot: ActionPlot) -> Iterator[str]:
         if isinstance(state, State):
             actions = [action for _, block in state.blocks() for action in block]
             yield from (one for one in map(component_of, flat(actions)) if one is not None)
+    commands = [one for reaction in plot.rules for one in reaction.do.command]
+    commands += [one for reaction in plot.handlers for one in reaction.do.command]
+    listens = [one.listen for one in plot.handlers if one.listen is not None]
+    yield from (one for one in map(component_of, (*commands, *listens)) if one is not None)
 
 
 def _steps(running: Iterable[Running]) -> Iterator[tuple[str, DynamicState]]:

@@ -40,7 +40,7 @@ class ComponentRelations:
         self._live = live
         self._renew = renew
         self.rows: dict[str, Rows] = {
-            "dsc:component": lambda: [(name,) for name in dispatcher.components],
+            "dsc:component": lambda: [(name,) for name in [*dispatcher.components]],
             "dsc:component-life": lambda: self._each(lambda one: [(one.name, str(one.life.state))]),
             "dsc:component-mode": lambda: self._each(lambda one: [(one.name, one.mode)]),
             "dsc:component-active": lambda: self._each(lambda one: [(one.name,)] if one.life.active else []),

@@ -18,6 +18,10 @@ Read = Term | Atom
 """An input of a computed predicate: the value of a term, or the truth of an atom."""
 
 
+def _alternatives(parameter: TypedVariable) -> str:
+    return " or ".join(parameter.types or (ROOT_TYPE,))
+
+
 @dataclass(frozen=True, slots=True)
 class Signature:
     """The name of a predicate or function, with its parameters in order.
@@ -43,7 +47,7 @@ class Signature:
 
     def __str__(self) -> str:
         """Return the declaration as text: `(on ?a - item ?b - place)`, `(label ?a - item) - text`."""
-        typed = (f"?{p.name} - {' or '.join(p.types or (ROOT_TYPE,))}" for p in self.parameters)
+        typed = (f"?{p.name}{'' if self.live else f' - {_alternatives(p)}'}" for p in self.parameters)
         result = "" if self.result in (None, "number") else f" - {self.result}"
         return "(" + " ".join([self.name, *typed]) + ")" + result
 

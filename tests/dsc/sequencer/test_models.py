@@ -21,6 +21,8 @@ from dsc import (
     run_simulated,
     skill,
 )  # fmt: skip
+from dsc.dynamic.library import Library
+from dsc.reflection import design_rows
 from dsc.testing import Crashes, one_history, replays, violations
 from dsc.trace import Record
 from knowledge_base.errors import InputError
@@ -67,6 +69,24 @@ def test_the_design_is_asked_during_a_run():
     assert {one["plot"] for one in implementing} == {"pick_up_from_above", "pick_up_from_side"}
 
 
+TOUCHING = """
+plot: main
+states: {ask: {dynamic: [], goal: (p), on: {done: over, no_plan: over, gave_up: over}}, over: {final: true}}
+"""
+LISTENING = """
+plot: guard
+states: {s: {use: main, on: {done: e}}, e: {final: true}}
+handlers: [{on: moved, listen: {trigger: leg.walk}, do: {command: {switch: lamp, to: scan}}}]
+"""
+
+
+def test_plans_rules_and_handlers_touch_components_too():
+    rows = design_rows(lambda: Library(map(parse_plot, (TOUCHING, LISTENING, MOVING))))
+    touching = set(rows["dsc:touches"]())
+    assert touching == {("main", "arm"), ("guard", "arm"), ("guard", "lamp"), ("guard", "leg"), ("move", "arm")}
+
+
+MOVING = "{plot: move, implements: go, states: {s: {entry: {trigger: arm.move}, on: {moved: e}}, e: {final: true}}}"
 DYNAMIC = """
 plot: main
 states:
