@@ -9,7 +9,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
-.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
+.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-choice bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -166,6 +166,9 @@ bench-wire: $(VENV)/.test   ## a call in a process and over Zenoh, and Zenoh alo
 
 bench-run: $(VENV)/.run   ## a macrostep without a store and with one, and 1,000 plots at once, as ratios (QUICK=1, PLOTS=N, SECONDS=N, WRITE=1 writes the docs)
 	$(BIN)/python benchmarks/run.py $(if $(QUICK),--quick) $(if $(PLOTS),--plots $(PLOTS)) $(if $(SECONDS),--seconds $(SECONDS)) $(if $(WRITE),--write)
+
+bench-choice: $(VENV)/.run   ## candidates chosen by order, by priority, learned and by an oracle: time and slips (RUNS=N)
+	$(BIN)/python benchmarks/choice.py --runs $(or $(RUNS),200)
 
 pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/clean_up_table.yaml --svg docs/pictures/clean_up_table.svg

@@ -24,6 +24,7 @@ from dsc.components.streams import Push as Push
 from dsc.components.streams import Stream as Stream
 from dsc.conversions import Conversion as Conversion
 from dsc.conversions import conversion as conversion
+from dsc.dynamic.experience import Experience as Experience
 from dsc.dynamic.library import Library as Library
 from dsc.engine.machine import Machine as Machine
 from dsc.errors import ChangedError as ChangedError
@@ -42,6 +43,7 @@ from dsc.profiles import configure as configure
 from dsc.run_log import RunFilter as RunFilter
 from dsc.runs.archive import has_run as has_run
 from dsc.runs.archive import is_unfinished as is_unfinished
+from dsc.runs.learning import learn as learn
 from dsc.runs.store import RunStore as RunStore
 from dsc.sequencer.clock import LoopClock as LoopClock
 from dsc.sequencer.clock import run_real as run_real
@@ -53,6 +55,7 @@ from dsc.skills import primitive_plot as primitive_plot
 from dsc.skills import skill as skill
 from dsc.text.cloning import cloned as cloned
 from dsc.text.cloning import cloned_profile as cloned_profile
+from dsc.text.experience import load_experience as load_experience
 from dsc.text.plot_files import load_library as load_library
 from dsc.text.plot_files import load_plot as load_plot
 from dsc.text.plot_files import parse_plot as parse_plot

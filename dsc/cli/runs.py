@@ -73,6 +73,29 @@ def list_(file: Store, as_json: AsJson = False) -> None:
 
 
 @app.command()
+def learn(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="The stores.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Write the experience to this YAML file.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Learn from the runs how often candidates of dynamic states are done, and how long they take."""
+    from dsc.runs.learning import learn as learned_from
+    from dsc.text.experience import experience_to_yaml
+    from knowledge_base.output_files import Output
+
+    output = None if out is None else Output(out, "--out", *files)
+    experience = learned_from(files)
+    if output is not None:
+        output.write(experience_to_yaml(experience))
+    if as_json:
+        print_line(experience.to_form()["tries"])
+        return
+    for (plot, candidate, situation), tries in sorted(experience.tries.items()):
+        about = ", ".join(f"{text} is {str(truth).lower()}" for text, truth in situation)
+        typer.echo(f"{plot}: {candidate}{f' ({about})' if about else ''}: {tries}")
+
+
+@app.command()
 def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
     """Print the macrosteps of a run, one per line, and the running skills of an unfinished run."""
     from dsc.runs.archive import archive

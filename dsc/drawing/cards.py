@@ -213,6 +213,8 @@ def _choices(state: DynamicState, library: Library | None) -> list[CardRow]:
         term = None if plot is None else plot.scores().get(state.choose)
         score = "" if term is None else f"{choice_text(state)} {to_text(term)}"
         rows.append(_row(f"◇ {content_text(name, _taken(state, plot))}{condition}{score}"))
+    if state.situation:
+        rows.append(_row(f"situation: {', '.join(map(to_text, state.situation))}"))
     if state.goal is not None:
         rows.append(_row(f"plan for {to_text(state.goal)}"))
     return rows

@@ -12,6 +12,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from dsc.chance import uniform
+from dsc.dynamic.experience import NO_EXPERIENCE, Experience, Tries
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Plots, candidates_of
 from dsc.engine.exclusion import Excluded, FailedCandidate
@@ -87,11 +89,18 @@ class KnowledgeSituation:
         return delta
 
     def choose(
-        self, state: DynamicState, holder: str, bindings: Bindings, failed: Sequence[FailedCandidate] = ()
+        self,
+        state: DynamicState,
+        holder: str,
+        bindings: Bindings,
+        failed: Sequence[FailedCandidate] = (),
+        activation: int = 0,
     ) -> Decision:
         """See `Situation`."""
         excluded = Excluded(failed, self.now()) if failed else None
-        return choose(state, holder, bindings, self._world, self._library, self._version, excluded)
+        library = self._library
+        draw = uniform(library.experience.seed, str(activation), "explore") if state.explore else 1.0
+        return choose(state, holder, bindings, self._world, library, self._version, excluded, library.experience, draw)
 
 
 NOT_INSTALLED = "not installed"
@@ -108,12 +117,25 @@ def choose(
     plots: Plots,
     version: int,
     excluded: Excluded | None = None,
+    experience: Experience = NO_EXPERIENCE,
+    draw: float = 1.0,
 ) -> Decision:
     """Return the decision on the content of `state`, a dynamic state of the plot named `holder`.
 
     If the state's goal is already true, no plot is chosen. Otherwise `choose` of the state determines the choice among
     the candidates with true conditions; one whose number is unknown comes last. If no candidate fits and the state has
     a goal, the plot `achieve` is chosen.
+
+    Args:
+        state: the dynamic state.
+        holder: the name of its plot.
+        bindings: values of variables.
+        world: the knowledge.
+        plots: provider of the candidates.
+        version: version of the knowledge.
+        excluded: the candidates that have failed.
+        experience: the tries for a learned choice.
+        draw: a random number in [0, 1); below `explore` of the state, it chooses among the candidates that fit.
 
     Raises:
         UnknownNameError: a variable has no value.
@@ -124,6 +146,7 @@ def choose(
     if goal is not None and holds(goal, world, {}):
         return Decision(None, satisfied=True, version=version)
     arguments = {name: _argument(term, world, bindings) for name, term in state.arguments.items()}
+    situation = {to_text(one): _is_true(one, bindings, world) for one in state.situation}
     verdicts, own = [], {}
     fitting: list[Verdict] = []
     for plot in candidates_of(state, plots):
@@ -132,13 +155,19 @@ def choose(
         verdict = judge(plot, own[name], world)
         if verdict.fits and excluded is not None and (reason := excluded.reason(name, own[name])):
             verdict = Verdict(name, fits=False, reason=reason)
-        if verdict.fits and state.choose != "order":
+        if verdict.fits and state.choose == "learned":
+            verdict = _with_tries(verdict, experience.of(holder, name, tuple(situation.items())))
+        elif verdict.fits and state.choose != "order":
             verdict = replace(verdict, score=_score(plot, state.choose, own[name], world))
         verdicts.append(verdict)
         if verdict.fits:
             fitting.append(verdict)
     verdicts += [Verdict(name, fits=False, reason=NOT_INSTALLED) for name in state.candidates if name not in plots]
-    best = min(fitting, key=partial(_rank, by=state.choose), default=None)
+    explored = state.choose == "learned" and draw < state.explore and len(fitting) > 1
+    if explored:
+        best: Verdict | None = fitting[int(draw / state.explore * len(fitting))]
+    else:
+        best = min(fitting, key=partial(_rank, by=state.choose), default=None)
     chosen = None if best is None else best.plot
     chosen_arguments = own[chosen] if chosen is not None else {}
     if chosen is None and goal is not None:
@@ -147,7 +176,10 @@ def choose(
         chosen_arguments = {
             "goal": to_text(goal), "holder": holder, "replans": budget.replans, "seconds": budget.seconds,
         }  # fmt: skip
-    return Decision(chosen, chosen_arguments, verdicts=tuple(verdicts), version=version, by=state.choose)
+    return Decision(
+        chosen, chosen_arguments, verdicts=tuple(verdicts), version=version, by=state.choose, holder=holder,
+        situation=situation, explored=explored,
+    )  # fmt: skip
 
 
 def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdict:
@@ -174,7 +206,17 @@ def _rank(verdict: Verdict, by: Choice) -> float:
     """Return a number that is smallest for the candidate to choose; `min` takes the first of equal ones."""
     if verdict.score is None:
         return math.inf
-    return verdict.score if by == "cost" else -verdict.score
+    return verdict.score if by in {"cost", "learned"} else -verdict.score
+
+
+def _with_tries(verdict: Verdict, tries: Tries | None) -> Verdict:
+    """Return the verdict with the expected time until success; without a try, it is unknown."""
+    return verdict if tries is None else replace(verdict, score=tries.time_to_success, learned=str(tries))
+
+
+def _is_true(condition: Expression, bindings: Mapping[str, Any], world: World) -> bool:
+    condition = plain_condition(condition, Values(bindings)) if reads_data(condition) else condition
+    return holds(condition, world, scalars(bindings))
 
 
 def _argument(term: Term, world: World, bindings: Mapping[str, Any]) -> Any:

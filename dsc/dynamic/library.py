@@ -13,6 +13,7 @@ from typing import Any
 from dsc.annotations import FoundRecords, add_records
 from dsc.conversions import Conversion, conversions_by_name
 from dsc.data_types import Records
+from dsc.dynamic.experience import NO_EXPERIENCE
 from dsc.dynamic.rule_expansion import expand
 from dsc.engine.tables import CompiledPlot, compile_plot
 from dsc.events import RESERVED
@@ -37,6 +38,7 @@ class Library:
     Attributes:
         records: the records that types of plots may name: those that plots or components declare.
         conversions: the functions that terms of the plots may call.
+        experience: the tries of candidates for learned choices.
     """
 
     def __init__(self, plots: Iterable[ActionPlot] = (), conversions: Iterable[Conversion[..., Any]] = ()) -> None:
@@ -45,6 +47,7 @@ class Library:
         self._bound: dict[str, CompiledPlot] = {}
         self._made: dict[str, ActionPlot] = {}
         self.records: FoundRecords = {}
+        self.experience = NO_EXPERIENCE
         self.conversions = conversions_by_name(conversions)
         for one in self.conversions.values():
             self.declare(one.records)

@@ -307,7 +307,9 @@ class Execution:
             state = state.model_copy(update={"arguments": {**state.arguments, **places}})
             bindings = {**bindings, **{f"passed.{given}": value for given, value in passed.items()}}
         failed = failures_of(name, frame.variables) if state.exclude is not None else ()
-        decision = self.performer.situation.choose(state, frame.compiled.plot.name, bindings, failed)
+        decision = self.performer.situation.choose(
+            state, frame.compiled.plot.name, bindings, failed, frame.activations.get(name, 0)
+        )
         self.performer.decisions.append(DecisionMade(frame.prefix + name, decision))
         return decision
 

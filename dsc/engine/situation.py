@@ -48,6 +48,7 @@ class Verdict:
         reason: the part of the condition that determines the result, as text.
         explanation: the whole condition as a tree with truth values, as plain data.
         score: the number by which the state chooses; `None` if the state chooses by order, or if the number is unknown.
+        learned: the tries from which a learned number follows, as text; empty without any.
     """
 
     plot: str
@@ -55,6 +56,7 @@ class Verdict:
     reason: str
     explanation: Mapping[str, Any] = field(default_factory=dict)
     score: float | None = None
+    learned: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +70,9 @@ class Decision:
         verdicts: a verdict for each candidate, in the order of preference.
         version: version of the knowledge at the decision.
         by: the choice among candidates that fit, see `choose` of `DynamicState`.
+        holder: the plot of the dynamic state.
+        situation: the conditions under `situation` of the state, as texts, with their truth.
+        explored: whether the candidate was chosen at random.
     """
 
     chosen: str | None
@@ -76,6 +81,9 @@ class Decision:
     verdicts: tuple[Verdict, ...] = ()
     version: int = 0
     by: str = "order"
+    holder: str = ""
+    situation: Mapping[str, bool] = field(default_factory=dict)
+    explored: bool = False
 
     def _repr_html_(self) -> str:
         title = "the goal holds" if self.satisfied else f"chosen: {self.chosen or 'no candidate fits'}"
@@ -103,7 +111,12 @@ class Situation(Protocol):
         ...
 
     def choose(
-        self, state: DynamicState, holder: str, bindings: Bindings, failed: Sequence[FailedCandidate] = ()
+        self,
+        state: DynamicState,
+        holder: str,
+        bindings: Bindings,
+        failed: Sequence[FailedCandidate] = (),
+        activation: int = 0,
     ) -> Decision:
         """Return the decision on the content of a dynamic state.
 
@@ -112,6 +125,7 @@ class Situation(Protocol):
             holder: the name of the state's plot.
             bindings: values of variables.
             failed: the remembered failures of candidates, see `exclusion`.
+            activation: serial number of the state's activation, on which random choices depend.
         """
         ...
 

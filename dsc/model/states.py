@@ -136,8 +136,8 @@ class Budget(Frozen):
     seconds: float = Field(default=10.0, gt=0, strict=True)
 
 
-Choice = Literal["order", "priority", "utility", "cost"]
-"""Choice of a dynamic state among the candidates that fit: the first one, or by this field of the candidates."""
+Choice = Literal["order", "priority", "utility", "cost", "learned"]
+"""Choice of a dynamic state among the candidates that fit: the first one, or by this number of the candidates."""
 
 
 class Exclusion(Frozen):
@@ -170,7 +170,10 @@ class DynamicState(State):
         dynamic: names of candidate plots, in order of preference; each candidate declares its condition in `when`. With
             `Offers`, the candidates are the plots that offer a name, in the order of the library.
         choose: the choice among several candidates that fit (S0.14): the first one in `order`, the one of the largest
-            `priority` or `utility`, or of the smallest `cost`; of equal ones the first.
+            `priority` or `utility`, or of the smallest `cost`; of equal ones the first. `learned` chooses by the
+            expected time until success, see `dsc.dynamic.experience`.
+        situation: conditions on which the success of candidates may depend; decisions record their truth.
+        explore: probability of a random choice among the candidates that fit, with `learned`.
         exclude: exclusion of candidates that have failed; by default none.
         arguments: values for the candidates' parameters (`with`).
         goal: planning goal; if no candidate fits, a plan for the goal is made. The goal adds the outcomes `no_plan` and
@@ -181,6 +184,8 @@ class DynamicState(State):
     dynamic: tuple[str, ...] | Offers = ()
     choose: Choice = "order"
     exclude: Exclusion | None = None
+    situation: tuple[ConditionField, ...] = ()
+    explore: float = Field(default=0.0, ge=0, le=1, strict=True)
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
     goal: ConditionField | None = None
     budget: Budget = Budget()

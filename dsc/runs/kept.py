@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dsc.dynamic.experience import NO_EXPERIENCE, Experience
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import offers_for
@@ -18,10 +19,13 @@ from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, SubmachineState
 from dsc.runs.archive import RunArchive, RunRow
 from dsc.runs.encoding import Awaited, awaited_of, events_of, frame_form
-from dsc.runs.hashed_forms import plots_of_hashes
+from dsc.runs.hashed_forms import full_value, plots_of_hashes
 from dsc.runs.tables import SnapshotRow
 from dsc.trace import Record
 from knowledge_base.errors import Place
+
+EXPERIENCE = "experience"
+"""Key of a run's header with the hash of its experience."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +71,7 @@ class Kept:
         outputs: as in `Reactor`.
         settings: the values of `Reactor.settings`.
         plots: as in `Reactor`.
+        experience: the tries for learned choices.
         pending: pending items, in the order of their requests.
         memory: memories of components, by component name.
         records: trace records so far.
@@ -83,6 +88,7 @@ class Kept:
     outputs: Mapping[str, Any]
     settings: tuple[ParameterMessage, ...]
     plots: Mapping[str, ActionPlot | None]
+    experience: Experience
     pending: tuple[Pending, ...]
     memory: Mapping[str, Any]
     records: tuple[Record, ...]
@@ -136,6 +142,7 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
         outputs=reactor["outputs"],
         settings=tuple([ParameterMessage(**setting) for setting in reactor["settings"]]),
         plots=plots,
+        experience=_experience_of(runs, run),
         pending=tuple(pending),
         memory={name: json.loads(memory) for name, memory in now.memory.items()},
         records=tuple(record for step in steps for record in step.records),
@@ -157,8 +164,15 @@ def require_unchanged(runs: RunArchive, run: RunRow, library: Library, domain: M
 
 
 def plots_of(runs: RunArchive, run: RunRow) -> Library:
-    """Return the plots with which the run began."""
-    return Library(ActionPlot.model_validate(runs.form(digest)) for digest in run.plots.values())
+    """Return the plots with which the run began, and its experience."""
+    library = Library(ActionPlot.model_validate(runs.form(digest)) for digest in run.plots.values())
+    library.experience = _experience_of(runs, run)
+    return library
+
+
+def _experience_of(runs: RunArchive, run: RunRow) -> Experience:
+    form = full_value(run.header.get(EXPERIENCE), runs.form)
+    return NO_EXPERIENCE if form is None else Experience.from_form(form)
 
 
 def _changed_plots(

@@ -11,13 +11,14 @@ from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import Any, Literal
 
+from dsc.dynamic.experience import NO_EXPERIENCE
 from dsc.dynamic.library import Library
 from dsc.engine.steps import Output, SendMessage, Start
 from dsc.messages import LateMessage, Message, Told
 from dsc.runs.archive import RELATIONS, RunArchive, archive, unfinished
 from dsc.runs.encoding import SKILLS, message_form, signature_forms
 from dsc.runs.hashed_forms import Shortener
-from dsc.runs.kept import Kept, read, require_unchanged
+from dsc.runs.kept import EXPERIENCE, Kept, read, require_unchanged
 from dsc.runs.state import ReactorState, RunState
 from dsc.runs.tables import CHAIN, FORMAT, TABLES, require_tables_of_runs
 from dsc.skills import SkillSignature
@@ -249,6 +250,8 @@ class RunStore:
         self._number, self._state = 0, RunState(self._short)
         plots = {one.name: self._short.hash(one.to_form()) for one in library}
         deployed = {} if skills is None else {SKILLS: self._short.reference(signature_forms(skills))}
+        if library.experience != NO_EXPERIENCE:
+            deployed[EXPERIENCE] = self._short.reference(library.experience.to_form())
         row = (
             plot, text_of(self._short(arguments)), self._knowledge.version, text_of({**self._header, **deployed}),
             text_of(plots), text_of(self._domain),

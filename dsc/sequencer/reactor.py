@@ -160,6 +160,7 @@ class Reactor:
         self.programming_error = kept.programming_error
         self.outputs = kept.outputs
         self.plots = kept.plots
+        self.library.experience = kept.experience
         self._change_library(kept.plots)
         for setting in kept.settings:
             self._set_default(setting)

@@ -128,7 +128,11 @@ class StepTracer:
         """Record the decisions of dynamic states in this macrostep, with their reasons."""
         for made in step.decisions if self._trace.heard else ():
             decision = made.decision
-            how = {} if decision.by == "order" else {"by": decision.by}
+            how: dict[str, Any] = {} if decision.by == "order" else {"by": decision.by}
+            if decision.by == "learned" or decision.situation:
+                how |= {"plot": decision.holder, "situation": dict(decision.situation)}
+            if decision.explored:
+                how["explored"] = True
             self._trace.record(
                 "decision",
                 state=made.state,
@@ -139,6 +143,7 @@ class StepTracer:
                 candidates=[
                     {"plot": v.plot, "fits": v.fits, "reason": v.reason, "condition": dict(v.explanation)}
                     | ({} if v.score is None else {"score": v.score})
+                    | ({"learned": v.learned} if v.learned else {})
                     for v in decision.verdicts
                 ],
                 **how,

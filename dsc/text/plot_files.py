@@ -58,10 +58,10 @@ def plot_to_yaml(plot: ActionPlot) -> str:
 _ORDER = (
     "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs",
     "receives", "emits", "seconds", "set", "switch", "send", "to", "pass", "before", "when", "offers", "utility",
-    "cost", "of", "interrupt", "listen", "trigger", "use", "dynamic", "choose", "exclude", "assign", "tell", "emit",
-    "command", "with", "as", "within", "goal", "budget", "clear", "do", "then", "limit", "rule", "choice", "select",
-    "cases", "else", "entry", "at_least", "initial", "final", "states", "regions", "on", "after", "every", "always",
-    "exit", "on_break", "rules", "handlers",
+    "cost", "of", "interrupt", "listen", "trigger", "use", "dynamic", "choose", "exclude", "situation", "explore",
+    "assign", "tell", "emit", "command", "with", "as", "within", "goal", "budget", "clear", "do", "then", "limit",
+    "rule", "choice", "select", "cases", "else", "entry", "at_least", "initial", "final", "states", "regions", "on",
+    "after", "every", "always", "exit", "on_break", "rules", "handlers",
 )  # fmt: skip
 """Keys of a plot file in the order in which they are written."""
 _SINGLE = frozenset({

@@ -87,9 +87,12 @@ def _condition(plot: ActionPlot, given: Iterable[str]) -> Expression:
 def _without_score(
     subject: Subject, name: str, state: DynamicState, path: Path, plots: Sequence[ActionPlot]
 ) -> Iterator[Finding]:
-    """Yield warnings about candidates without the term by which their state chooses."""
+    """Yield warnings about candidates without the term by which their state chooses, and about needless exploration."""
+    if state.explore and state.choose != "learned":
+        message = f"state '{name}' explores, and it does not choose by experience"
+        yield subject.finding((*path, "explore"), "candidates", message, "write `choose: learned`", level="warning")
     for number, plot in enumerate(plots):
-        if state.choose != "order" and state.choose not in plot.scores():
+        if state.choose not in {"order", "learned"} and state.choose not in plot.scores():
             message = (
                 f"state '{name}' chooses by {state.choose}, and the candidate '{plot.name}' has no `{state.choose}`"
             )

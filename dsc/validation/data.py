@@ -135,8 +135,11 @@ class _Data:
             yield from self._term(state.at_least, None, (*path, "at_least"), "number")
         if isinstance(state, Step):
             yield from self._given(state.arguments, None, (*path, "with"), contents_of(state, self._library))
-        if isinstance(state, DynamicState) and state.goal is not None:
-            yield from self._condition(state.goal, self._own, (*path, "goal"), planned=True)
+        if isinstance(state, DynamicState):
+            if state.goal is not None:
+                yield from self._condition(state.goal, self._own, (*path, "goal"), planned=True)
+            for number, condition in enumerate(state.situation):
+                yield from self._condition(condition, self._own, (*path, "situation", number))
 
     def _selection(self, state: SelectState, path: Path) -> Iterator[Finding]:
         """Yield findings about the selected term, and about cases whose type differs from the term's type."""

@@ -77,6 +77,9 @@ def run_command(
     profile: Annotated[
         str | None, typer.Option(metavar="NAME|FILE", help="The robot and the values of its parameters (YAML).")
     ] = None,
+    experience: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The experience for learned choices (YAML).")
+    ] = None,
     engine: Annotated[
         str | None, typer.Option(metavar="NAME", help="The planning engine.  [default: one that suits the problem]")
     ] = None,
@@ -137,14 +140,16 @@ def run_command(
     if speed is not None and real_time:
         raise InputError("a run is in real time, or in simulated time at a --speed")
     output = (
-        None if trace is None else Output(trace, "--trace", scenario, settings, store, resume, monitor, over=BEGINS)
+        None
+        if trace is None
+        else Output(trace, "--trace", scenario, settings, experience, store, resume, monitor, over=BEGINS)
     )
     planner = None if engine is None else _planner(engine)
     wire = _Wire(realm, connect or (), zenoh)
     if resume is not None:
         beginning = {
             "--goal": goal, "--plot": plot, "--with": with_, "--scenario": scenario, "--seed": seed,
-            "--faults": faults, "--store": store, "--profile": profile, "--until": until,
+            "--faults": faults, "--store": store, "--profile": profile, "--until": until, "--experience": experience,
         }  # fmt: skip
         given = [name for name, value in beginning.items() if value is not None] + ["--real-time"] * real_time
         if given:
@@ -155,8 +160,8 @@ def run_command(
         if bundle.remote and speed is not None:
             raise InputError("a run with components of other programs is in real time, without --speed")
         clock: ClockKind = "real" if real_time or bundle.remote else "simulated"
-        robot = _robot(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, store,
-                             durability, target, planner, clock, wire)  # fmt: skip
+        robot = _robot(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, experience,
+                             store, durability, target, planner, clock, wire)  # fmt: skip
     follow = partial(_followed, robot, speed=inf if speed is None else speed, until=until,
                      on_signal=on_signal, quiet=json or quiet, trace=output, watch=watch)  # fmt: skip
     with wire, robot:
@@ -242,6 +247,7 @@ def _robot(
     seed: int | None,
     faults: float | None,
     profile: str | None,
+    experience: Path | None,
     store: Path | None,
     durability: Durability,
     target: str | None,
@@ -249,16 +255,20 @@ def _robot(
     clock: ClockKind,
     wire: _Wire,
 ) -> Robot:
+    from dsc.text.experience import load_experience
     from dsc.text.profiles import find_profile
     from planning.robot.bringup import deploy
     from planning.robot.targets import full_target
 
     settings = None if profile is None else find_profile(profile, bundle.profiles or Path())
-    return deploy(
+    known = None if experience is None else load_experience(experience)
+    robot = deploy(
         bundle, task, seed=seed, faults=faults, scenario=scenario, profile=settings, store=store,
         durability=durability.value, planner=planner, target=None if target is None else full_target(target),
         clock=clock, remote=wire.connect(bundle),
     )  # fmt: skip
+    robot.experience = known or robot.experience
+    return robot
 
 
 def _planner(engine: str) -> Planner:

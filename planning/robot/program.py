@@ -5,15 +5,17 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Self
+from zlib import crc32
 
 from dsc.components.assembly import require_deployed, require_instances
 from dsc.components.component import Component
 from dsc.components.wiring import choose_sources, require_wired
 from dsc.conversions import Conversion
+from dsc.dynamic.experience import NO_EXPERIENCE, Experience
 from dsc.dynamic.library import Library
 from dsc.events import SKILL_FAILURES
 from dsc.model.plot import ActionPlot
@@ -102,6 +104,7 @@ class RobotProgram:
         conversions: Iterable[Conversion[..., Any]] = (),
         wiring: Mapping[str, str] | None = None,
         resources: Mapping[str, float] | None = None,
+        experience: Experience | None = None,
     ) -> None:
         require_parts(knowledge, planner, foresight, store)
         self.components = require_instances(components)
@@ -125,6 +128,7 @@ class RobotProgram:
             if plot.name not in self.library:
                 self.library.add(plot)
         self.library = with_plots_of(self.library, self.components)
+        self.experience = experience or NO_EXPERIENCE
         self.clock = clock
         self._own_planners: dict[bool, CachingPlanner] = {}
         self._planner = planner
@@ -225,6 +229,7 @@ class RobotProgram:
             **({} if origin is None else {"run": origin.bundle.name}),
             **({} if world is None else {"seed": world.seed, "faults": world.chance}),
             **({} if origin is None or origin.profile is None else {"profile": origin.profile.digest}),
+            **({"experience": self.experience.digest} if self.experience.tries else {}),
             "chart": hashlib.sha256(plots.encode()).hexdigest()[:12],
             "domain": hashlib.sha256(domain.encode()).hexdigest()[:12],
         }
@@ -264,6 +269,8 @@ class RobotProgram:
             self.library, self.knowledge, components, clock, trace, open_ended=open_ended, store=store,
             until=math.inf if until is None else until, failures=self.failures, run_id=run,
         )  # fmt: skip
+        seed = 0 if self.simulation is None else self.simulation.seed
+        sequencer.library.experience = replace(self.experience, seed=crc32(f"{seed} {run}".encode()))
         sequencer.check_plots = self._require_sound
         planning = PlanningComponent(
             self.domain, sequencer.library, self.knowledge, self.planner_for(clock), clock, trace,

@@ -74,11 +74,13 @@ class Robot(RobotProgram):
         wiring: the providers of required ports, both as `component.port`, see `dsc.components.wiring`.
         resources: the capacity of each resource that components demand, see `dsc.supervision.room`; without it, all
             components may be active together.
+        experience: the tries for learned choices, see `dsc.dynamic.experience`.
 
     Attributes:
         clock: the kind of time; `None` for that of the event loop.
         components: the components.
         domain: the merged planning domain.
+        experience: the tries for the learned choices of later runs.
         library: the plots.
         knowledge: the knowledge base.
         store: the file of knowledge and runs; `None` without a store.

@@ -91,7 +91,7 @@ class FakeSituation:
     def now(self):
         return 0.0
 
-    def choose(self, state, holder, bindings, failed=()):
+    def choose(self, state, holder, bindings, failed=(), activation=0):
         self.asked.append((state, holder, dict(bindings)))
         return self.choices.get(next(iter(state.dynamic), "goal"), Decision(None))
 

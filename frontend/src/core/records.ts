@@ -61,6 +61,8 @@ export interface Candidate {
   readonly reason: string;
   readonly condition: Explanation;
   readonly score?: number;
+  /** The tries from which a learned score follows. */
+  readonly learned?: string;
 }
 
 export interface DecisionRec extends Rec {
@@ -69,6 +71,9 @@ export interface DecisionRec extends Rec {
   readonly satisfied: boolean;
   /** What it chose by among those that fit, if not by their order. */
   readonly by?: string;
+  readonly situation?: Readonly<Record<string, boolean>>;
+  /** Whether the candidate was chosen at random. */
+  readonly explored?: boolean;
   readonly arguments?: Named;
   readonly version?: number;
   readonly candidates?: readonly Candidate[];

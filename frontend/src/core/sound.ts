@@ -56,7 +56,7 @@ const words = fields({ states: optional(dict(text)), events: optional(dict(text)
 
 const explanation: Is = (value, depth) => explanationFields(value, depth);
 const explanationFields = fields({ text: optional(text), detail: optional(text), decider: optional(count), children: optional(list(explanation)) });
-const candidate = fields({ plot: text, reason: optional(text), condition: explanation, score: optional(scalar) });
+const candidate = fields({ plot: text, reason: optional(text), condition: explanation, score: optional(scalar), learned: optional(text) });
 const thing = fields({
   id: text, shape: optional(text), x: optional(number), y: optional(number), label: optional(text), width: optional(number),
   depth: optional(number), in: optional(text), to_x: optional(number), to_y: optional(number),

@@ -56,7 +56,7 @@ function CandidateView({ one, chosen, by }: { one: Candidate; chosen: boolean; b
       <div className="head">
         <b>{one.plot}</b>
         <span className={`badge ${one.fits ? "" : "bad"}`}>{verdict}</span>
-        {one.score !== undefined && <span className="quiet">{`${by ?? "score"} ${one.score}`}</span>}
+        {one.learned !== undefined ? <span className="quiet">{one.learned}</span> : one.score !== undefined && <span className="quiet">{`${by ?? "score"} ${one.score}`}</span>}
       </div>
       {one.condition.text === undefined ? <p className="quiet">{one.reason}</p> : <Tree why={one.condition} decider={deciding(one.condition)} />}
     </div>

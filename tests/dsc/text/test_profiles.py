@@ -131,7 +131,7 @@ def test_a_profile_changes_the_choice_of_a_dynamic_state_at_any_depth():
         ("choose: {main: {wait: cost}}", "sim.yaml:2:17: plot 'main' has no dynamic state 'wait'"),
         (
             "choose: {main: {first: best}}",
-            "sim.yaml:2:17: it should be 'order', 'priority', 'utility' or 'cost'; found 'best'",
+            "sim.yaml:2:17: it should be 'order', 'priority', 'utility', 'cost' or 'learned'; found 'best'",
         ),
     ],
 )
