@@ -13,7 +13,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 Situation = tuple[tuple[str, bool], ...]
-"""The conditions of a dynamic state under `situation`, as texts, each with its truth."""
+"""The conditions of a dynamic state under `situation`, as sorted texts, each with its truth."""
+
+
+def situation_of(truths: Mapping[str, bool]) -> Situation:
+    """Return the situation in which conditions have this truth."""
+    return tuple(sorted(truths.items()))
 
 
 class Tries(NamedTuple):
@@ -90,7 +95,7 @@ class Experience:
     def from_form(form: Mapping[str, Any]) -> Experience:
         """Return the experience of a form from `to_form`."""
         tries = {
-            (one["plot"], one["candidate"], tuple(one["situation"].items())): Tries(
+            (one["plot"], one["candidate"], situation_of(one["situation"])): Tries(
                 *(one[name] for name in Tries._fields)
             )
             for one in form["tries"]

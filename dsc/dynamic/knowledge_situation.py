@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any
 
 from dsc.chance import uniform
-from dsc.dynamic.experience import NO_EXPERIENCE, Experience, Tries
+from dsc.dynamic.experience import NO_EXPERIENCE, Experience, Tries, situation_of
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import Plots, candidates_of
 from dsc.engine.exclusion import Excluded, FailedCandidate
@@ -156,7 +156,7 @@ def choose(
         if verdict.fits and excluded is not None and (reason := excluded.reason(name, own[name])):
             verdict = Verdict(name, fits=False, reason=reason)
         if verdict.fits and state.choose == "learned":
-            verdict = _with_tries(verdict, experience.of(holder, name, tuple(situation.items())))
+            verdict = _with_tries(verdict, experience.of(holder, name, situation_of(situation)))
         elif verdict.fits and state.choose != "order":
             verdict = replace(verdict, score=_score(plot, state.choose, own[name], world))
         verdicts.append(verdict)

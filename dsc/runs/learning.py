@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from dsc.dynamic.experience import Experience, Key, Situation, Tries
+from dsc.dynamic.experience import Experience, Key, Situation, Tries, situation_of
 from dsc.events import DONE
 from dsc.runs.archive import archive
 from dsc.trace import Record
@@ -42,7 +42,7 @@ def tries_in(records: Iterable[Record]) -> Iterator[tuple[Key, Tries]]:
         if record.type == "decision":
             data = record.data
             if data.get("chosen") is not None and "situation" in data:
-                situation = tuple(data["situation"].items())
+                situation = situation_of(data["situation"])
                 open_tries[data["state"]] = _Try(data["plot"], data["chosen"], situation, record.t)
         elif record.type == "step":
             for microstep in record.data["microsteps"]:

@@ -251,7 +251,8 @@ class RunStore:
         plots = {one.name: self._short.hash(one.to_form()) for one in library}
         deployed = {} if skills is None else {SKILLS: self._short.reference(signature_forms(skills))}
         if library.experience != NO_EXPERIENCE:
-            deployed[EXPERIENCE] = self._short.reference(library.experience.to_form())
+            form = library.experience.to_form()
+            deployed[EXPERIENCE] = self._short.reference(form) if form["tries"] else form
         row = (
             plot, text_of(self._short(arguments)), self._knowledge.version, text_of({**self._header, **deployed}),
             text_of(plots), text_of(self._domain),

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from dsc.dynamic.experience import Experience, Tries
+from dsc.dynamic.experience import Experience, Tries, situation_of
 from dsc.model.language import Frozen, Written
 from dsc.text.yaml import dump, load_document, read_file, read_model
 
@@ -43,7 +43,7 @@ def parse_experience(text: str, source: str | None = None) -> Experience:
     """
     read = read_model(_Experience, load_document(text, source))
     return Experience({
-        (one.plot, one.candidate, tuple(one.situation.items())): Tries(one.tries, one.done, one.seconds)
+        (one.plot, one.candidate, situation_of(one.situation)): Tries(one.tries, one.done, one.seconds)
         for one in read.experience
     })  # fmt: skip
 
