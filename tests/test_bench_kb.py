@@ -35,7 +35,12 @@ def test_conditions_are_updated_in_three_kinds_of_store(rows):
     assert all(set(row["cells"]) == {"floor", "this engine", "journaled", "fsynced"} for row in watched)
 
 
+def test_a_change_of_a_live_relation_is_compared_with_the_same_change_of_facts(rows):
+    changed = [case.partition(",")[0] for case in rows if case.startswith("change of")]
+    assert changed == ["change of facts", "change of a live relation"]
+
+
 def test_targets_are_judged_by_their_figures(rows):
     targets = [target for row in rows.values() for target in row["targets"]]
-    assert len(targets) == 21
+    assert len(targets) == 22
     assert all(one["met"] is (one["value"] <= one["bound"]) for one in targets)

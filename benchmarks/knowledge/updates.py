@@ -95,9 +95,9 @@ def relation_rows(pace: Pace, sizes: Sizes, facts: int = 50) -> list[Row]:
             "µs",
             {FLOOR: floor, ENGINE: Cell(1e6 * median(figures[name]), ratio(figures, name, FLOOR))},
         )
-        for change, name in (("update", SOME), ("change of a live relation", LIVE))
+        for change, name in (("change of facts", SOME), ("change of a live relation", LIVE))
     ]
-    rows[-1].targets.append(Target("x update", 2, ratio(figures, LIVE, SOME)))
+    rows[-1].targets.append(Target("x facts", 2, ratio(figures, LIVE, SOME)))
     return rows
 
 
