@@ -8,9 +8,9 @@ from functools import partial
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import candidates_of, is_planned
 from dsc.engine.machine_state import MachineState
-from dsc.model.actions import Trigger, component_of, flat
+from dsc.model.actions import Trigger, component_of
 from dsc.model.plot import ActionPlot
-from dsc.model.states import DynamicState, State
+from dsc.model.states import DynamicState
 from knowledge_base.facts import Value
 from knowledge_base.language.syntax.expression import Constant
 from knowledge_base.language.syntax.text import to_text
@@ -85,8 +85,7 @@ def parts_of(plot: ActionPlot, library: Library) -> list[str]:
 
 def skills_of(plot: ActionPlot) -> list[str]:
     """Return the skills that the states of a plot trigger, and those that its handlers listen to."""
-    entries = [actions for _, state, _ in plot.walk() if isinstance(state, State) for _, actions in state.blocks()]
-    found = [action.trigger for actions in entries for action in actions if isinstance(action, Trigger)]
+    found = [action.trigger for action in plot.actions() if isinstance(action, Trigger)]
     listens = [one.listen.trigger for one in plot.handlers if one.listen is not None]
     return list(dict.fromkeys([*found, *listens]))
 
@@ -123,14 +122,11 @@ def _touches(plot: ActionPlot, library: Library) -> Iterator[_Row]:
 
 
 def _components(plot: ActionPlot) -> Iterator[str]:
-    for _, state, _ in plot.walk():
-        if isinstance(state, State):
-            actions = [action for _, block in state.blocks() for action in block]
-            yield from (one for one in map(component_of, flat(actions)) if one is not None)
     commands = [one for reaction in plot.rules for one in reaction.do.command]
     commands += [one for reaction in plot.handlers for one in reaction.do.command]
     listens = [one.listen for one in plot.handlers if one.listen is not None]
-    yield from (one for one in map(component_of, (*commands, *listens)) if one is not None)
+    reached = map(component_of, (*plot.actions(), *commands, *listens))
+    return (one for one in reached if one is not None)
 
 
 def _steps(running: Iterable[Running]) -> Iterator[tuple[str, DynamicState]]:

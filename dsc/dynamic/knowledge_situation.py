@@ -142,11 +142,13 @@ def choose(
     """
     goal = state.goal
     if goal is not None:
-        goal = substitute(plain_condition(goal, Values(bindings)) if reads_data(goal) else goal, scalars(bindings))
+        goal = substitute(_plain(goal, bindings), scalars(bindings))
     if goal is not None and holds(goal, world, {}):
         return Decision(None, satisfied=True, version=version)
     arguments = {name: _argument(term, world, bindings) for name, term in state.arguments.items()}
-    situation = {to_text(one): _is_true(one, bindings, world) for one in state.situation}
+    read = scalars(bindings) if state.situation else {}
+    truths = {to_text(one): holds(_plain(one, bindings), world, read) for one in state.situation}
+    situation = situation_of(truths)
     verdicts, own = [], {}
     fitting: list[Verdict] = []
     for plot in candidates_of(state, plots):
@@ -156,7 +158,7 @@ def choose(
         if verdict.fits and excluded is not None and (reason := excluded.reason(name, own[name])):
             verdict = Verdict(name, fits=False, reason=reason)
         if verdict.fits and state.choose == "learned":
-            verdict = _with_tries(verdict, experience.of(holder, name, situation_of(situation)))
+            verdict = _with_tries(verdict, experience.of(holder, name, situation))
         elif verdict.fits and state.choose != "order":
             verdict = replace(verdict, score=_score(plot, state.choose, own[name], world))
         verdicts.append(verdict)
@@ -178,7 +180,7 @@ def choose(
         }  # fmt: skip
     return Decision(
         chosen, chosen_arguments, verdicts=tuple(verdicts), version=version, by=state.choose, holder=holder,
-        situation=situation, explored=explored,
+        situation=truths, explored=explored,
     )  # fmt: skip
 
 
@@ -187,8 +189,7 @@ def judge(plot: ActionPlot, arguments: Mapping[str, Any], world: World) -> Verdi
     if plot.when is None:
         return Verdict(plot.name, fits=True, reason="no condition")
     bindings = {**_defaults(plot), **arguments}
-    when = plain_condition(plot.when, Values(bindings)) if reads_data(plot.when) else plot.when
-    why = explain(when, world, scalars(bindings))
+    why = explain(_plain(plot.when, bindings), world, scalars(bindings))
     return Verdict(plot.name, fits=why.truth, reason=str(why.deciding), explanation=why.to_json())
 
 
@@ -214,9 +215,9 @@ def _with_tries(verdict: Verdict, tries: Tries | None) -> Verdict:
     return verdict if tries is None else replace(verdict, score=tries.time_to_success, learned=str(tries))
 
 
-def _is_true(condition: Expression, bindings: Mapping[str, Any], world: World) -> bool:
-    condition = plain_condition(condition, Values(bindings)) if reads_data(condition) else condition
-    return holds(condition, world, scalars(bindings))
+def _plain(condition: Expression, bindings: Mapping[str, Any]) -> Expression:
+    """Return the condition with the values of the data that it reads."""
+    return plain_condition(condition, Values(bindings)) if reads_data(condition) else condition
 
 
 def _argument(term: Term, world: World, bindings: Mapping[str, Any]) -> Any:

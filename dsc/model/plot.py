@@ -12,6 +12,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from dsc.model import relations  # noqa: F401  declares them for all texts
+from dsc.model.actions import ExternalAction, Internal, flat
 from dsc.model.declarations import PlotParameter, PlotVariable, TypeText
 from dsc.model.language import ConditionField, TermField, Written, constant
 from dsc.model.ranges import Who, refuse_change
@@ -179,6 +180,13 @@ class ActionPlot(Written):
     def walk(self) -> Iterator[tuple[str, AnyState, Path]]:
         """Yield name, state and path of every state at any depth, in document order."""
         yield from _walk(self.states, ("states",))
+
+    def actions(self) -> Iterator[ExternalAction | Internal]:
+        """Yield the actions of all states, also those inside branches and blocks."""
+        for _, state, _ in self.walk():
+            if isinstance(state, State):
+                for _, block in state.blocks():
+                    yield from flat(block)
 
     def heard(self) -> frozenset[str]:
         """Return the names of the events that the plot declares under `receives`, or for which it has a reaction."""

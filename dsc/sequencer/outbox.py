@@ -93,14 +93,14 @@ class Outbox:
 
         Consecutive parameters of one entry are one set, as each alone may violate a relation (S1.20).
         """
-        open_set = self._open_sets.pop(component.name, {})
-        if isinstance(told, SetParameter):
-            is_more = bool(open_set) and _extends(told, open_set.values())
-            outputs = self._open_sets[component.name] = open_set if is_more else {}
-        else:
-            is_more, outputs = False, {}
+        outputs = self._open_sets.pop(component.name, {})
+        if not _extends(told, outputs.values()):
+            outputs = {}
+        is_new = not outputs
         outputs[self._number(told)] = told
-        if not is_more:
+        if isinstance(told, SetParameter):
+            self._open_sets[component.name] = outputs
+        if is_new:
             self._begin(component, _hook_of(told), outputs, lambda: self._take(component, outputs))
         if not isinstance(told, SendMessage):
             self.configuring[component.name] = self.untaken[component.name]
@@ -382,9 +382,9 @@ async def _is_ready(component: Component, told: Told | None) -> bool:
     return True
 
 
-def _extends(told: SetParameter, outputs: Iterable[Told]) -> bool:
-    """Return whether a parameter belongs to the same set as these: of the same entry, and with another name."""
-    return all(
+def _extends(told: Told, outputs: Iterable[Told]) -> bool:
+    """Return whether an output is a parameter of the same set as these: of the same entry, and with another name."""
+    return isinstance(told, SetParameter) and all(
         isinstance(one, SetParameter) and one.activation == told.activation and one.parameter != told.parameter
         for one in outputs
     )

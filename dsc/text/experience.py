@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from dsc.dynamic.experience import Experience, Tries, situation_of
+from dsc.dynamic.experience import Experience
 from dsc.model.language import Frozen, Written
 from dsc.text.yaml import dump, load_document, read_file, read_model
 
@@ -42,10 +42,7 @@ def parse_experience(text: str, source: str | None = None) -> Experience:
         InputError: the text is not experience; the message has the place and the nearest valid key.
     """
     read = read_model(_Experience, load_document(text, source))
-    return Experience({
-        (one.plot, one.candidate, situation_of(one.situation)): Tries(one.tries, one.done, one.seconds)
-        for one in read.experience
-    })  # fmt: skip
+    return Experience.from_form({"tries": [one.model_dump() for one in read.experience], "seed": 0})
 
 
 def load_experience(path: Path | str) -> Experience:

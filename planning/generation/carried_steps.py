@@ -9,10 +9,10 @@ from typing import Any
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import offers_for
 from dsc.events import SKILL_FAILURES
-from dsc.model.actions import Configure, Switch, Trigger, component_of, flat
+from dsc.model.actions import Configure, Switch, Trigger, component_of
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import Rule
-from dsc.model.states import DynamicState, State, SubmachineState
+from dsc.model.states import DynamicState, SubmachineState
 from dsc.sequencer.dispatcher import DEFAULT_WITHIN
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.facts import Value
@@ -71,7 +71,8 @@ def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] =
             found[plot.name] = plot
             waiting += [library.plot(name) for name in sorted(plot.uses()) if name in library]
             waiting += offers_for(plot, library)
-    actions = [action for plot in found.values() for action in _actions(plot)]
+    reaching = (action for plot in found.values() for action in plot.actions())
+    actions = [action for action in reaching if isinstance(action, Trigger | Configure | Switch)]
     actions += [one for rule in applied for one in rule.do.command if isinstance(one, Configure | Switch)]
     names = {name for action in actions if (name := component_of(action)) is not None}
     limits = [action.within or DEFAULT_WITHIN for action in actions if isinstance(action, Trigger)]
@@ -102,12 +103,6 @@ def _is_false(e: Expression, bindings: Mapping[str, Value]) -> bool:
             return len(values) == len(sides) and (values[0] == values[1]) is not (operator == "=")
         case _:
             return False
-
-
-def _actions(plot: ActionPlot) -> Iterable[Trigger | Configure | Switch]:
-    blocks = [actions for _, state, _ in plot.walk() if isinstance(state, State) for _, actions in state.blocks()]
-    found = (action for block in blocks for action in flat(block))
-    return [action for action in found if isinstance(action, Trigger | Configure | Switch)]
 
 
 def _is_open(plot: ActionPlot) -> bool:
