@@ -3,12 +3,13 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 BENCH  := .venv-bench
+LONG   := $(shell cat tests/long.txt)
 
 # The tests start hundreds of programs, which share the compiled modules.
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-engines test-all check conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
+.PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-long test-engines test-all check types limits conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-choice bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
@@ -31,8 +32,11 @@ $(BENCH)/.peers: pyproject.toml   # apart, so that what the peers pin does not d
 demo: $(VENV)/.run   ## clear a table: designed where foreseen, planned where not
 	$(BIN)/dsc run clean-up-table --seed 1 --faults 0.2
 
-test: $(VENV)/.test check   ## static checks, then all tests, on all cores
-	$(BIN)/python -m pytest -n auto
+test: $(VENV)/.test check   ## static checks, then the tests, on all cores; those of tests/long.txt have their own target
+	$(BIN)/python -m pytest -n auto $(LONG:%=--ignore=%)
+
+test-long: $(VENV)/.test   ## whole runs of robots and programs: the files whose tests take more than five seconds (tests/long.txt)
+	$(BIN)/python -m pytest -n auto $(LONG)
 
 $(VENV)/.engines: $(VENV)/.test   # planning engines that no one is forced to have; ENHSP needs Java besides
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,check,fast,numeric,durations,numbers]'
@@ -46,16 +50,21 @@ test-engines: $(VENV)/.engines   ## every planning engine for real
 	$(BIN)/dsc doctor
 	$(BIN)/python -m pytest -rs tests/planning/engines/test_real_engines.py tests/planning/engines/test_kairos.py
 
-test-all: $(VENV)/.engines check   ## as test, with every planning engine and the page in a browser
+test-all: $(VENV)/.engines check   ## all tests, with every planning engine and the page in a browser
 	$(BIN)/dsc doctor
 	$(BIN)/python -m pytest -n auto -rs
 	frontend/tests.sh
 
-check: $(VENV)/.test   ## ruff, mypy strict, import contracts, prose
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check --quiet .
+check: $(VENV)/.test   ## ruff, mypy strict, import contracts, prose, limits of the house
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=target types limits
+
+types: $(VENV)/.test
 	$(BIN)/mypy
 	$(BIN)/mypy --config-file tests/mypy.toml tests
+
+limits: $(VENV)/.test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet .
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/python tests/prose.py
 	$(BIN)/python tests/house.py

@@ -1,7 +1,7 @@
 """Experience: how often candidates succeeded, and how long they took, by situation; learned from kept runs (S0.14).
 
 The model is one number per candidate and situation: the expected time until success, if the candidate is repeated. The
-probability of success follows Laplace's rule of succession.
+probability of success follows Laplace's rule of succession. The same number is the cost of a plan step.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 Situation = tuple[tuple[str, bool], ...]
@@ -19,6 +20,10 @@ Situation = tuple[tuple[str, bool], ...]
 def situation_of(truths: Mapping[str, bool]) -> Situation:
     """Return the situation in which conditions have this truth."""
     return tuple(sorted(truths.items()))
+
+
+PRIOR_TRIES = 5
+"""The weight of all steps of an action in the cost of one step, as a number of tries."""
 
 
 class Tries(NamedTuple):
@@ -50,7 +55,15 @@ class Tries(NamedTuple):
 
 
 Key = tuple[str, str, Situation]
-"""The plot of a dynamic state, a candidate, and the situation of its choice."""
+"""The plot of a dynamic state, a candidate, and the situation of its choice.
+
+For a step of a plan: the planning action, a candidate, and `step_situation` of the step.
+"""
+
+
+def step_situation(step: str) -> Situation:
+    """Return the situation of a plan step, which is its text in PDDL."""
+    return ((step, True),)
 
 
 @dataclass(frozen=True)
@@ -67,14 +80,7 @@ class Experience:
 
     def of(self, plot: str, candidate: str, situation: Situation) -> Tries | None:
         """Return the tries of a candidate in a situation, else in all situations; `None` without a try."""
-        found = self.tries.get((plot, candidate, situation))
-        if found is not None:
-            return found
-        total = Tries()
-        for (of, name, _), one in self.tries.items():
-            if (of, name) == (plot, candidate):
-                total = total.plus(one)
-        return total if total.tries else None
+        return self.tries.get((plot, candidate, situation)) or self._totals.get((plot, candidate))
 
     def plus(self, tries: Iterable[tuple[Key, Tries]]) -> Experience:
         """Return the experience with further tries."""
@@ -101,6 +107,28 @@ class Experience:
             for one in form["tries"]
         }
         return Experience(tries, form["seed"])
+
+    def seconds_for(self, action: str, step: str) -> float | None:
+        """Return the expected time until success of a plan step in seconds; `None` if its action was never tried.
+
+        The mean of all steps of the action counts as `PRIOR_TRIES` further tries of the step.
+        """
+        every = self._totals.get((action,))
+        if every is None:
+            return None
+        own = self._totals.get((step,), Tries())
+        done = own.done + PRIOR_TRIES * (every.done + 1) / (every.tries + 2)
+        seconds = own.seconds + PRIOR_TRIES * every.seconds / every.tries
+        return seconds / done
+
+    @cached_property
+    def _totals(self) -> Mapping[tuple[str, ...], Tries]:
+        """The tries by plot or action, by plot or action and candidate, and by the text of a plan step."""
+        found: dict[tuple[str, ...], Tries] = {}
+        for (of, name, situation), one in self.tries.items():
+            for key in ((of,), (of, name), *((text,) for text, _ in situation)):
+                found[key] = found.get(key, Tries()).plus(one)
+        return found
 
     @property
     def digest(self) -> str:

@@ -134,7 +134,7 @@ def choose(
         plots: provider of the candidates.
         version: version of the knowledge.
         excluded: the candidates that have failed.
-        experience: the tries for a learned choice.
+        experience: the tries for a learned choice; those of plan steps count for a candidate without others.
         draw: a random number in [0, 1); below `explore` of the state, it chooses among the candidates that fit.
 
     Raises:
@@ -158,7 +158,8 @@ def choose(
         if verdict.fits and excluded is not None and (reason := excluded.reason(name, own[name])):
             verdict = Verdict(name, fits=False, reason=reason)
         if verdict.fits and state.choose == "learned":
-            verdict = _with_tries(verdict, experience.of(holder, name, situation))
+            tries = experience.of(holder, name, situation) or experience.of(str(plot.implements), name, ())
+            verdict = _with_tries(verdict, tries)
         elif verdict.fits and state.choose != "order":
             verdict = replace(verdict, score=_score(plot, state.choose, own[name], world))
         verdicts.append(verdict)

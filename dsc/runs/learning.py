@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from dsc.dynamic.experience import Experience, Key, Situation, Tries, situation_of
+from dsc.dynamic.experience import Experience, Key, Tries, situation_of, step_situation
 from dsc.events import DONE
 from dsc.runs.archive import archive
 from dsc.trace import Record
@@ -27,28 +28,67 @@ def learn(stores: Iterable[Path | str]) -> Experience:
 
 
 class _Try(NamedTuple):
-    """A candidate that a dynamic state has chosen at second `at`."""
+    """A try that began at second `at`, with its key."""
 
-    plot: str
-    candidate: str
-    situation: Situation
+    key: Key
     at: float
 
 
 def tries_in(records: Iterable[Record]) -> Iterator[tuple[Key, Tries]]:
-    """Yield each try in the records of a run; a try that a surrounding state has ended does not count."""
+    """Yield each try in the records of a run: of learned choices, and of the steps of plans.
+
+    A try that a surrounding state has ended does not count.
+    """
     open_tries: dict[str, _Try] = {}
+    plots = _Plots()
     for record in records:
-        if record.type == "decision":
-            data = record.data
-            if data.get("chosen") is not None and "situation" in data:
-                situation = situation_of(data["situation"])
-                open_tries[data["state"]] = _Try(data["plot"], data["chosen"], situation, record.t)
+        if record.type == "plot":
+            plots.forms[record.data["name"]] = record.data["plot"]
+        elif record.type == "decision":
+            if (key := plots.key_of(record.data)) is not None:
+                open_tries[record.data["state"]] = _Try(key, record.t)
         elif record.type == "step":
             for microstep in record.data["microsteps"]:
                 triggers = {one["from"]: one["on"] for one in microstep["taken"]}
                 for path in microstep["exited"]:
                     tried = open_tries.pop(path, None)
                     if tried is not None and path in triggers:
-                        done = int(triggers[path] == DONE)
-                        yield (tried.plot, tried.candidate, tried.situation), Tries(1, done, record.t - tried.at)
+                        yield tried.key, Tries(1, int(triggers[path] == DONE), round(record.t - tried.at, 6))
+                plots.bound.update({one["state"]: one["plot"] for one in microstep.get("bound", ())})
+
+
+@dataclass
+class _Plots:
+    """The plots of a run so far.
+
+    Attributes:
+        forms: the plots as data, by name.
+        bound: the name of the plot that each state contains, by the state's path.
+    """
+
+    forms: dict[str, Mapping[str, Any]] = field(default_factory=dict)
+    bound: dict[str, str] = field(default_factory=dict)
+
+    def key_of(self, decision: Mapping[str, Any]) -> Key | None:
+        """Return the key of the try that a decision begins; `None` for a choice without learning."""
+        chosen = decision.get("chosen")
+        if chosen is None:
+            return None
+        if "situation" in decision:
+            return decision["plot"], chosen, situation_of(decision["situation"])
+        step = self._text_about(decision["state"])
+        action = step[1:].rstrip(")").partition(" ")[0]
+        is_step = bool(action) and self.forms.get(chosen, {}).get("implements") == action
+        return (action, chosen, step_situation(step)) if is_step else None
+
+    def _text_about(self, path: str) -> str:
+        """Return the text about a state; about a step of a plan, it is the step in PDDL."""
+        names = path.split("/")
+        for length in range(len(names) - 1, 0, -1):
+            plot = self.bound.get("/".join(names[:length]))
+            if plot is not None:
+                state = self.forms[plot]
+                for name in names[length:]:
+                    state = {**state.get("states", {}), **state.get("regions", {})}.get(name, {})
+                return str(state.get("about", ""))
+        return ""

@@ -15,7 +15,6 @@ from knowledge_base.world.overlay import Overlay
 from planning.execution.link_monitor import OVERTAKING, OWN_STEPS, Broken, GoalReached, LinkMonitor, News, Shorter
 from planning.execution.outcomes import GoalHolds, Monitored, PlanInvalid
 from planning.execution.plan_ends import shortest_end
-from planning.execution.plan_progress import cost_of
 from planning.execution.plan_run import Better, PlanNews, PlanRun, PlanState, Successor
 from planning.execution.search import Found, NotFound
 from planning.model.plan import PlanFound
@@ -222,7 +221,8 @@ class MonitorSkill:
         ahead = Overlay(self._knowledge)
         ahead.apply(progress.domain.effects(step, ahead))
         end = shortest_end(plan.steps, progress.domain, ahead, progress.goal)
-        if end is None or cost_of(end, progress.domain, ahead) >= cost_of(progress.coming(), progress.domain, ahead):
+        cost = self._escalation.search.costs.sum
+        if end is None or cost(end, progress.domain, ahead) >= cost(progress.coming(), progress.domain, ahead):
             return None
         return (step, *end)
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from knowledge_base.errors import InputError
-from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import And, Atom, Constant, Expression
@@ -24,10 +23,8 @@ from planning.model.cancellable_work import WorkLimit
 from planning.model.domain import PlanningDomain
 from planning.model.plan import Plan, PlanStep
 from planning.model.problem import Problem
-from planning.model.quantities import value_of
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation
-from planning.problem.operators import TOTAL_COST
 
 _MOST_RUNNING = 3
 """The largest number of running steps for which each subset is tried as done; beyond it, only none and all."""
@@ -76,17 +73,6 @@ def _possible(
         if domain.applicable(step, ahead):
             ahead.apply(domain.effects(step, ahead))
             yield step
-
-
-def cost_of(steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> float:
-    """Return the `(total-cost)` of the steps from `world`; the number of steps if the domain lacks that function."""
-    if TOTAL_COST.function not in domain.schema.functions:
-        return len(steps)
-    ahead = Overlay(world)
-    for step in steps:
-        ahead.apply(domain.effects(step, ahead))
-    total = Fact(TOTAL_COST.function)
-    return value_of(ahead, total) - value_of(world, total)
 
 
 class PlanProgress:

@@ -42,6 +42,7 @@ from planning.execution.plan_run import PlanRun, task_of
 from planning.execution.plan_runs import PlanRuns
 from planning.execution.plotting import Plotting
 from planning.execution.search import NotFound, Search
+from planning.execution.step_costs import StepCosts
 from planning.problem.construction import check_goal
 from planning.problem.derived import derivation
 
@@ -107,7 +108,8 @@ class PlanningComponent(GoalSkills):
         self._clock = clock
         self._working_for = working_for
         self._records = PlanRecords(trace)
-        self._search = Search(domain, knowledge, planner, clock, self._records, foresight)
+        costs = StepCosts(domain, library)
+        self._search = Search(domain, knowledge, planner, clock, self._records, costs, foresight)
         self._runs = PlanRuns()
         self._outages = Outages(components, self._records)
         self._library = library

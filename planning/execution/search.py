@@ -20,7 +20,7 @@ from planning.analysis.validation import Validation, validate
 from planning.engines.registry import timing
 from planning.execution.outcomes import NoPlanKind
 from planning.execution.plan_ends import leads_to
-from planning.execution.plan_progress import PlanProgress, cost_of, local_repair
+from planning.execution.plan_progress import PlanProgress, local_repair
 from planning.execution.planner_call import Answer, Improvements, PlannerCalls
 from planning.model.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.model.plan import (
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from knowledge_base.store import KnowledgeBase
     from planning.engines.planner import Planner
     from planning.execution.plan_records import PlanRecords
+    from planning.execution.step_costs import StepCosts
     from planning.model.domain import PlanningDomain
     from planning.model.problem import Problem
 
@@ -165,6 +166,7 @@ class Search:
     Args:
         domain, knowledge, planner, clock: see `PlanningComponent`.
         records: receives a record of each excluded, readmitted and rejected step, and of each wrong plan.
+        costs: the costs of plan steps.
         foresight: simulates each plan; the search returns only plans that the simulation accepts.
     """
 
@@ -175,6 +177,7 @@ class Search:
         planner: Planner,
         clock: LoopClock,
         records: PlanRecords,
+        costs: StepCosts,
         foresight: Foresight | None = None,
     ) -> None:
         self._domain = domain
@@ -182,6 +185,7 @@ class Search:
         self._planner = PlannerCalls(planner, clock)
         self._clock = clock
         self._records = records
+        self.costs = costs
         self._foresight = foresight
         self._excluded: dict[PlanStep, float] = {}
 
@@ -227,7 +231,8 @@ class Search:
         if ahead is None or not leads_to(found.steps, before.domain, world, before.goal):
             return later  # the world changed during the second search
         then = later.steps[len(running) :]
-        return later if cost_of(then, before.domain, ahead) <= cost_of(found.steps, before.domain, world) else found
+        cost = self.costs.sum
+        return later if cost(then, before.domain, ahead) <= cost(found.steps, before.domain, world) else found
 
     def _running(self, progress: PlanProgress) -> tuple[PlanStep, ...]:
         """Return the running steps that are applicable; the others are done, or cannot be completed."""
@@ -405,7 +410,7 @@ class Search:
         except WorkLimitError as error:
             return NotFound("timed_out", f"no plan within {seconds:g} s (while {error.doing})")
         problem = replace(problem, wrong=tuple(refused.plans)) if refused.plans else problem
-        answer, better = await self._answer(problem, budget.left, refused.steps)
+        answer, better = await self._answer(self.costs.price(problem), budget.left, refused.steps)
         if isinstance(answer, PlanFound):
             reproducible = answer.reproducible and repaired is None
             return Found(replace(answer, reproducible=reproducible), better=better)

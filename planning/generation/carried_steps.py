@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from dsc.dynamic.experience import Experience
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import offers_for
 from dsc.events import SKILL_FAILURES
@@ -161,14 +162,15 @@ class Carrier:
         self._domain = domain
         self._library = library.copy()
         self.rules = tuple(rules)
+        self.experience = library.experience
         self._usage: dict[tuple[str, ...], Usage] = {}  # most steps share their candidates
         self._carried: dict[tuple[PlanStep, tuple[str, ...]], CarriedStep] = {}
 
     @staticmethod
     def of(domain: PlanningDomain, library: Library, rules: Sequence[Rule]) -> Carrier:
-        """Return the carrier of the last plan if the rules are equal, since successive plans share most steps."""
+        """Return the carrier of the last plan if rules and experience are equal, since plans share most steps."""
         known = _carriers.find(domain, library.plots)
-        if known is None or known.rules != tuple(rules):
+        if known is None or known.rules != tuple(rules) or known.experience.tries is not library.experience.tries:
             known = _carriers.keep(domain, library.plots, Carrier(domain, library, rules))
         return known
 
@@ -196,7 +198,7 @@ class Carrier:
         used = self._usage[names]
         taken = {name for plot in candidates for name in plot.parameters}
         content = {"dynamic": names, "with": {name: value for name, value in bindings.items() if name in taken}}
-        if (choice := _choice(candidates)) is not None:
+        if (choice := _choice(candidates, self.experience)) is not None:
             content["choose"] = choice
         return _step(
             step, self._domain, content, None if used.anything else PATIENCE * used.seconds,
@@ -206,13 +208,14 @@ class Carrier:
         )  # fmt: skip
 
 
-def _choice(candidates: Collection[ActionPlot]) -> str | None:
-    """Return the term that all of several candidates declare, by which the step chooses; else `None`: by order."""
-    if len(candidates) > 1:
-        for name in ("utility", "cost", "priority"):
-            if all(name in plot.scores() for plot in candidates):
-                return name
-    return None
+def _choice(candidates: Collection[ActionPlot], experience: Experience) -> str | None:
+    """Return how a step chooses among several candidates: by a term that all declare, or by experience; else `None`."""
+    if len(candidates) == 1:
+        return None
+    for name in ("utility", "cost", "priority"):
+        if all(name in plot.scores() for plot in candidates):
+            return name
+    return "learned" if any(experience.of(str(plot.implements), plot.name, ()) for plot in candidates) else None
 
 
 _carriers: IdentityCache[PlanningDomain, Carrier] = IdentityCache(size=8)

@@ -7,9 +7,10 @@ import asyncio
 import pytest
 from obedient_robot import ObedientRobot, plots
 
+from dsc.dynamic.library import Library
 from knowledge_base import Delta, KnowledgeBase, fact
 from planning import Plan, PlanningDomain, PlanStep, Robot
-from planning.execution.plan_progress import cost_of
+from planning.execution.step_costs import StepCosts
 from planning.model.plan import EngineFailed, PlanFound
 
 TRIP = """(define (domain trip) (:types place) (:predicates (at ?p - place) (packed) (road ?a ?b - place))
@@ -82,7 +83,8 @@ def test_the_cheaper_plan_is_carried_out_and_without_costs_the_shorter_one(text,
 @pytest.mark.parametrize(("text", "costs"), [(TRIP, (11, 7)), (FREE, (2, 3))])
 def test_what_steps_cost(text, costs):
     domain, world = trip(text)
-    assert tuple(cost_of(steps(one), domain, world) for one in (SHORT, LONG)) == costs
+    cost = StepCosts(domain, Library()).sum
+    assert tuple(cost(steps(one), domain, world) for one in (SHORT, LONG)) == costs
     assert world.ask("(at a)")
 
 
