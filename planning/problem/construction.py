@@ -4,7 +4,7 @@ Construction consists of these steps, in this order:
 
 - Select the relevant actions.
 - Ground these actions by relaxed reachability, and evaluate all conditions that cannot change.
-- Compile a disjunctive goal into bookkeeping actions after the last real action.
+- Compile a disjunctive goal into bookkeeping actions after the last real action, unless only one part is reachable.
 - Prune facts and actions that cannot contribute.
 - Remove objects that other objects can replace.
 - Replace negative conditions by positive ones.
@@ -13,8 +13,9 @@ Construction consists of these steps, in this order:
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from knowledge_base.facts import Fact
 from knowledge_base.language.checking.check import check
@@ -150,7 +151,8 @@ class ProblemBuilder:
             missing = [said(numbering, one, goal) for one in grounded.task.goal if one not in reach.facts]
             if missing:
                 return self._nothing(*dict.fromkeys(missing))
-            task, notes = _priced(pruned(grounded.task, reach.taken), amount)
+            decided = _without_decided_choices(grounded.task, reach.taken)
+            task, notes = _priced(pruned(decided, reach.taken), amount)
             return self._sliced(task, grounded.assembly, world, grounded.things, notes)
 
     def grounded(
@@ -275,6 +277,33 @@ def _with_conjunctive_goal(
     return OperatorIndex([*real, *(numbered(variant, numbering, 0.0) for variant in (finish, *closing))]), wanted
 
 
+def _without_decided_choices(task: Task, possible: Sequence[int]) -> Task:
+    """Return the task whose goal has the condition of each disjunction of which only one part is reachable.
+
+    Engines find plans for such a goal much sooner than for bookkeeping actions. A goal like that of the clean-up table
+    has a disjunction for each item, whose other parts are about facts that no action changes.
+    """
+    if task.ways.all[-1].step is not None:  # bookkeeping actions are the last ones
+        return task
+    finished = task.numbering.of(_FINISHED)
+
+    def simplify(wanted: int) -> Iterator[int]:
+        ways = task.ways.adders.get(wanted, ()) if _is_choice(task.numbering.named(wanted)) else ()
+        reached = [task.ways.all[i] for i in ways if possible[i]]
+        if len(reached) != 1:
+            yield wanted
+            return
+        for need in reached[0].needs:
+            if need != finished:
+                yield from simplify(need)
+
+    return replace(task, goal=tuple(dict.fromkeys(chain.from_iterable(map(simplify, task.goal)))))
+
+
+def _is_choice(what: object) -> bool:
+    return isinstance(what, Fact) and what.predicate == _ONE_OF
+
+
 def _conjunction(goal: Residual, bookkeeping: list[Variant]) -> tuple[Leaf, ...]:
     match goal:
         case Literal() | NumericBound():
@@ -296,6 +325,6 @@ _builders: IdentityCache[PlanningDomain, ProblemBuilder] = IdentityCache(size=8)
 def said(numbering: Numbering, missing: int, goal: Expression) -> str:
     """Return an unreachable part of the goal as text."""
     what = numbering.named(missing)
-    if isinstance(what, Fact) and what.predicate == _ONE_OF:
+    if _is_choice(what):
         return to_text(goal)
     return f"(not {what})" if missing & 1 else str(what)
