@@ -37,6 +37,9 @@ from knowledge_base.questions import Binding as Binding
 from knowledge_base.sources import DataSource as DataSource
 from knowledge_base.store import KnowledgeBase as KnowledgeBase
 from knowledge_base.transaction import Transaction as Transaction
+from knowledge_base.transforms.transform import Transform as Transform
+from knowledge_base.transforms.transform import TransformError as TransformError
+from knowledge_base.transforms.tree import TransformTree as TransformTree
 from knowledge_base.view import View as View
 from knowledge_base.world.computation import Computed as Computed
 from knowledge_base.world.computation import computed as computed

@@ -31,8 +31,8 @@ class Requirement(NamedTuple):
 IN_PROCESS, APART, BUILD = "imported", "a separate process", "to develop"
 WHY = {
     "networkx": ("the public graph of a knowledge base, and layouts of drawings", IN_PROCESS),
-    "numpy": ("layouts of networkx", IN_PROCESS),
-    "scipy": ("layouts of networkx", IN_PROCESS),
+    "numpy": ("layouts of networkx, and transforms", IN_PROCESS),
+    "scipy": ("layouts of networkx, and the algebra of transforms", IN_PROCESS),
     "pydantic": ("plots, profiles and scenarios as validated values", IN_PROCESS),
     "pyperplan": ("the default planner", APART),
     "rich": ("trees, tables and progress on a terminal", IN_PROCESS),

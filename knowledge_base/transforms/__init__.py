@@ -1,0 +1,1 @@
+"""Transforms: where frames are in each other, at each time; imports only `errors` and `facts`."""
