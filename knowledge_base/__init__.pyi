@@ -37,6 +37,7 @@ from knowledge_base.questions import Binding as Binding
 from knowledge_base.sources import DataSource as DataSource
 from knowledge_base.store import KnowledgeBase as KnowledgeBase
 from knowledge_base.transaction import Transaction as Transaction
+from knowledge_base.transforms.transform import Stamped as Stamped
 from knowledge_base.transforms.transform import Transform as Transform
 from knowledge_base.transforms.transform import TransformError as TransformError
 from knowledge_base.transforms.tree import TransformTree as TransformTree

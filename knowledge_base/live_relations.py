@@ -51,7 +51,11 @@ class LiveRelations:
             ended, begun = live.news(read, self._installed.reads)
             if ended or begun:
                 self._installed.renew(ended, begun)
-            for listener in self._listeners:
-                self._notifier.queue(listener)
+            self.announce()
         self._notifier.deliver()
         return True
+
+    def announce(self) -> None:
+        """Queue the calls of the listeners; the caller has the lock."""
+        for listener in self._listeners:
+            self._notifier.queue(listener)

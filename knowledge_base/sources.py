@@ -125,6 +125,8 @@ class Sources:
             raise InputError(f"a source's reference is text that says where values come from, not {reference!r}")
         with self._lock:
             check_fluent(fluent, self._state)
+            if fluent.predicate in self._state.poses:
+                raise SchemaError(f"{fluent} is answered by a transform tree already")
             if fluent in self._open:
                 raise SchemaError(f"{fluent} is fed by '{self._open[fluent].reference}' already")
             source = self._open[fluent] = DataSource(self, fluent, reference)

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from threading import get_ident
 from types import TracebackType
-from typing import Self, get_args
+from typing import TYPE_CHECKING, Self, get_args
 from weakref import WeakSet
 
 from knowledge_base.conditions.condition import Condition
@@ -28,6 +28,7 @@ from knowledge_base.language.checking.inputs import require_delta, require_text,
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.sexpr import read
 from knowledge_base.live_relations import LiveRelations
+from knowledge_base.live_transforms import LiveTransforms
 from knowledge_base.sources import DataSource, SourceListener, Sources
 from knowledge_base.statements import told
 from knowledge_base.transaction import GroupCommit, Transaction
@@ -36,6 +37,9 @@ from knowledge_base.world.live_rows import LiveRows, Rows
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
+
+if TYPE_CHECKING:  # loads scipy
+    from knowledge_base.transforms.tree import TransformTree
 
 Now = Callable[[], float]
 """A function that returns the present time in seconds."""
@@ -68,6 +72,7 @@ class KnowledgeBase(View):
         self._closed = False
         self._sources = Sources(start.state, lambda: self._graph, self._installed, self._notifier)
         self._relations = LiveRelations(start.state, self._installed, self._notifier)
+        self._transforms = LiveTransforms(start.state, self._installed, self._notifier, self._relations.announce)
         self._clock = clock
         self._time = start.time
         self._writer: tuple[int, str] | None = None
@@ -116,7 +121,7 @@ class KnowledgeBase(View):
             raise InputError(f"with the file '{path}' durability is 'process' or 'power', not 'memory'")
         if read_only and new:
             raise InputError("a store that is opened read_only exists already, and is not new")
-        file = _resolved(path)
+        file = located(path)
         archive = Archive(file, schema) if read_only else Journal(file, schema, durability or "process", clock, new=new)
         try:
             return cls(archive.schema, clock, archive)
@@ -390,6 +395,20 @@ class KnowledgeBase(View):
             self._require_free()
             return self._sources.bind(Fact(function, args), reference)
 
+    def bind_transforms(self, function: str, tree: TransformTree) -> Callable[[], None]:
+        """Let a tree answer `(pose ?frame ?reference) - geometry` for all objects; return a function that ends this.
+
+        Queries, snapshots and installed conditions read the latest pose, x y z qx qy qz qw, or `()` if there is none.
+        A change of the function publishes a static transform to the tree, or removes its arc by `()`. No version, watch
+        or file contains poses.
+
+        Raises:
+            UnknownNameError, SchemaError: the function is not such a function, or has a tree or a source already.
+            StoreError: the knowledge base is closed.
+        """
+        self._require_open()
+        return self._transforms.bind(function, tree)
+
     def subscribe_to_relations(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Call `listener` after each change of relations that were read; return a function that ends this.
 
@@ -501,6 +520,12 @@ class KnowledgeBase(View):
 
     def _commit(self, effective: Delta, author: str, key: str | None, along: Writer | None) -> Change:
         self._require_open()  # the block of a transaction may have closed the knowledge base
+        if not (effective.values and self._state.poses):
+            return self._store(effective, author, key, along)
+        with self._transforms.publish(effective) as rest:
+            return self._store(rest, author, key, along)
+
+    def _store(self, effective: Delta, author: str, key: str | None, along: Writer | None) -> Change:
         self._time = max(self._time, self._clock())
         change = Change(self._version + bool(effective), author, effective, self._time)
         self._history.append(change, key, self._state, along)
@@ -520,6 +545,8 @@ class KnowledgeBase(View):
         self._version = change.version
         self._notifier.add(change)
         self._installed.commit(effective, departures)
+        if self._state.poses and (effective.nodes or effective.removed_nodes):
+            self._transforms.reread()
 
     def _present(self) -> Version:
         with self._lock:
@@ -540,12 +567,6 @@ class KnowledgeBase(View):
         self._require_open()
         if self._writer is not None and self._writer[0] == get_ident():
             raise ConflictError(f"a transaction by '{self._writer[1]}' is open in this thread already")
-
-
-def _resolved(path: object) -> Path:
-    if not isinstance(path, str | Path) or "\0" in str(path) or not str(path):
-        raise InputError(f"a store's path is text or a Path, not {shown(path)}")
-    return located(path)
 
 
 def _require_names(author: object, key: object) -> None:

@@ -304,6 +304,15 @@ class View:
         with self._lock:
             return self._state.reference(function, args)
 
+    def publishes(self, function: str) -> bool:
+        """Return whether a transform tree answers the function, and receives its new values."""
+        return self._state.publishes(function)
+
+    def require_publishable(self, values: Mapping[Fact, Content]) -> None:
+        """Raise `TransformError` if a transform tree refuses one of these values."""
+        with self._lock:
+            self._state.require_publishable(values)
+
     def objects(self, type_name: str) -> list[str]:
         """Return the objects of that type and its subtypes, in order of insertion.
 

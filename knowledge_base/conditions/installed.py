@@ -90,9 +90,18 @@ class Installed:
             events.append(("said", fluent.predicate, fluent.args, BOTH))
         self._evaluate(events)
 
-    def refreshed(self, fluent: Fact) -> None:
-        """Evaluate the conditions that read a fluent whose source has a new value; the version stays the same."""
-        self._evaluate([("said", fluent.predicate, fluent.args, BOTH)])
+    def refreshed(self, *fluents: Fact) -> None:
+        """Evaluate the conditions that read fluents with new values of sources; the version stays the same."""
+        self._evaluate([("said", fluent.predicate, fluent.args, BOTH) for fluent in fluents])
+
+    def reread(self, function: str) -> None:
+        """Evaluate all conditions that read a function, whose values may all have changed."""
+        readers = self._readers.get(("said", function))
+        if readers is not None:
+            self._changed.clear()
+            for row in readers.rows():
+                row.relation.renew(row)
+            self._settle()
 
     def reads(self, name: str) -> bool:
         """Return whether an installed condition has read a predicate."""
@@ -125,6 +134,10 @@ class Installed:
             for trigger, rows in readers.made(args, sign):
                 if rows:  # an earlier event may have closed the rows
                     trigger.relation.make(trigger, args, rows)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Let the conditions of the changed rows fire."""
         touched: dict[Condition, None] = {}
         for row in self._changed:
             touched.update(self._conditions.get(row, {}))

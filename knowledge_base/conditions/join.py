@@ -104,6 +104,17 @@ class AlphaIndex:
                 found += relying.get(pick(args), ())
         return found
 
+    def rows(self) -> dict[ConditionRow, None]:
+        """Return all rows that read the predicate, function or type."""
+        found = self.failing.copy()
+        for _, relying in self._relying.values():
+            found.update((row, None) for several in relying.values() for row, _ in several)
+        for _, listed in self._open.values():
+            for by_trigger in listed.values():
+                for rows in by_trigger.values():
+                    found.update(rows)
+        return found
+
     def made(self, args: Args, sign: int) -> list[tuple[DeltaJoin, dict[ConditionRow, None]]]:
         """Return the open rows for which a change may create a witness, by delta join."""
         found: list[tuple[DeltaJoin, dict[ConditionRow, None]]] = []

@@ -19,8 +19,9 @@ from pathlib import Path
 from threading import Lock
 from typing import Literal, NamedTuple
 
-from knowledge_base.errors import DamagedStoreError, Place, StoreError
+from knowledge_base.errors import DamagedStoreError, InputError, Place, StoreError
 from knowledge_base.journal.sidecar_files import INDEX, LOG, OLD_LOG, place, regular, require_no_strangers, unlocked
+from knowledge_base.language.checking.inputs import shown
 from knowledge_base.pddl.files import neighbour_files
 
 Durability = Literal["memory", "process", "power"]
@@ -146,9 +147,12 @@ def located(path: str | Path) -> Path:
     """Return the resolved path of a store.
 
     Raises:
+        InputError: the path is neither text nor a `Path`, or is empty.
         StoreError: the path does not denote a file, is too long, or is a broken link.
     """
     text = str(path)
+    if not isinstance(path, str | Path) or "\0" in text or not text:
+        raise InputError(f"a store's path is text or a Path, not {shown(path)}")
     if text == ":memory:" or text.startswith("file:"):
         raise StoreError(f"'{text}' has a meaning to SQLite; a store is named by the path of its file")
     if text.endswith("/"):

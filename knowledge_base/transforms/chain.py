@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from knowledge_base.transforms.arc import Arc
-from knowledge_base.transforms.transform import Sample, TransformError
+from knowledge_base.transforms.transform import Sample, Transform, TransformError
 
 Arcs = Mapping[str, Arc]
 """The arcs by the name of the child."""
+Links = Mapping[tuple[str, str], Transform | None]
+"""Static transforms by child and parent; `None` removes the arc between them, if there is one."""
 
 
 class Chain(NamedTuple):
@@ -75,6 +77,20 @@ class Chain(NamedTuple):
         return f"'{child}' in '{arc.parent}' ({arc.first:g} s to {arc.last:g} s)"
 
 
+class Reading(NamedTuple):
+    """The latest transform between two frames.
+
+    Attributes:
+        chain: the arcs between the frames.
+        time: time of the transform in seconds; infinity if all arcs are static, `None` without a transform.
+        transform: the transform; `None` if the arcs have no time in common.
+    """
+
+    chain: Chain
+    time: float | None
+    transform: Transform | None
+
+
 def chain_between(frame: str, reference: str, arcs: Arcs) -> Chain:
     """Return the chain from a frame to its reference.
 
@@ -134,6 +150,24 @@ def require_link(parent: str, child: str, arcs: Arcs) -> None:
     if child in above:
         cycle = _arrows([child, *above[: above.index(child) + 1]])
         raise TransformError(f"the arc from '{child}' to '{parent}' closes a cycle: {cycle}; omit this arc")
+
+
+def arcs_after(links: Links, arcs: Arcs) -> dict[str, Arc]:
+    """Return the arcs after a change of static transforms; the removals come first.
+
+    Raises:
+        TransformError: as for `require_link`, after the removals.
+    """
+    found = {**arcs}
+    for (child, parent), transform in links.items():
+        if transform is None and parent_of(child, found) == parent:
+            del found[child]
+    for (child, parent), transform in links.items():
+        if transform is not None:
+            require_link(parent, child, found)
+            found[child] = Arc(parent)
+            found[child].fix(transform)
+    return found
 
 
 def _arrows(path: Sequence[str]) -> str:

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from threading import RLock
-from typing import Literal, Self
+from typing import Literal, Self, get_args
 
 from knowledge_base.transforms.arc import Arc
-from knowledge_base.transforms.chain import Arcs, Chain, chain_between, names_of, parent_of, require_link
-from knowledge_base.transforms.transform import Transform, TransformError, multiply
+from knowledge_base.transforms.chain import (
+    Arcs,
+    Chain,
+    Links,
+    Reading,
+    arcs_after,
+    chain_between,
+    names_of,
+    parent_of,
+    require_link,
+)
+from knowledge_base.transforms.transform import Stamped, Transform, TransformError, multiply
 
 HORIZON_S = 10.0
 """Default time in seconds for which an arc keeps its readings, as in tf2."""
 
-Links = Mapping[tuple[str, str], Transform | None]
-"""Static transforms by child and parent; `None` removes the arc between them, if there is one."""
 News = Literal["newer", "other", "linked"]
 """A change of an arc: a newer reading; other readings or a static transform; a new, moved or removed arc."""
-TreeListener = Callable[[str, News], None]
-"""Function that is called with a frame whose arc has changed, in the thread of the change."""
+_NEWS = get_args(News)
+TreeListener = Callable[[Mapping[str, News]], None]
+"""Function that is called with the changes of arcs, by child, in the thread of the changes."""
 
 
 class TransformTree:
@@ -69,17 +78,22 @@ class TransformTree:
             TransformError: `child` has another parent, the arc would close a cycle, the time is not finite, or the
                 time is older than the horizon.
         """
-        if not math.isfinite(time):
-            raise TransformError(f"the time of a transform is a finite number of seconds, not {time!r}")
-        with self._lock:
-            arc = self._arcs.get(child)
-            is_new = arc is None
-            if arc is None or arc.parent != parent:
-                require_link(parent, child, self._arcs)
-                arc = self._arcs[child] = Arc(parent)
-            arc.require_recent(child, time, self._horizon)
-            is_newer = arc.add(time, transform, self._horizon)
-        self._tell(child, "linked" if is_new else "newer" if is_newer else "other")
+        self.update_all([Stamped(parent, child, transform, time)])
+
+    def update_all(self, readings: Iterable[Stamped]) -> None:
+        """Add several readings, e.g. of one message, and call the listeners once.
+
+        Raises:
+            TransformError: as for `update`; the readings before the refused one are added.
+        """
+        news: dict[str, News] = {}
+        try:
+            with self._lock:
+                for one in readings:
+                    latest = self._add(*one)
+                    news[one.child] = max(latest, news.get(one.child, latest), key=_NEWS.index)
+        finally:
+            self._tell(news)
 
     def fix(self, parent: str, child: str, transform: Transform) -> None:
         """Set a static transform of `child` in `parent`, for all times; earlier readings are discarded.
@@ -105,16 +119,15 @@ class TransformTree:
             TransformError: as for `fix`, after the removals.
         """
         with self._lock:
-            before, self._arcs = self._arcs, self._arcs_after(links)
+            before, self._arcs = self._arcs, arcs_after(links, self._arcs)
             children = dict.fromkeys(child for child, _ in links)
             linked = {child for child in children if parent_of(child, before) != parent_of(child, self._arcs)}
-        for child in children:
-            self._tell(child, "linked" if child in linked else "other")
+        self._tell({child: "linked" if child in linked else "other" for child in children})
 
     def require_change(self, links: Links) -> None:
         """Raise the errors of `change`, without a change."""
         with self._lock:
-            self._arcs_after(links)
+            arcs_after(links, self._arcs)
 
     def look_up(self, frame: str, reference: str, time: float | None = None) -> Transform:
         """Return the transform of `frame` in `reference`: the position and orientation of `frame` there.
@@ -132,17 +145,28 @@ class TransformTree:
             down, up = chain.samples(chain.latest() if time is None else time)
         return multiply(down, up)
 
-    def chain(self, frame: str, reference: str) -> Chain:
-        """Return the arcs between two frames.
+    def latest(self, frame: str, reference: str) -> Reading:
+        """Return the latest transform of `frame` in `reference`, with its time and its arcs.
 
         Raises:
             TransformError: an unknown frame, or frames in different trees.
         """
         with self._lock:
-            return chain_between(frame, reference, self._arcs)
+            chain = chain_between(frame, reference, self._arcs)
+            time = self.latest_time(chain)
+            if time is None:
+                return Reading(chain, None, None)
+            down, up = chain.samples(time)
+        return Reading(chain, time, multiply(down, up))
+
+    def latest_time(self, chain: Chain) -> float | None:
+        """Return the latest time for which all arcs have readings, or `None`; infinity if all are static."""
+        with self._lock:
+            first, last = chain.limits()
+        return last if first <= last else None
 
     def subscribe(self, listener: TreeListener) -> Callable[[], None]:
-        """Call `listener` after each change of an arc; return a function that ends the subscription."""
+        """Call `listener` after each change of arcs; return a function that ends the subscription."""
         with self._lock:
             self._listeners = (*self._listeners, listener)
 
@@ -157,19 +181,19 @@ class TransformTree:
         with self._lock:
             return type(self)(self._horizon, self._arcs)
 
-    def _tell(self, child: str, news: News) -> None:
-        """Call the listeners, without the lock."""
-        for listener in self._listeners:
-            listener(child, news)
+    def _add(self, parent: str, child: str, transform: Transform, time: float) -> News:
+        if not math.isfinite(time):
+            raise TransformError(f"the time of a transform is a finite number of seconds, not {time!r}")
+        arc = self._arcs.get(child)
+        is_new = arc is None
+        if arc is None or arc.parent != parent:
+            require_link(parent, child, self._arcs)
+            arc = self._arcs[child] = Arc(parent)
+        arc.require_recent(child, time, self._horizon)
+        is_newer = arc.add(time, transform, self._horizon)
+        return "linked" if is_new else "newer" if is_newer else "other"
 
-    def _arcs_after(self, links: Links) -> dict[str, Arc]:
-        found = self._arcs.copy()
-        for (child, parent), transform in links.items():
-            if transform is None and parent_of(child, found) == parent:
-                del found[child]
-        for (child, parent), transform in links.items():
-            if transform is not None:
-                require_link(parent, child, found)
-                found[child] = Arc(parent)
-                found[child].fix(transform)
-        return found
+    def _tell(self, news: Mapping[str, News]) -> None:
+        """Call the listeners, without the lock."""
+        for listener in self._listeners if news else ():
+            listener(news)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from knowledge_base.errors import MAX_NAME, InputError, SchemaError, UnknownNameError, shortened
@@ -106,6 +106,17 @@ class Overlay:
         is_recreated = self._gone and not self._gone.keys().isdisjoint(args)
         return below(function, args) if below and not is_recreated else None
 
+    def publishes(self, function: str) -> bool:
+        """Return whether a transform tree answers the function, and receives its new values."""
+        below = getattr(self._base, "publishes", None)
+        return below is not None and below(function)
+
+    def require_publishable(self, values: Mapping[Fact, Content]) -> None:
+        """Raise an error if a transform tree refuses one of these values, together with the pending ones."""
+        below = getattr(self._base, "require_publishable", None)
+        if below is not None:
+            below({**self._values, **values})
+
     def objects(self, type_name: str) -> list[str]:
         """Return the objects of that type and its subtypes; objects of the base come first."""
         kept = [name for name in self._base.objects(type_name) if name not in self._gone]
@@ -136,7 +147,8 @@ class Overlay:
             self._removed[fact] = None
 
     def _set(self, fluent: Fact, content: Content) -> None:
-        if content == self._base_value(fluent):
+        is_new = content != self._base_value(fluent)
+        if not (is_new or (isinstance(content, tuple) and content and self.publishes(fluent.predicate))):
             self._values.pop(fluent, None)
         else:
             self._values[fluent] = content
@@ -215,6 +227,7 @@ def check_delta(delta: Delta, world: World) -> None:
         UnknownNameError: an undeclared type, predicate or function, or an unknown object.
         SchemaError: wrong arguments, a second type of an object, or a second fact of a functional predicate. The error
             is also raised for a new value of a function that is bound to a source.
+        TransformError: a value that the transform tree of its function refuses.
         InputError: a number that is not finite, a new object with a name that PDDL cannot spell, or a fact that is both
             removed and added.
     """
@@ -237,6 +250,7 @@ def check_delta(delta: Delta, world: World) -> None:
             continue  # the new object has no source
         if reference is not None and (source := reference(fluent.predicate, fluent.args)) is not None:
             raise SchemaError(f"{fluent} is fed by '{source}' and cannot be set")
+    _require_publishable(delta.values, world)
     for name in delta.removed_nodes:
         if name in schema.constants and name not in delta.nodes:
             raise SchemaError(f"'{name}' is a constant of the domain and cannot be removed")
@@ -244,6 +258,13 @@ def check_delta(delta: Delta, world: World) -> None:
         _require_replaceable(fact, schema)
     if delta.replaced or schema.functional:
         require_single(delta, world)
+
+
+def _require_publishable(values: Mapping[Fact, Content], world: World) -> None:
+    if any(isinstance(content, tuple) for content in values.values()):
+        check = getattr(world, "require_publishable", None)
+        if check is not None:
+            check(values)
 
 
 def check_fluent(fluent: Fact, world: World) -> None:

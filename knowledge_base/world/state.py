@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from typing import TYPE_CHECKING, cast
 
 from knowledge_base.facts import Content, Delta, Fact, Value
 from knowledge_base.world.fact_index import Args, FactIndex
 from knowledge_base.world.live_rows import LiveRows, Rows
 from knowledge_base.world.schema import Schema
+
+if TYPE_CHECKING:  # loads scipy
+    from knowledge_base.transforms.poses import Pair, Poses
 
 
 class WorldState:
@@ -20,11 +24,13 @@ class WorldState:
         schema: the declarations of the world.
         facts: all facts; `holds`, `match` and `estimate` are its methods, unless relations are provided.
         live: the rows of relations, which copies do not have.
+        poses: the functions that transform trees answer, by name; only copies with the latest values have them.
     """
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
         self.live = LiveRows()
+        self.poses: dict[str, Poses] = {}
         self._index(FactIndex())
         self._values: dict[Fact, Content] = {}
         self._references: dict[Fact, str] = {}
@@ -79,6 +85,8 @@ class WorldState:
         Raises:
             UnknownNameError: the function is not declared.
         """
+        if self.poses and function in self.poses:
+            return self.poses[function].value(cast("Pair", args)) if self._types.keys() >= {*args} else ()
         fluent = Fact(function, args)
         found = self._latest.get(fluent) if self._latest else None
         if found is None:
@@ -88,6 +96,15 @@ class WorldState:
     def reference(self, function: str, args: Args) -> str | None:
         """Return the reference of the source that is bound to the function, or `None`."""
         return self._references.get(Fact(function, args)) if self._references else None
+
+    def publishes(self, function: str) -> bool:
+        """Return whether a transform tree answers the function, and receives its new values."""
+        return function in self.poses
+
+    def require_publishable(self, values: Mapping[Fact, Content]) -> None:
+        """Raise `TransformError` if a transform tree refuses one of these values."""
+        for poses in self.poses.values():
+            poses.require_publishable(values)
 
     def values_about(self, things: Collection[str]) -> list[Fact]:
         """Return the fluents with a set or latest value that have one of these objects as an argument."""
@@ -138,6 +155,7 @@ class WorldState:
         twin = WorldState(self.schema)
         twin._index(self.facts.copy())
         twin._values = {**self._values, **self._latest} if fed else self._values.copy()
+        twin.poses = {name: poses.copy() for name, poses in self.poses.items()} if fed else {}
         twin._types = self._types.copy()
         twin._members = {t: members.copy() for t, members in self._members.items()}
         return twin

@@ -23,10 +23,12 @@ class World(Protocol):
     """A state of the world: the store, pending changes on top of it, or a state of a planner.
 
     `holds` and `match` cover only predicates with asserted facts; the language derives type tests, computed predicates,
-    quantifiers and comparisons. Three methods are optional. `estimate(predicate, pattern) -> int` returns an upper
-    bound of the number of matching facts, so that conjunctions begin with the rarest fact.
+    quantifiers and comparisons. Five methods are optional. `estimate(predicate, pattern) -> int` returns an upper bound
+    of the number of matching facts, so that conjunctions begin with the rarest fact.
     `reference(function, args) -> str | None` returns the reference of the data source of a function's value, which no
-    effect may set. `spend()` is called for every effect on the world, and may raise an error at a bound (`Bounds`).
+    effect may set. `publishes(function) -> bool` returns whether a transform tree receives new values of a function;
+    `require_publishable(values)` raises an error if the tree refuses them. `spend()` is called for every effect on the
+    world, and may raise an error at a bound (`Bounds`).
     """
 
     @property

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from kb_worlds import PROPERTY
 from scipy.spatial.transform import Rotation, Slerp
 
-from knowledge_base import InputError, Transform, TransformError, TransformTree
+from knowledge_base import InputError, Stamped, Transform, TransformError, TransformTree
 
 UNTYPED: Any = Transform
 HALF = math.sqrt(0.5)
@@ -241,8 +241,8 @@ def test_arrays_are_numbers_too():
 
 
 def test_listeners_hear_each_change_until_they_leave(tree):
-    heard = []
-    leave = tree.subscribe(lambda *news: heard.append(news))
+    heard: list[Any] = []
+    leave = tree.subscribe(heard.append)
     tree.update("map", "base", Transform(), 11)
     tree.update("map", "base", Transform(), 10.5)
     tree.fix("base", "gripper", Transform())
@@ -251,12 +251,24 @@ def test_listeners_hear_each_change_until_they_leave(tree):
     leave()
     tree.update("map", "base", Transform(), 12)
     assert heard == [
-        ("base", "newer"),
-        ("base", "other"),
-        ("gripper", "linked"),
-        ("gripper", "other"),
-        ("gripper", "linked"),
+        {"base": "newer"},
+        {"base": "other"},
+        {"gripper": "linked"},
+        {"gripper": "other"},
+        {"gripper": "linked"},
     ]
+
+
+def test_the_readings_of_a_message_are_heard_at_once(tree):
+    heard: list[Any] = []
+    tree.subscribe(heard.append)
+    message = [("camera", "cup2", 9), ("camera", "cup2", 10), ("camera", "cup1", 9), ("camera", "cup1", 8.5)]
+    tree.update_all(Stamped(parent, child, Transform(), time) for parent, child, time in message)
+    tree.update_all([])
+    with pytest.raises(TransformError, match="finite"):
+        tree.update_all([Stamped("map", "base", Transform(), 11), Stamped("map", "base", Transform(), math.inf)])
+    assert heard == [{"cup2": "linked", "cup1": "other"}, {"base": "newer"}]
+    assert tree.look_up("cup1", "cup2", 9) == Transform()
 
 
 def test_threads_update_and_look_up_at_the_same_time():
