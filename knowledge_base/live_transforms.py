@@ -36,6 +36,7 @@ class LiveTransforms:
     ) -> None:
         self._state, self._installed, self._notifier = state, installed, notifier
         self._announce = announce
+        self._ends: dict[str, Callable[[], None]] = {}
         self._changed: deque[Fact | str] = deque()  # a name is a function whose poses may all have changed
         self._is_publishing = False
 
@@ -50,16 +51,22 @@ class LiveTransforms:
                 raise SchemaError(f"'{function}' has a transform tree or a source already; end the other one first")
             self._state.poses[function] = poses
         leave = tree.subscribe(partial(self._receive, poses))
-        self._change(function)
 
         def withdraw() -> None:
             leave()
             with self._notifier.lock:
                 if self._state.poses.get(function) is poses:
-                    del self._state.poses[function]
+                    del self._state.poses[function], self._ends[function]
             self._change(function)
 
+        self._ends[function] = withdraw
+        self._change(function)
         return withdraw
+
+    def close(self) -> None:
+        """End all bindings."""
+        for withdraw in [*self._ends.values()]:
+            withdraw()
 
     @contextmanager
     def publish(self, effective: Delta) -> Iterator[Delta]:

@@ -170,8 +170,8 @@ class KnowledgeBase(View):
             condition.cancel()
         for one in watches:
             one.close()
-        for source in self.sources():
-            source.close()
+        for close in (*(source.close for source in self.sources()), self._transforms.close):
+            close()
         with self._lock.changing():
             self._history.close()
 

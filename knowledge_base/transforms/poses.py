@@ -54,9 +54,7 @@ class Poses:
         After a "linked" arc, also other frames may have poses.
         """
         is_linked = "linked" in news.values()
-        if not is_linked and not any(map(self._pairs.get, news)):
-            return []
-        with self._lock:
+        with self._lock:  # also without pairs: a look-up may be in progress
             gone = list(self._read) if is_linked else self._old_pairs(news)
             for pair in gone:
                 for frame in self._read.pop(pair)[0].chain.arcs:

@@ -132,12 +132,13 @@ def _motion(sample: Sample) -> _Motion:
 
 
 def _product(outer: _Motion, inner: _Motion) -> _Motion:
-    return _Motion(outer.rotation * inner.rotation, outer.translation + outer.rotation.apply(inner.translation))
+    turned = outer.rotation.as_matrix() @ inner.translation  # `apply` costs eight times as much
+    return _Motion(outer.rotation * inner.rotation, outer.translation + turned)
 
 
 def _inverse(motion: _Motion) -> _Motion:
     back = motion.rotation.inv()
-    return _Motion(back, -back.apply(motion.translation))
+    return _Motion(back, -(back.as_matrix() @ motion.translation))
 
 
 def _finite(numbers: Iterable[float], count: int, rule: str) -> tuple[float, ...]:

@@ -86,10 +86,11 @@ class TransformTree:
         Raises:
             TransformError: as for `update`; the readings before the refused one are added.
         """
+        message = [*readings]  # without the lock, as the caller's generator may wait for other locks
         news: dict[str, News] = {}
         try:
             with self._lock:
-                for one in readings:
+                for one in message:
                     latest = self._add(*one)
                     news[one.child] = max(latest, news.get(one.child, latest), key=_NEWS.index)
         finally:

@@ -286,8 +286,9 @@ def test_a_source_and_a_tree_exclude_each_other(kb, tree):
         other.bind_transforms("pose", tree)
 
 
-def test_a_closed_knowledge_base_binds_nothing(kb):
+def test_a_closed_knowledge_base_binds_nothing(kb, tree):
     kb.close()
+    assert (tree._listeners, kb.value("pose", ("cup1", "base"))) == ((), ())
     with pytest.raises(InputError, match="closed"):
         kb.bind_transforms("pose", TransformTree())
 
