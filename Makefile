@@ -10,7 +10,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-long test-engines test-all check types limits conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
-.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-choice bench-transforms bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
+.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-choice bench-learned-costs bench-transforms bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -178,6 +178,9 @@ bench-run: $(VENV)/.run   ## a macrostep without a store and with one, and 1,000
 
 bench-choice: $(VENV)/.run   ## candidates chosen by order, by priority, learned and by an oracle: time and slips (RUNS=N)
 	$(BIN)/python benchmarks/choice.py --runs $(or $(RUNS),200)
+
+bench-learned-costs: $(VENV)/.engines   ## plans of the clean-up table by experience: falls, trips and simulated time (RUNS=N LEARNED=N ITEMS=N)
+	$(BIN)/python benchmarks/learned_costs.py --runs $(or $(RUNS),40) --learned $(or $(LEARNED),20) --items $(or $(ITEMS),32)
 
 bench-transforms: $(VENV)/.run   ## 10,000 random trees of frames compared with scipy; the cost of updates and look-ups (TREES=N)
 	$(BIN)/python benchmarks/transforms.py --trees $(or $(TREES),10000)
