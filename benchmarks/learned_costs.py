@@ -7,11 +7,11 @@ learning are not among those of the comparison. Each run has other faults, with 
 
 import argparse
 import json
-import math
 import time
 from collections.abc import Sequence
 from contextlib import aclosing, suppress
-from statistics import mean, stdev
+
+from choice import figures
 
 from domains.clean_up_table.bringup import MAIN_PLOT, deploy
 from domains.clean_up_table.scenario import Scenario, Table
@@ -68,11 +68,6 @@ def counted(records: Sequence[Record]) -> dict[str, float]:
     """Return the falls, the trips and the seconds of a run."""
     events = [one.data["name"] for one in records if one.type == "event"]
     return {"falls": events.count("stack_fell"), "trips": events.count("arrived"), "seconds": records[-1].t}
-
-
-def figures(values: Sequence[float]) -> dict[str, float]:
-    """Return the mean with the half width of its 95 % confidence interval."""
-    return {"mean": mean(values), "within": 1.96 * stdev(values) / math.sqrt(len(values))}
 
 
 def main() -> None:
