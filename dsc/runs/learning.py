@@ -87,7 +87,7 @@ class _Plots:
         for length in range(len(names) - 1, 0, -1):
             plot = self.bound.get("/".join(names[:length]))
             if plot is not None:
-                state = self.forms[plot]
+                state = self.forms.get(plot, {})
                 for name in names[length:]:
                     state = {**state.get("states", {}), **state.get("regions", {})}.get(name, {})
                 return str(state.get("about", ""))

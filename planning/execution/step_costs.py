@@ -51,8 +51,9 @@ class StepCosts:
         """
         if self._current() is None:
             return problem
-        whole = problem.whole or problem
-        return replace(whole, actions=tuple(map(self._price_action, whole.actions)))
+        if (whole := problem.whole) is not None:
+            problem = replace(whole, one_at_a_time=problem.one_at_a_time, timed=problem.timed, wrong=problem.wrong)
+        return replace(problem, actions=tuple(map(self._price_action, problem.actions)))
 
     def sum(self, steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> float:
         """Return the cost of steps from `world`; `domain` has its conditions expanded for the present world."""

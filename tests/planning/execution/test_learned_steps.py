@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
@@ -20,7 +21,8 @@ from knowledge_base import Delta, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanningDomain, PlanStep, Robot
 from planning.execution.step_costs import StepCosts
-from planning.model.plan import PlanFound, ProvenUnsolvable
+from planning.model.plan import Plan, PlanFound, ProvenUnsolvable
+from planning.model.problem import WrongPlan
 from planning.problem.construction import build_problem
 
 SHORT, LONG = ["(go a b)", "(go b c)"], ["(go a d)", "(go d e)", "(go e c)"]
@@ -151,7 +153,10 @@ def test_objects_that_others_can_replace_are_not_left_out_since_they_may_be_chea
     )
     assert "shelf" not in problem.objects
     known = Experience().plus([tries("(drive table shelf)", 5, 5, 5.0, "drive")])
-    assert "shelf" in costs_of(known, clean_up).price(problem).objects
+    told = replace(problem, one_at_a_time=True, timed=problem, wrong=(WrongPlan(Plan(), "no step"),))
+    priced = costs_of(known, clean_up).price(told)
+    assert "shelf" in priced.objects
+    assert (priced.one_at_a_time, priced.timed, priced.wrong) == (True, problem, told.wrong)
 
 
 def test_a_disjunctive_goal_costs_nothing_more():
