@@ -83,12 +83,14 @@ class _Plots:
 
     def _text_about(self, path: str) -> str:
         """Return the text about a state; about a step of a plan, it is the step in PDDL."""
-        names = path.split("/")
-        for length in range(len(names) - 1, 0, -1):
-            plot = self.bound.get("/".join(names[:length]))
-            if plot is not None:
-                state = self.forms.get(plot, {})
-                for name in names[length:]:
-                    state = {**state.get("states", {}), **state.get("regions", {})}.get(name, {})
-                return str(state.get("about", ""))
-        return ""
+        holder, _, name = path.rpartition("/")
+        form = _state_in(self.forms.get(self.bound.get(holder, ""), {}), name) or {}
+        return str(form.get("about", ""))
+
+
+def _state_in(form: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
+    """Return the form of a state, at any depth in the form of a plot; the names of a plot's states differ."""
+    inner: dict[str, Mapping[str, Any]] = {**form.get("states", {}), **form.get("regions", {})}
+    if name in inner:
+        return inner[name]
+    return next((found for one in inner.values() if (found := _state_in(one, name)) is not None), None)

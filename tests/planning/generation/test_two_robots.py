@@ -7,6 +7,7 @@ import pytest
 from trace_replay import Replay
 
 from dsc.chance import uniform
+from dsc.runs.learning import tries_in
 from dsc.trace import Record
 from knowledge_base.world.overlay import Overlay
 from planning.engines.planner import PlannerProcess
@@ -93,3 +94,10 @@ def test_the_checker_finds_a_step_that_takes_away_what_another_one_needs(two_tab
             record.data["added"].remove(["open", "bin"])  # as if the lid had been seen to stay closed
         replay.take(record)
     assert any("(open bin)" in problem for problem in replay.problems)
+
+
+@pytest.mark.parametrize("parallel", [True, False])
+def test_each_step_of_a_parallel_plan_is_a_try(two_tables, planner, parallel):
+    records, replay = run(two_tables, planner, {"anna": 2, "bert": 2}, 0, parallel=parallel)
+    tried = [text for (_, _, situation), _ in tries_in(records) for text, _ in situation]
+    assert sorted(tried) == sorted(str(step) for step in replay.steps.values())
