@@ -82,7 +82,7 @@ def main() -> None:
     scenario, how = table(options.items), (options.engine, options.patience)
     experience = Experience()
     for seed in range(10_000, 10_000 + options.learned):
-        experience = experience.plus(tries_in(ran(scenario, seed, *how, Experience())))
+        experience = experience.plus(tries_in(ran(scenario, seed, *how, Experience()), steps=True))
     found = {}
     for name, known in (("each step costs 1", Experience()), ("learned costs", experience)):
         runs = [counted(ran(scenario, seed, *how, known)) for seed in range(options.runs)]

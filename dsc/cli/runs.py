@@ -76,6 +76,7 @@ def list_(file: Store, as_json: AsJson = False) -> None:
 def learn(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="The stores.")],
     out: Annotated[Path | None, typer.Option("--out", help="Write the experience to this YAML file.")] = None,
+    steps: Annotated[bool, typer.Option("--steps", help="Learn the steps of plans, too, as their costs.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Learn from the runs how often candidates of dynamic states are done, and how long they take."""
@@ -84,7 +85,7 @@ def learn(
     from knowledge_base.output_files import Output
 
     output = None if out is None else Output(out, "--out", *files)
-    experience = learned_from(files)
+    experience = learned_from(files, steps=steps)
     if output is not None:
         output.write(experience_to_yaml(experience))
     if as_json:

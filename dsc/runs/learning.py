@@ -13,8 +13,12 @@ from dsc.runs.archive import archive
 from dsc.trace import Record
 
 
-def learn(stores: Iterable[Path | str]) -> Experience:
+def learn(stores: Iterable[Path | str], *, steps: bool = False) -> Experience:
     """Return the experience of all runs in stores, which are only read.
+
+    Args:
+        stores: the files.
+        steps: whether to learn the steps of plans, too.
 
     Raises:
         StoreError: a file is not a store, or cannot be read.
@@ -23,7 +27,7 @@ def learn(stores: Iterable[Path | str]) -> Experience:
     for store in stores:
         with archive(Path(store)) as runs:
             for run in runs.runs():
-                experience = experience.plus(tries_in(runs.records(run.number)))
+                experience = experience.plus(tries_in(runs.records(run.number), steps=steps))
     return experience
 
 
@@ -34,13 +38,13 @@ class _Try(NamedTuple):
     at: float
 
 
-def tries_in(records: Iterable[Record]) -> Iterator[tuple[Key, Tries]]:
-    """Yield each try in the records of a run: of learned choices, and of the steps of plans.
+def tries_in(records: Iterable[Record], *, steps: bool = False) -> Iterator[tuple[Key, Tries]]:
+    """Yield each try in the records of a run: of learned choices, and with `steps` of the steps of plans.
 
     A try that a surrounding state has ended does not count.
     """
     open_tries: dict[str, _Try] = {}
-    plots = _Plots()
+    plots = _Plots(steps)
     for record in records:
         if record.type == "plot":
             plots.forms[record.data["name"]] = record.data["plot"]
@@ -62,10 +66,12 @@ class _Plots:
     """The plots of a run so far.
 
     Attributes:
+        steps: whether the steps of plans are tries.
         forms: the plots as data, by name.
         bound: the name of the plot that each state contains, by the state's path.
     """
 
+    steps: bool
     forms: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     bound: dict[str, str] = field(default_factory=dict)
 
@@ -76,7 +82,7 @@ class _Plots:
             return None
         if "situation" in decision:
             return decision["plot"], chosen, situation_of(decision["situation"])
-        step = self._text_about(decision["state"])
+        step = self._text_about(decision["state"]) if self.steps else ""
         action = step[1:].rstrip(")").partition(" ")[0]
         is_step = bool(action) and self.forms.get(chosen, {}).get("implements") == action
         return (action, chosen, step_situation(step)) if is_step else None

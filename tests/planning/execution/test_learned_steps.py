@@ -85,13 +85,13 @@ def ran(goal, *, experience=None, script=None, ways=None, links=LINKS):
 
 def test_steps_of_plans_are_tries_of_their_action():
     _, records, _ = ran("(at c)", script={"(go b c)": [FAILED]})
-    found = Experience().plus(tries_in(records))
+    found = Experience().plus(tries_in(records, steps=True))
     assert found.tries == dict([tries("(go a b)", 1, 1, 1.0), tries("(go b c)", 2, 1, 2.0)])
 
 
 def test_each_candidate_of_a_step_has_its_tries():
     _, records, _ = ran("(holding cup)", script={"hand: (take cup a)": [FAILED] * 9}, ways={"take": ["hand", "tongs"]})
-    found = Experience().plus(tries_in(records))
+    found = Experience().plus(tries_in(records, steps=True))
     assert found.tries == dict([tries("(take cup a)", 2, 0, 2.0, "hand"), tries("(take cup a)", 1, 1, 1.0, "tongs")])
 
 
