@@ -158,10 +158,8 @@ class KnowledgeBase(View):
     def close(self) -> None:
         """Close the knowledge base and its file; every later change raises `StoreError`.
 
-        The file contains all commits already.
-
-        All conditions are cancelled, with their timers and waiting coroutines. All watches end, and all sources are
-        closed. A second call has no effect.
+        The file contains all commits already. All conditions are cancelled, with their timers and waiting coroutines.
+        All watches and bindings of trees end, and all sources are closed. A second call has no effect.
         """
         with self._lock:
             self._closed = True
@@ -170,8 +168,9 @@ class KnowledgeBase(View):
             condition.cancel()
         for one in watches:
             one.close()
-        for close in (*(source.close for source in self.sources()), self._transforms.close):
-            close()
+        for source in self.sources():
+            source.close()
+        self._transforms.close()
         with self._lock.changing():
             self._history.close()
 

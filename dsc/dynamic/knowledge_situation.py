@@ -158,7 +158,7 @@ def choose(
         if verdict.fits and excluded is not None and (reason := excluded.reason(name, own[name])):
             verdict = Verdict(name, fits=False, reason=reason)
         if verdict.fits and state.choose == "learned":
-            tries = experience.of(holder, name, situation) or experience.of(str(plot.implements), name, ())
+            tries = experience.of(holder, name, situation) or experience.of(plot.implements or "", name, ())
             verdict = _with_tries(verdict, tries)
         elif verdict.fits and state.choose != "order":
             verdict = replace(verdict, score=_score(plot, state.choose, own[name], world))

@@ -221,7 +221,7 @@ class MonitorSkill:
         ahead = Overlay(self._knowledge)
         ahead.apply(progress.domain.effects(step, ahead))
         end = shortest_end(plan.steps, progress.domain, ahead, progress.goal)
-        cost = self._escalation.search.costs.sum
+        cost = self._escalation.search.costs.total
         if end is None or cost(end, progress.domain, ahead) >= cost(progress.coming(), progress.domain, ahead):
             return None
         return (step, *end)

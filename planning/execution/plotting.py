@@ -70,7 +70,7 @@ class Plotting:
             for key in next(path for name, _, path in plot.walk() if name == "step_1"):
                 state = state[key]
             state["dynamic"].sort(key=lambda name: name == instead_of)  # stable: the other candidates keep their order
-            state.pop("choose", None)
+            state.pop("choose", None)  # by order
         return order, form
 
     def _order(self, plan: Plan, goal: Expression, known: PartialOrder | None) -> PartialOrder:

@@ -231,7 +231,7 @@ class Search:
         if ahead is None or not leads_to(found.steps, before.domain, world, before.goal):
             return later  # the world changed during the second search
         then = later.steps[len(running) :]
-        cost = self.costs.sum
+        cost = self.costs.total
         return later if cost(then, before.domain, ahead) <= cost(found.steps, before.domain, world) else found
 
     def _running(self, progress: PlanProgress) -> tuple[PlanStep, ...]:

@@ -7,11 +7,10 @@ from dataclasses import replace
 from statistics import fmean
 from typing import TYPE_CHECKING
 
-from dsc.dynamic.experience import NO_EXPERIENCE, Experience
+from dsc.dynamic.experience import NO_EXPERIENCE
 from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.world.overlay import Overlay
-from planning.model.ground_action import GroundAction
 from planning.model.plan import PlanStep
 from planning.model.problem import Problem
 from planning.model.quantities import value_of
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from dsc.dynamic.library import Library
     from planning.model.domain import PlanningDomain
 
-_DIGITS = 1  # tenths of seconds, since the costs of some engines are integers
+_LEAST = 0.1  # seconds; costs are rounded to tenths, since the costs of some engines are integers
 
 
 class StepCosts:
@@ -41,47 +40,41 @@ class StepCosts:
         self._actions = tuple(domain.actions)
         self._library = library
         self._experience = NO_EXPERIENCE
-        self._unknown: float | None = None
-        self._seconds: dict[PlanStep, float] = {}
+        self._mean: float | None = None
 
     def price(self, problem: Problem) -> Problem:
         """Return the problem with the costs of experience; the costs of bookkeeping actions stay.
 
         The result has all objects, since those that others can replace may be cheaper.
         """
-        if self._current() is None:
+        mean = self._mean_of_actions()
+        if mean is None:
             return problem
         if (whole := problem.whole) is not None:
             problem = replace(whole, one_at_a_time=problem.one_at_a_time, timed=problem.timed, wrong=problem.wrong)
-        return replace(problem, actions=tuple(map(self._price_action, problem.actions)))
+        actions = [a if a.step is None else replace(a, cost=self._cost(a.step, mean)) for a in problem.actions]
+        return replace(problem, actions=tuple(actions))
 
-    def sum(self, steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> float:
+    def total(self, steps: Sequence[PlanStep], domain: PlanningDomain, world: World) -> float:
         """Return the cost of steps from `world`; `domain` has its conditions expanded for the present world."""
         if not self._declared:
-            return len(steps) if self._current() is None else sum(map(self._of, steps))
+            mean = self._mean_of_actions()
+            return len(steps) if mean is None else sum(self._cost(step, mean) for step in steps)
         ahead = Overlay(world)
         for step in steps:
             ahead.apply(domain.effects(step, ahead))
-        total = Fact(TOTAL_COST.function)
-        return value_of(ahead, total) - value_of(world, total)
+        spent = Fact(TOTAL_COST.function)
+        return value_of(ahead, spent) - value_of(world, spent)
 
-    def _current(self) -> Experience | None:
-        """Return the experience from which costs follow, or `None`."""
-        if self._declared:
-            return None
-        if self._experience is not self._library.experience:  # a resumed run receives its own
+    def _mean_of_actions(self) -> float | None:
+        """Return the mean cost of the actions with tries; `None` if no costs follow from experience."""
+        if self._experience is not self._library.experience and not self._declared:  # a resumed run receives its own
             self._experience = self._library.experience
             known = [self._experience.seconds_for(action, "") for action in self._actions]
             tried = [seconds for seconds in known if seconds is not None]
-            self._unknown = fmean(tried) if tried else None
-            self._seconds = {}
-        return None if self._unknown is None else self._experience
+            self._mean = fmean(tried) if tried else None
+        return self._mean
 
-    def _of(self, step: PlanStep) -> float:
-        if step not in self._seconds:
-            seconds = self._experience.seconds_for(step.action, str(step)) or self._unknown or 1.0
-            self._seconds[step] = max(round(seconds, _DIGITS), 10**-_DIGITS)
-        return self._seconds[step]
-
-    def _price_action(self, action: GroundAction) -> GroundAction:
-        return action if action.step is None else replace(action, cost=self._of(action.step))
+    def _cost(self, step: PlanStep, mean: float) -> float:
+        seconds = self._experience.seconds_for(step.action, str(step))
+        return max(round(mean if seconds is None else seconds, 1), _LEAST)

@@ -162,7 +162,6 @@ class Carrier:
         self._domain = domain
         self._library = library.copy()
         self.rules = tuple(rules)
-        self.experience = library.experience
         self._usage: dict[tuple[str, ...], Usage] = {}  # most steps share their candidates
         self._carried: dict[tuple[PlanStep, tuple[str, ...]], CarriedStep] = {}
 
@@ -170,9 +169,13 @@ class Carrier:
     def of(domain: PlanningDomain, library: Library, rules: Sequence[Rule]) -> Carrier:
         """Return the carrier of the last plan if rules and experience are equal, since plans share most steps."""
         known = _carriers.find(domain, library.plots)
-        if known is None or known.rules != tuple(rules) or known.experience.tries is not library.experience.tries:
+        if known is None or not known.suits(library, rules):
             known = _carriers.keep(domain, library.plots, Carrier(domain, library, rules))
         return known
+
+    def suits(self, library: Library, rules: Sequence[Rule]) -> bool:
+        """Return whether rules and experience are those of this carrier."""
+        return self.rules == tuple(rules) and self._library.experience.tries is library.experience.tries
 
     def carried(self, step: PlanStep) -> CarriedStep:
         """Return the step as a dynamic state whose candidates implement its action and fit its arguments.
@@ -198,7 +201,7 @@ class Carrier:
         used = self._usage[names]
         taken = {name for plot in candidates for name in plot.parameters}
         content = {"dynamic": names, "with": {name: value for name, value in bindings.items() if name in taken}}
-        if (choice := _choice(candidates, self.experience)) is not None:
+        if (choice := _choice(candidates, self._library.experience)) is not None:
             content["choose"] = choice
         return _step(
             step, self._domain, content, None if used.anything else PATIENCE * used.seconds,
@@ -215,7 +218,7 @@ def _choice(candidates: Collection[ActionPlot], experience: Experience) -> str |
     for name in ("utility", "cost", "priority"):
         if all(name in plot.scores() for plot in candidates):
             return name
-    return "learned" if any(experience.of(str(plot.implements), plot.name, ()) for plot in candidates) else None
+    return "learned" if any(experience.of(plot.implements or "", plot.name, ()) for plot in candidates) else None
 
 
 _carriers: IdentityCache[PlanningDomain, Carrier] = IdentityCache(size=8)

@@ -283,7 +283,7 @@ def _without_decided_choices(task: Task, possible: Sequence[int]) -> Task:
     Engines find plans for such a goal much sooner than for bookkeeping actions. A goal like that of the clean-up table
     has a disjunction for each item, whose other parts are about facts that no action changes.
     """
-    if task.ways.all[-1].step is not None:  # bookkeeping actions are the last ones
+    if not task.ways.all or task.ways.all[-1].step is not None:  # bookkeeping actions are the last ones
         return task
     finished = task.numbering.of(_FINISHED)
 

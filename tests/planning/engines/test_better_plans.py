@@ -83,7 +83,7 @@ def test_the_cheaper_plan_is_carried_out_and_without_costs_the_shorter_one(text,
 @pytest.mark.parametrize(("text", "costs"), [(TRIP, (11, 7)), (FREE, (2, 3))])
 def test_what_steps_cost(text, costs):
     domain, world = trip(text)
-    cost = StepCosts(domain, Library()).sum
+    cost = StepCosts(domain, Library()).total
     assert tuple(cost(steps(one), domain, world) for one in (SHORT, LONG)) == costs
     assert world.ask("(at a)")
 

@@ -133,10 +133,15 @@ def test_the_cost_of_a_step_is_its_expected_time_with_the_prior_of_its_action():
     costs = costs_of(CLOSED)
     all_done, all_seconds = 5 * (82 + 1) / (100 + 2), 5 * 280 / 100
     expected = (200 + all_seconds) / (2 + all_done)
-    assert costs.sum([PlanStep("go", ("b", "c"))], DOMAIN, None) == round(expected, 1)
+    assert costs.total([PlanStep("go", ("b", "c"))], DOMAIN, None) == round(expected, 1)
     never = PlanStep("go", ("c", "b"))
-    assert costs.sum([never], DOMAIN, None) == round(all_seconds / all_done, 1)
-    assert costs.sum([PlanStep("take", ("cup", "a"))], DOMAIN, None) == costs.sum([never], DOMAIN, None)
+    assert costs.total([never], DOMAIN, None) == round(all_seconds / all_done, 1)
+    assert costs.total([PlanStep("take", ("cup", "a"))], DOMAIN, None) == costs.total([never], DOMAIN, None)
+
+
+def test_a_step_without_duration_costs_less_than_the_mean():
+    known = Experience().plus([tries("(take cup a)", 5, 5, 0.0, "take"), tries("(go a b)", 5, 5, 50.0)])
+    assert costs_of(known).total([PlanStep("take", ("cup", "a"))], DOMAIN, None) == 0.1
 
 
 def test_of_equal_ways_the_one_that_succeeds_sooner_is_taken():
