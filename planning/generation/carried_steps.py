@@ -174,7 +174,7 @@ class Carrier:
         return known
 
     def suits(self, library: Library, rules: Sequence[Rule]) -> bool:
-        """Return whether rules and experience are those of this carrier."""
+        """Return whether rules and experience equal those of this carrier."""
         return self.rules == tuple(rules) and self._library.experience.tries is library.experience.tries
 
     def carried(self, step: PlanStep) -> CarriedStep:
