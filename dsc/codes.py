@@ -7,6 +7,7 @@ from collections.abc import Mapping
 CODES: Mapping[str, str] = {
     "arguments-are-taken": "Arguments reach a state with a plot that has such a parameter; others have no effect.",
     "at-least": "A timeout is longer than the minimum duration of its state.",
+    "bindings": "`bind` finds one value for a variable, `bind_all` a list, by conditions that find values.",
     "bounded-rules": "The rules of a plot make a bounded number of transitions: name their states with `of`.",
     "candidates": "The conditions of candidates exclude each other, and cover all cases that they distinguish.",
     "candidates-conform": "An argument of a dynamic state is a parameter of at least one candidate.",

@@ -9,6 +9,7 @@ from dsc.drawing.layout import TextStyle, pack
 from dsc.events import TIMERS
 from dsc.model.actions import (
     Assign,
+    Bind,
     Block,
     Choose,
     Configure,
@@ -118,14 +119,21 @@ def _rest(one: Labelled, *, terse: bool) -> tuple[object, ...]:
 
 def _guard(one: Labelled, *, terse: bool) -> str:
     guard = one.transition.guard
+    if (binding := one.transition.binding) is not None:
+        return f"[{action_text(binding)}]"
     if guard is not None and guard != TRUE:
         return f"[{to_text(guard)}]"
     return "[else]" if one.otherwise and not (terse and one.trigger) else ""
 
 
 def _brief(transition: Transition, *, terse: bool) -> tuple[str, ...]:
-    shown = [action for action in transition.effect if not (terse and isinstance(action, Assign))]
+    shown = [action for action in _effect(transition) if not (terse and isinstance(action, Assign))]
     return (*(action_text(action, brief=True) for action in shown), *_handed(transition, brief=True))
+
+
+def _effect(transition: Transition) -> list[Internal]:
+    """Return the actions of a transition without its binding, which the guard shows."""
+    return [action for action in transition.effect if not (isinstance(action, Bind) and not action.every)]
 
 
 def _handed(transition: Transition, *, brief: bool = False) -> list[str]:
@@ -151,7 +159,7 @@ def _caption(group: list[Labelled], *, terse: bool) -> Caption:
 
 def full_text(one: Labelled, *, trigger: bool = True) -> str:
     """Return the full text of a transition; `trigger=False` omits the trigger."""
-    effects = "; ".join([*map(action_text, one.transition.effect), *_handed(one.transition)])
+    effects = "; ".join([*map(action_text, _effect(one.transition)), *_handed(one.transition)])
     rule = one.transition.rule
     parts = [
         one.trigger if trigger else "",
@@ -216,6 +224,8 @@ def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> st
         case Emit(emit=event, arguments=arguments):
             later = "" if action.delay is None else f" after {to_text(action.delay)} s"
             return f"^{event}" + (_values(arguments) if arguments and not brief else "") + later
+        case Bind(names=names, condition=condition, every=every):
+            return f"{', '.join(names)} {':= all' if every else '∈'} {to_text(condition)}"
         case Assign(assign=values):
             return ", ".join(f"{name} := {term_text(value)}" for name, value in values.items())
         case Tell(tell=effect):

@@ -137,7 +137,7 @@ class Insertions:
             connector = self._added.state(key, f"{rule.place} {name}")
             made: States = {}
             branches = self._responses.execute(rule, name, key, onward, made)
-            if branches[-1].guard is not None:
+            if branches[-1].has_guard:
                 branches.append(following)
             states[connector] = ChoiceState(choice=tuple(branches))
             states.update(made)

@@ -29,7 +29,7 @@ from dsc.model.data_forms import (
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Choice, DynamicState
 from knowledge_base.facts import Content, Delta
-from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds
+from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds, query
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import Effect
@@ -73,6 +73,12 @@ class KnowledgeSituation:
         if PLAIN.get(id(expression)) is not expression and reads_data(expression):
             expression = plain_condition(expression, Values(bindings))
         return holds(expression, self._world, bindings)
+
+    def answers(self, expression: Expression, bindings: Bindings) -> list[dict[str, Any]]:
+        """See `Situation`."""
+        if reads_data(expression):
+            expression = plain_condition(expression, Values(bindings))
+        return query(expression, self._world, scalars(bindings))
 
     def value(self, term: Term, bindings: Bindings) -> Any:
         """See `Situation`."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dsc.dynamic.fresh_names import FreshNames
 from dsc.dynamic.steps import Plots, filled
 from dsc.events import DONE, FAILURES, GAVE_UP, SKILL_FAILURES
-from dsc.model.actions import Assign, Block, Choose, Emit, Internal, Log, Tell, Withdraw
+from dsc.model.actions import Assign, Block, Choose, Emit, Log, Tell, Withdraw, WrittenAction
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import CONTINUE, ENTER, GIVE_UP, REPLAN, RETRY, Rule
 from dsc.model.states import AnyState, FinalState, State, SubmachineState
@@ -218,6 +218,9 @@ def because(outcome: str, abandoning: Transition) -> Transition:
     return abandoning.model_copy(
         update={
             "guard": None if abandoning.guard is None else lang.substitute(abandoning.guard, reason),
+            "bind": {name: lang.substitute(one, reason) for name, one in abandoning.bind.items()},
+            "bind_all": {name: lang.substitute(one, reason) for name, one in abandoning.bind_all.items()},
+            "order_by": tuple(lang.substitute(one, reason) for one in abandoning.order_by),
             "assign": filled(abandoning.assign, reason),
             "arguments": filled(abandoning.arguments, reason),
             "passed": filled(abandoning.passed, reason),
@@ -227,7 +230,7 @@ def because(outcome: str, abandoning: Transition) -> Transition:
     )
 
 
-def _action_because(action: Internal, reason: Terms) -> Internal:
+def _action_because(action: WrittenAction, reason: Terms) -> WrittenAction:
     match action:
         case Tell():
             return Tell(tell=substitute_effect(action.tell, reason))
@@ -242,7 +245,7 @@ def _action_because(action: Internal, reason: Terms) -> Internal:
 def _joined(rule: Rule, guard: lang.Expression | None, counting: Terms, after: Transition) -> Transition:
     """Return the transition `after` with the rule's guard, and with the rule's actions before its actions."""
     both = [part for part in (guard, after.guard) if part is not None]
-    actions: list[Internal] = []
+    actions: list[WrittenAction] = []
     if rule.do.tell is not None:
         actions.append(Tell(tell=rule.do.tell))
     if counting:

@@ -80,7 +80,7 @@ class _Expansion:
         recoveries: States = {}
         for event in answerable(state, self._plots):
             own = list(on.get(event, ()))
-            if own and own[-1].guard is None:
+            if own and not own[-1].has_guard:
                 continue
             for number, rule in enumerate(self._plot.rules):
                 if rule.on == event and concerns(rule, name, state, self._plots):
@@ -156,7 +156,7 @@ def answered(on: Ways, abandoned: MutableMapping[str, str]) -> Ways:
 
 
 def _settles(ways: Sequence[Transition]) -> bool:
-    return bool(ways) and ways[-1].guard is None
+    return bool(ways) and not ways[-1].has_guard
 
 
 def _way(rule: Rule, counter: str, most: int) -> Transition:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from dsc.engine.binding import find_values
 from dsc.engine.machine_state import NOTHING, FrameState, MachineState, idle_state
 from dsc.engine.macrostep import Macrostep
 from dsc.engine.plot_changes import ActivePlots, keep_plots
@@ -51,7 +52,11 @@ def _answered(question: Question, root: FrameState, event: Event, situation: Sit
     choice: Choice = question
     while isinstance(choice, Question):
         try:
-            choice = choice.follow(situation.holds(choice.condition, bindings))
+            bind = choice.edge.bind
+            if bind is None:
+                choice = choice.follow(situation.holds(choice.condition, bindings))
+            else:
+                choice = choice.follow(find_values(bind, situation, bindings) is not None)
         except InputError:  # the full macrostep evaluates the guard again and reports the error
             return None
     return choice

@@ -251,7 +251,7 @@ class Macrostep:
 
     def _holds(self, frame: Frame, edge: TransitionEdge, condition: Expression) -> bool:
         try:
-            return self._performer.holds(frame, condition)
+            return self._performer.enables(frame, edge, condition)
         except InputError as error:
             # A guard's error is reported only once in a macrostep, because guards without trigger are evaluated after
             # every microstep. In SCXML the error of a guard with a trigger is reported for each event (SCXML 5.9.1).

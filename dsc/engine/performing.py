@@ -10,13 +10,15 @@ from typing import Any
 
 from dsc.data_types import check_all
 from dsc.engine import steps
+from dsc.engine.binding import find_values
 from dsc.engine.frames import Frame
 from dsc.engine.machine_state import NOTHING
 from dsc.engine.situation import Situation
-from dsc.engine.tables import CompiledPlot, StateNode
+from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
 from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event
 from dsc.model.actions import (
     Assign,
+    Bind,
     Block,
     Choose,
     Configure,
@@ -108,6 +110,14 @@ class Performer:
         """Return whether a condition is true in a frame; raise `InputError` if its evaluation fails."""
         return self.situation.holds(condition, self.bindings(frame))
 
+    def enables(self, frame: Frame, edge: TransitionEdge, condition: Expression) -> bool:
+        """Return whether a guard is true, or the transition's `bind` finds values; errors as for `holds`."""
+        return self.holds(frame, condition) if edge.bind is None else self.find(frame, edge.bind) is not None
+
+    def find(self, frame: Frame, bind: Bind) -> Mapping[str, Any] | None:
+        """Return the values that a transition binds; `None` if there are none. Errors as for `find_values`."""
+        return find_values(bind, self.situation, self.bindings(frame))
+
     def value(self, frame: Frame, term: TermField) -> Any:
         """Return the value of a term in a frame; raise `InputError` if its evaluation fails."""
         return evaluate(term, self.bindings(frame), self.situation, frame.compiled)
@@ -139,7 +149,7 @@ class Performer:
                     self.output.append(self._output_of(frame, state, action, activation, number))
             except InputError as error:
                 self.fail(frame, f"{frame.prefix}{state}", error)
-                if frame.compiled.scxml:
+                if frame.compiled.scxml or isinstance(action, Bind):  # later actions read what it binds
                     return
 
     def start_timers(self, frame: Frame, node: StateNode, activation: int) -> None:
@@ -192,12 +202,12 @@ class Performer:
     def _perform(self, frame: Frame, state: str, action: Internal) -> None:
         match action:
             case Assign(assign=terms):
-                values, compiled = self.values(frame, terms), frame.compiled
-                for name, value in values.items():
-                    if type(value) not in compiled.exact.get(name, _NO_CLASS):  # most values need no further check
-                        check_all(_OF_PLOT, compiled.plot.name, values, compiled.types, compiled.records)
-                        break
-                frame.variables = {**frame.variables, **values}
+                _set_variables(frame, self.values(frame, terms))
+            case Bind(names=names):
+                found = self.find(frame, action)
+                if found is None:
+                    raise InputError(f"a transition of this step ended what was found for {', '.join(names)}")
+                _set_variables(frame, dict(found))
             case Tell(tell=effect):
                 told = self.situation.tell(effect, self.bindings(frame))
                 self.knowledge = self.knowledge.then(told)
@@ -251,6 +261,15 @@ class Performer:
         elif not frame.gone:
             self.internal.append(Event(name, attributes, to=frame.parent.activations[frame.host]))
         # Otherwise another transition of this microstep exited the host, and the outcome is dropped.
+
+
+def _set_variables(frame: Frame, values: dict[str, Any]) -> None:
+    compiled = frame.compiled
+    for name, value in values.items():
+        if type(value) not in compiled.exact.get(name, _NO_CLASS):  # most values need no further check
+            check_all(_OF_PLOT, compiled.plot.name, values, compiled.types, compiled.records)
+            break
+    frame.variables = {**frame.variables, **values}
 
 
 def _rank(frame: Frame, state: str) -> Rank:

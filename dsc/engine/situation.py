@@ -102,6 +102,10 @@ class Situation(Protocol):
         """Return whether the condition is true."""
         ...
 
+    def answers(self, expression: Expression, bindings: Bindings) -> list[dict[str, Any]]:
+        """Return the values of the other free variables that make the condition true, in the order of a query."""
+        ...
+
     def value(self, term: Term, bindings: Bindings) -> Any:
         """Return the value of the term."""
         ...

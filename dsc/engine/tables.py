@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from dsc.conversions import Conversions
 from dsc.data_types import NO_RECORDS, Records, data_type
+from dsc.engine.binding_types import with_types
 from dsc.events import DONE
 from dsc.model import states
-from dsc.model.actions import ExternalAction, Internal
+from dsc.model.actions import Bind, ExternalAction, Internal
 from dsc.model.language import TermField
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.transitions import Connector, Transition
@@ -26,13 +27,15 @@ class TransitionEdge:
 
     Attributes:
         source, targets: indices of the source node and of the target nodes.
-        trigger, guard, effect, rule: see `dsc.model.transitions.Transition`.
+        trigger, guard, effect, rule: see `dsc.model.transitions.Transition`; with `bind`, the guard is its condition.
         internal: whether a composite source stays active if all targets are inside it (SCXML 3.5).
         place: keys of the transition in its source state, e.g. `("on", "grasped", 0)`.
         passed: arguments for the plot inside the target, by name.
         cleared: indices of the history nodes whose memory the transition clears.
         keeps: whether the plot inside the source continues in the plot that replaces it.
         interrupts: whether the source is exited as by another state's transition, with `on_break`.
+        bind: the action that binds variables to values, without which the transition is not taken; it is also the
+            first action of `effect`.
     """
 
     source: int
@@ -47,6 +50,7 @@ class TransitionEdge:
     cleared: tuple[int, ...] = ()
     keeps: bool = False
     interrupts: bool = False
+    bind: Bind | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,12 +238,12 @@ def compile_plot(
         UnknownNameError: a transition or the initial state of a scope refers to a missing state.
         SchemaError: targets of a transition cannot be active together, or a history's default is outside its scope.
     """
-    layout = _Layout(plot)
-    for node in layout.nodes:
-        layout.prepare(node)
     scxml = plot.dialect == "scxml"
     declared = {} if scxml else {**plot.parameters, **plot.variables, **plot.outputs}
     types = {name: one.type for name, one in declared.items()}
+    layout = _Layout(plot, types, records)
+    for node in layout.nodes:
+        layout.prepare(node)
     exact = {name: data_type(text).exact for name, text in types.items()}
     return CompiledPlot(
         plot, tuple(layout.nodes), layout.index, form, layout.defaults(), scxml, types, exact, records, conversions
@@ -249,8 +253,9 @@ def compile_plot(
 class _Layout:
     """Builder of the nodes of a plot and of the edges between them."""
 
-    def __init__(self, plot: ActionPlot) -> None:
+    def __init__(self, plot: ActionPlot, types: Mapping[str, str], records: Records) -> None:
         self._scxml = plot.dialect == "scxml"
+        self._types, self._records = types, records
         self._initials: list[tuple[StateNode, str]] = []
         self.nodes = [StateNode(0, plot.name, (), None)]
         self._add_states(self.nodes[0], plot)
@@ -350,12 +355,21 @@ class _Layout:
         targets = tuple([self._target(node, name) for name in transition.targets])
         if len(targets) > 1 and not self._together(targets):
             raise SchemaError(f"targets of a transition of '{node.name}' exclude each other", found=node.name)
+        guard, effect, bind = transition.guard, transition.effect, None
+        if transition.bind or transition.bind_all:
+            effect = tuple([self._typed(action) for action in effect])
+            first = effect[0]
+            if isinstance(first, Bind) and not first.every:
+                guard, bind = first.condition, first
         return TransitionEdge(
-            node.index, trigger, targets, transition.guard, transition.effect, transition.rule,
+            node.index, trigger, targets, guard, effect, transition.rule,
             transition.internal and isinstance(node.state, states.CompositeState), place, transition.passed,
             tuple(self._cleared(node, transition)) if transition.clear else (),
-            transition.keep and node.holds_plot and targets == (node.index,),
+            transition.keep and node.holds_plot and targets == (node.index,), bind=bind,
         )  # fmt: skip
+
+    def _typed(self, action: Internal) -> Internal:
+        return with_types(action, self._types, self._records) if isinstance(action, Bind) else action
 
     def _together(self, targets: Sequence[int]) -> bool:
         """Return whether all targets can be active together, because each pair is in different regions (SCXML 3.11)."""

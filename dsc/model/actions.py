@@ -71,6 +71,22 @@ ExternalAction = Trigger | Configure | Switch | Send | Wire | Unwire
 """The external actions, which reach components, as a union of types."""
 
 
+class Bind(Frozen):
+    """Assign to variables the objects or values that fulfil a condition; a transition's `bind` and `bind_all` (S4.3).
+
+    Attributes:
+        names: the variables.
+        condition: the condition that finds their values; it does not read their values before.
+        order_by: terms of which the smallest values come first; of equal ones, the order of a query.
+        every: whether the only variable receives the list of all values.
+    """
+
+    names: tuple[str, ...]
+    condition: ConditionField
+    order_by: tuple[TermField, ...] = ()
+    every: bool = False
+
+
 class Assign(Frozen):
     """Assign new values to variables of the plot, by name."""
 
@@ -140,14 +156,16 @@ class Block(Frozen):
     block: tuple[InternalAction, ...]
 
 
-Internal = Assign | Tell | Emit | Withdraw | Log | Choose | Block
+WrittenAction = Assign | Tell | Emit | Withdraw | Log | Choose | Block
+"""The internal actions that a list of actions contains, as a union of types."""
+Internal = WrittenAction | Bind
 """The internal actions as a union of types."""
-InternalAction = Annotated[Internal, ByKey()]
+InternalAction = Annotated[WrittenAction, ByKey()]
 """The internal actions as the field type of a transition's actions."""
 Choose.model_rebuild()
 Block.model_rebuild()
 
-Action = Annotated[ExternalAction | Internal, ByKey()]
+Action = Annotated[ExternalAction | WrittenAction, ByKey()]
 """An action in entry or exit; internal actions are allowed there only in dialect `scxml` (SCXML 3.8)."""
 
 
@@ -171,5 +189,5 @@ def component_of(action: ExternalAction | Internal) -> str | None:
             return port.partition(".")[0]
         case Switch(switch=name):
             return name
-        case Assign() | Tell() | Emit() | Withdraw() | Log() | Choose() | Block():
+        case Bind() | Assign() | Tell() | Emit() | Withdraw() | Log() | Choose() | Block():
             return None

@@ -10,10 +10,10 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from dsc.model.actions import Assign, Emit, Internal, InternalAction, Tell, flat
+from dsc.model.actions import Assign, Bind, Emit, Internal, InternalAction, Tell, flat
 from dsc.model.language import ConditionField, EffectField, Frozen, TermField, is_quoted
 from dsc.model.reading import LOCATED, FormPath
 from knowledge_base.facts import Value
@@ -42,6 +42,10 @@ class Transition(Frozen):
     Attributes:
         target: name of the state to enter (`to`); `None` means that only the actions are executed.
         guard: condition that must be true (`when`).
+        bind: conditions that find the values of variables, by variable (S4.3). Without values that fulfil all of them,
+            and `when`, the transition is not taken. They may read each other's variables.
+        bind_all: conditions by variable, which receives the list of all values that fulfil its condition.
+        order_by: terms that order the values for `bind` and `bind_all`, the smallest first.
         assign, tell, emit, arguments: internal actions without a list, executed in this order; `arguments` (`with`) are
             the attributes of the emitted event.
         do: further internal actions, executed before `assign`, `tell` and `emit`.
@@ -66,10 +70,20 @@ class Transition(Frozen):
     rule: str | None = None
     also: tuple[str, ...] = ()
     internal: bool = False
+    bind: dict[str, ConditionField] = Field(default_factory=dict)
+    bind_all: dict[str, ConditionField] = Field(default_factory=dict)
+    order_by: Annotated[tuple[TermField, ...], BeforeValidator(as_tuple)] = ()
     assign: dict[str, TermField] = Field(default_factory=dict)
     tell: EffectField | None = None
     emit: str | None = None
     arguments: dict[str, TermField] = Field(default_factory=dict, alias="with")
+
+    @field_validator("order_by")
+    @classmethod
+    def _orders_values(cls, terms: tuple[Term, ...], info: ValidationInfo) -> tuple[Term, ...]:
+        if terms and not any(info.data.get(key) for key in ("bind", "bind_all")):
+            raise ValueError("`order_by` orders what `bind` or `bind_all` finds, and neither is given")
+        return terms
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -79,11 +93,29 @@ class Transition(Frozen):
         return (self.target, *self.also) if self.also else (self.target,)
 
     @property
+    def has_guard(self) -> bool:
+        """Whether a condition may prevent the transition: `when`, or that nothing fulfils `bind`."""
+        return self.guard is not None or bool(self.bind)
+
+    @property
+    def binding(self) -> Bind | None:
+        """The action for `bind`, whose condition includes `when`; `None` without `bind`."""
+        if not self.bind:
+            return None
+        both = (*self.bind.values(), *(() if self.guard is None else (self.guard,)))
+        condition = both[0] if len(both) == 1 else And(both)
+        return Bind(names=tuple(self.bind), condition=condition, order_by=self.order_by)
+
+    @property
     def effect(self) -> tuple[Internal, ...]:
         """All internal actions in order of execution."""
-        if not self.assign and self.tell is None and self.emit is None:
+        if not self.assign and self.tell is None and self.emit is None and not self.bind and not self.bind_all:
             return self.do
-        actions: list[Internal] = list(self.do)
+        binding = self.binding
+        actions: list[Internal] = [] if binding is None else [binding]
+        for name, condition in self.bind_all.items():
+            actions.append(Bind(names=(name,), condition=condition, order_by=self.order_by, every=True))
+        actions += self.do
         if self.assign:
             actions.append(Assign(assign=self.assign))
         if self.tell is not None:

@@ -59,20 +59,21 @@ _ORDER = (
     "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs",
     "receives", "emits", "seconds", "set", "switch", "send", "to", "pass", "before", "when", "offers", "utility",
     "cost", "of", "interrupt", "listen", "trigger", "use", "dynamic", "choose", "exclude", "situation", "explore",
-    "assign", "tell", "emit", "command", "with", "as", "within", "goal", "budget", "clear", "do", "then", "limit",
-    "rule", "choice", "select", "cases", "else", "entry", "at_least", "initial", "final", "states", "regions", "on",
-    "after", "every", "always", "exit", "on_break", "rules", "handlers",
+    "bind", "bind_all", "order_by", "assign", "tell", "emit", "command", "with", "as", "within", "goal", "budget",
+    "clear", "do", "then", "limit", "rule", "choice", "select", "cases", "else", "entry", "at_least", "initial",
+    "final", "states", "regions", "on", "after", "every", "always", "exit", "on_break", "rules", "handlers",
 )  # fmt: skip
 """Keys of a plot file in the order in which they are written."""
 _SINGLE = frozenset({
     "entry", "exit", "on_break", "before", "after", "every", "always", "event", "clear", "command", "offers",
+    "order_by",
 })  # fmt: skip
 """Keys of lists that may be written as their only element; `event` stands for the transitions of an event."""
 _NAMES = {
     "on": "event", "states": "state", "connectors": "state", "regions": "region", "cases": "transition",
     "parameters": "declaration", "variables": "declaration", "outputs": "declaration",
     "emits": "attributes", "receives": "attributes", "with": "value", "pass": "value", "as": "value",
-    "assign": "value",
+    "assign": "value", "bind": "value", "bind_all": "value",
 }  # fmt: skip
 """Kind of the values, by the key of each mapping whose own keys are names and keep their order."""
 

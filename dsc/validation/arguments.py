@@ -9,7 +9,7 @@ from functools import cached_property
 
 from dsc.dynamic.steps import Step, concerns, contents_of, entered_by, is_open
 from dsc.errors import Finding
-from dsc.model.actions import Assign, ExternalAction, Internal, flat
+from dsc.model.actions import Assign, Bind, ExternalAction, Internal, flat
 from dsc.model.declarations import PlotParameter
 from dsc.model.plot import ActionPlot, Path, initial_of
 from dsc.model.ranges import Who, refuse_change
@@ -85,12 +85,16 @@ def check_outputs(subject: Subject) -> Iterator[Finding]:
     if not open_ones:
         return
     actions = flat(action for _, state, _ in subject.states for action in _actions(state))
-    assigned = {name for action in actions if isinstance(action, Assign) for name in action.assign}
+    assigned = {name for action in actions if isinstance(action, Assign | Bind) for name in _variables(action)}
     for name in open_ones:
         if name not in assigned:
             fix = "`assign` it on the way to the end, or add `initial`"
             message = f"the output '{name}' never gets a value"
             yield subject.finding(("outputs", name), "outputs-are-given", message, fix)
+
+
+def _variables(action: Assign | Bind) -> Iterable[str]:
+    return action.assign if isinstance(action, Assign) else action.names
 
 
 def _actions(state: AnyState) -> Iterator[ExternalAction | Internal]:

@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Any
 
 from dsc.conversions import Conversion
-from dsc.data_types import data_type, names_in
+from dsc.data_types import ANY, data_type, names_in
 from dsc.dynamic.steps import (
     Outcomes,
     Step,
@@ -24,6 +24,7 @@ from dsc.dynamic.steps import (
     outputs_of,
     terms_of,
 )
+from dsc.engine.binding_types import element_type, with_types
 from dsc.errors import Finding
 from dsc.events import DONE
 from dsc.model import actions
@@ -34,10 +35,11 @@ from dsc.model.rules import CONTINUE, Handler, Reaction, Rule
 from dsc.model.states import DynamicState, FinalState, HistoryState, State
 from dsc.model.transitions import CHOICE, SelectState, TimedTransition, Transition, TransitionSource
 from dsc.skills import SkillSignature, check_arguments
+from dsc.type_words import in_words
 from dsc.validation.language_checks import LanguageChecker
 from dsc.validation.rules import RuleScope, attributes_of, read_as
 from dsc.validation.subject import Subject, Types
-from dsc.validation.type_checks import FREE_TYPES, TypeChecker
+from dsc.validation.type_checks import FREE_TYPES, TypeChecker, inside_optional
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.effect import Effect, mentioned
 from knowledge_base.language.syntax.expression import (
@@ -51,6 +53,7 @@ from knowledge_base.language.syntax.expression import (
 from knowledge_base.language.syntax.text import to_text
 
 _ANY: Types = {}
+_FINDS = {"bind": "one value", "bind_all": "a list of values"}
 _OF_PYTHON = {"bool": "boolean", "float": "number", "int": "integer", "str": "text"}
 """Types of Python that authors write by mistake, with the types of plots."""
 
@@ -155,7 +158,7 @@ class _Data:
         for here, event, transition in ways:
             if isinstance(transition, TimedTransition):
                 yield from self._term(transition.seconds, None, (*here, "seconds"), "number")
-            if transition.guard is not None or transition.passed or transition.effect:
+            if transition.has_guard or transition.passed or transition.effect:
                 # Validation cannot determine the event that led to a connector.
                 attributes = None
                 if isinstance(state, State) and event in state.on:
@@ -166,10 +169,39 @@ class _Data:
     def _transition(self, transition: Transition, scope: Types | None, path: Path) -> Iterator[Finding]:
         if transition.guard is not None:
             yield from self._condition(transition.guard, scope, (*path, "when"))
+        if transition.bind or transition.bind_all:
+            yield from self._bindings(transition, scope, path)
         if transition.passed:
             contents = self._subject.contents(transition.target)
             yield from self._given(transition.passed, scope, (*path, "pass"), contents)
         yield from self._actions(transition.effect, scope, path)
+
+    def _bindings(self, transition: Transition, scope: Types | None, path: Path) -> Iterator[Finding]:
+        """Yield findings about the variables, conditions and terms of `bind`, `bind_all` and `order_by`."""
+        for key, conditions in (("bind", transition.bind), ("bind_all", transition.bind_all)):
+            for name in conditions:
+                yield from self._variable(name, (*path, key, name))
+                kind = inside_optional(data_type(self._assigned.get(name, ANY)))
+                if name in self._assigned and (kind.kind == "list") != (key == "bind_all"):
+                    other = "bind" if key == "bind_all" else "bind_all"
+                    message = f"'{name}' is {in_words(str(kind))}, and `{key}` finds {_FINDS[key]}"
+                    yield self._subject.finding((*path, key, name), "bindings", message, f"use `{other}`")
+        for bind in (action for action in transition.effect if isinstance(action, actions.Bind)):
+            key = "bind_all" if bind.every else "bind"
+            kinds = {
+                name: str(element_type(data_type(self._assigned[name]), every=bind.every))
+                for name in bind.names
+                if name in self._assigned
+            }
+            written = transition.bind_all if bind.every else transition.bind
+            for name in bind.names:
+                names = {**self._scope(scope, written[name]), **kinds}
+                yield from self._language.condition(written[name], names, (*path, key, name))
+            typed = with_types(bind, self._assigned, self._subject.records)
+            names = {**self._scope(scope, typed.condition), **kinds}
+            yield from self._language.answers(typed.condition, names, bind.names, (*path, key))
+            for number, term in enumerate(bind.order_by):
+                yield from self._term(term, names, (*path, "order_by", number), "number")
 
     def _actions(
         self, block: Iterable[actions.Internal | actions.ExternalAction], scope: Types | None, path: Path,
@@ -184,6 +216,8 @@ class _Data:
         match action:
             case actions.Tell(tell=effect):
                 yield from self._effect(effect, scope, (*path, "tell"))
+            case actions.Bind():  # see `_bindings`
+                pass
             case actions.Assign(assign=values):
                 for name in values:
                     yield from self._variable(name, (*path, "assign", name))

@@ -127,7 +127,7 @@ def _handled(states: Iterable[AnyState]) -> dict[str, bool]:
     for state in states:
         if isinstance(state, State):
             for event, transitions in state.on.items():
-                found[event] = found.get(event, False) or any(t.guard is None for t in transitions)
+                found[event] = found.get(event, False) or any(not t.has_guard for t in transitions)
     return found
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import TypeVar
 
 from dsc.data_types import DataType, data_type
@@ -15,7 +16,7 @@ from dsc.validation.subject import Subject, Types
 from dsc.validation.type_checks import TypeChecker, inside_optional, language_type
 from dsc.validation.type_reader import TypeReader
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.checking.binding import unbound_error
+from knowledge_base.language.checking.binding import check_answers, unbound_error
 from knowledge_base.language.checking.check import check, check_effect, check_term
 from knowledge_base.language.syntax.effect import Effect, Form, mentioned
 from knowledge_base.language.syntax.expression import (
@@ -68,6 +69,19 @@ class LanguageChecker:
                 schema.require_defined(plain)
 
         yield from self._evaluable(plain, names, path, "condition", require)
+
+    def answers(self, condition: Expression, names: Types, wanted: Sequence[str], path: Path) -> Iterator[Finding]:
+        """Yield a finding if a condition without other findings can only test one of the variables `wanted`."""
+        schema = self._schema
+        if schema is None:
+            return
+        with suppress(InputError):
+            plain = plain_condition(condition, TypeReader(names, self._subject.records))
+            check(plain, schema, self._known(names, schema))
+            try:
+                check_answers(schema.expanded(plain), frozenset(names) - frozenset(wanted), schema)
+            except InputError as error:
+                yield self._subject.caught(error, path, "bindings")
 
     def effect(self, effect: Effect, names: Types, path: Path) -> Iterator[Finding]:
         """Yield findings about an effect."""

@@ -45,11 +45,11 @@ def check_connectors(subject: Subject) -> Iterator[Finding]:
 
 def _branches(subject: Subject, name: str, path: Path) -> Iterator[Finding]:
     *earlier, (last_path, _, last) = subject.leaving(path)
-    if last.guard is not None:
+    if last.has_guard:
         message = f"'{name}' may lead nowhere: its last branch has a `when`"
         yield subject.finding(last_path, "choice", message, "end with a branch without `when`")
     for here, _, transition in earlier:
-        if transition.guard is None:
+        if not transition.has_guard:
             message = f"this branch of '{name}' has no `when`, so later branches are never reached"
             yield subject.finding(here, "choice", message, "give it a `when`, or put it last")
             return

@@ -124,7 +124,7 @@ def _all_answer(event: str, subject: Subject) -> bool:
     """Return whether each interruptible state always handles the event itself."""
     resting = [state for _, state, _ in subject.states if isinstance(state, State)]
     own = [state for state in resting if not isinstance(state, CompositeState)]
-    return all(any(way.guard is None for way in state.on.get(event, ())) for state in own)
+    return all(any(not way.has_guard for way in state.on.get(event, ())) for state in own)
 
 
 def _listed(earlier: Sequence[Rule] | Sequence[Handler]) -> str:
@@ -145,7 +145,7 @@ def _settled(subject: Subject, rule: Rule, event: str) -> bool:
     """Return whether the transitions of a rule's states always handle the rule's event."""
     mine = [state for name, state, _ in subject.steps if concerns(rule, name, state, subject.library)]
     able = [state for state in mine if event in answerable(state, subject.library)]
-    return bool(able) and all(any(way.guard is None for way in state.on.get(event, ())) for state in able)
+    return bool(able) and all(any(not way.has_guard for way in state.on.get(event, ())) for state in able)
 
 
 def _transitions(subject: Subject) -> Iterator[Finding]:

@@ -16,7 +16,7 @@ from dsc.engine import steps
 from dsc.errors import NotExpressibleError
 from dsc.events import Event
 from dsc.messages import LateMessage
-from dsc.model.actions import ExternalAction, Internal
+from dsc.model.actions import ExternalAction, WrittenAction
 from dsc.model.language import first_key
 from dsc.model.plot import ActionPlot
 from dsc.runs.encoding import Awaited, awaited_form, awaited_of
@@ -43,7 +43,7 @@ FORMS = {
 
 
 EXTERNAL = {first_key(kind) for kind in get_args(ExternalAction)}
-INTERNAL = {first_key(kind) for kind in get_args(Internal)}
+INTERNAL = {first_key(kind) for kind in get_args(WrittenAction)}
 
 
 def plot_with(key: str) -> ActionPlot:
@@ -54,7 +54,9 @@ def plot_with(key: str) -> ActionPlot:
 
 
 def kind_of(key: str) -> str:
-    return next(str(kind.__name__).lower() for kind in get_args(ExternalAction | Internal) if first_key(kind) == key)
+    return next(
+        str(kind.__name__).lower() for kind in get_args(ExternalAction | WrittenAction) if first_key(kind) == key
+    )
 
 
 @pytest.fixture(params=sorted(EXTERNAL | INTERNAL))
@@ -64,7 +66,7 @@ def key(request):
 
 def test_each_kind_of_action_has_an_example_with_its_own_key():
     assert set(FORMS) == EXTERNAL | INTERNAL
-    assert len(FORMS) == len(get_args(ExternalAction | Internal))
+    assert len(FORMS) == len(get_args(ExternalAction | WrittenAction))
 
 
 def test_a_written_action_is_read_back(key):

@@ -59,6 +59,12 @@ class FakeSituation:
                 return COMPARE[operator](a, b)
         raise NotImplementedError(expression)
 
+    def answers(self, expression, bindings):
+        free = [arg.name for arg in expression.args if isinstance(arg, lang.Variable) and arg.name not in bindings]
+        facts = [fact for fact in sorted(self.facts) if fact.predicate == expression.predicate]
+        found = [dict(zip([a.name for a in expression.args], fact.args, strict=False)) for fact in facts]
+        return [{name: one[name] for name in free} for one in found if self.holds(expression, {**bindings, **one})]
+
     def value(self, term, bindings):
         match term:
             case lang.Constant(value):

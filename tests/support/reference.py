@@ -33,6 +33,7 @@ from reference_tree import Node, NoValueError, grow, holds, told, value
 
 from dsc.model.actions import (
     Assign,
+    Bind,
     Block,
     Choose,
     Configure,
@@ -530,6 +531,8 @@ class Reference:
                     self._act(instance, inner)
             case Block(block=inside):
                 self._perform(instance, inside)
+            case Bind():
+                raise NotImplementedError(action)
             case Trigger() | Configure() | Send() | Wire() | Unwire() | Withdraw() | Log():
                 pass  # nothing of a chart without components depends on them
 

@@ -405,6 +405,7 @@ TRANSITIONS = st.fixed_dictionaries(
     optional={
         "to": NAMES, "when": st.sampled_from(["(p)", "(not (p ?x))"]), "assign": TERMS,
         "tell": st.just("(p)"), "emit": NAMES, "with": TERMS, "pass": TERMS,
+        "bind": st.dictionaries(NAMES, st.just("(p ?x)"), max_size=2), "bind_all": st.just({"x": "(p ?x)"}), "order_by": st.just([]),
     },
 )  # fmt: skip
 CASES = st.sampled_from(["a", "on", "4", 2, 0.5, '"3"', "Big Cup", "null", "true", "a: b"])

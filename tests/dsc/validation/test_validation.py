@@ -306,6 +306,11 @@ WRONG = [
         ITEM + "  a:\n" + GRASP + WIRED + E + "rules:\n  - on: lost\n    when: (on ?itm table)\n    do: {}\n",
         11, "?itm", "",
     ),
+    (
+        "bindings",
+        "plot: p\nvariables: {found: list of item}\nstates:\n  a:\n    on:\n      done: {to: e, bind: {found: (free)}}\n" + E,
+        6, "'found' is a list of item, and `bind` finds one value", "use `bind_all`",
+    ),
     ("effect", ITEM + "  a:\n    on:\n      done: {to: e, tell: (onn ?item table)}\n" + E, 6, "mean 'on'", ""),
     (
         "effect",
