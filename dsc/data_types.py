@@ -74,9 +74,9 @@ class DataType:
             case "name":
                 return self.name
             case "list" | "map":
-                return f"{self.kind} of {self.inner}"
+                return f"{self.kind} of {self.inner or ANY}"
             case "optional":
-                return f"optional {self.inner}"
+                return f"optional {self.inner or ANY}"
             case "choice":
                 return " | ".join(map(choice_text, self.values)) + (" |" if len(self.values) == 1 else "")
             case _:

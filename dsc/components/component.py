@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 from dsc.annotations import Namespace, class_statement, evaluated
 from dsc.calls import Ended, SkillCall, Status
+from dsc.components.checks import Check
 from dsc.components.demands import Demand, read_demands
 from dsc.components.interface import Interface
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
@@ -22,6 +23,7 @@ from dsc.components.requirement import Requirement
 from dsc.components.services import Service
 from dsc.components.streams import Push
 from dsc.components.turns import Turns
+from dsc.components.value_conditions import WATCH, declare_watch
 from dsc.data_types import check_all, data_type
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
@@ -45,6 +47,7 @@ class ComponentHooks:
             it maps each mode to the modes that may follow. From and to `neutral`, each transition is permitted.
         device_errors: exceptions that report a failed device, e.g. `(OSError,)`: a skill that raises one ends with
             `skill_error`, and a hook leads to FatalError. Every other exception is a programming error.
+        checks: the component's own checks for conditions on its pushed values, see `dsc.components.checks`.
         period: seconds between two calls of `step`; `None` without such steps.
         needs: for each mode, a tuple of names of required components, or of the component's required ports, whose
             providers it then needs; the key `ALWAYS` applies in every mode.
@@ -62,6 +65,7 @@ class ComponentHooks:
     device_errors: ClassVar[tuple[type[BaseException], ...]] = ()
     needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     demands: ClassVar[Mapping[str, Demand]] = {}
+    checks: ClassVar[tuple[Check, ...]] = ()
     period: float | None = None
 
     parameters: Parameters
@@ -251,8 +255,27 @@ class Component(ComponentHooks, RestartHooks):
         return ()
 
     def skills(self) -> dict[str, SkillSignature]:
-        """Return the signatures of all decorated methods, by skill name."""
-        return dict(signatures(type(self), self.name))  # type: ignore[arg-type]  # mypy: classes are hashable
+        """Return the signatures of all decorated methods, by skill name; without push ports, not `watch_values`."""
+        found = dict(signatures(type(self), self.name))  # type: ignore[arg-type]  # mypy: classes are hashable
+        if not self.pushes:
+            del found[WATCH]
+        return found
+
+    @declare_watch
+    def watch_values(
+        self,
+        condition: str,
+        values: Mapping[str, Any] | None = None,
+        hysteresis: float = 0.0,
+        hold: float = 0.0,
+        times: int = 1,
+        out_of: int = 1,
+    ) -> None:
+        """Report each change of a condition on the values of the push ports, see `ValueCondition` (S2.4).
+
+        Charts start it as `trigger: arm.watch_values`. The events `became_true` and `became_false` have the values that
+        the condition reads. The first of them reports the truth at the beginning.
+        """
 
     def takes_turns(self, skill: SkillSignature) -> bool:
         """Return whether a skill waits until no other skill has the component; events and queries never wait."""
@@ -355,7 +378,7 @@ class Component(ComponentHooks, RestartHooks):
             UnknownNameError: the component has no such event.
             InputError: the number of values, or a value's type, is not that of the parameters of the event's test.
         """
-        events = [name for name, signature in self.skills().items() if signature.pattern == "event"]
+        events = [name for name, signature in self.skills().items() if signature.pattern == "event" and name != WATCH]
         if event not in events:
             raise UnknownNameError(f"component '{self.name}' has no event '{event}'", found=event, valid=events)
         declared: Declared = getattr(getattr(self, event), DECLARED)

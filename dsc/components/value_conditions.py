@@ -1,0 +1,232 @@
+"""Conditions on the values that a component pushes, evaluated where the values are (S2.4).
+
+`(and (< scan.metres 0.5) (not (silent scan 2)))` reads the values as `port.value`. A condition is unknown until each
+value that it reads has arrived; then, only changes of its truth leave the component.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from dsc.calls import SkillCall
+from dsc.components.checks import LIBRARY, Check, Series, by_name
+from dsc.components.hooks import contained
+from dsc.components.streams import Push
+from dsc.components.value_evaluation import SILENT, ValueEvaluation
+from dsc.outcomes import Outcome
+from dsc.skills import Declared, SkillBody
+from knowledge_base.conditions.damping import relaxed
+from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.language.syntax.expression import Atom, Call, Constant, Expression, Term, parts_of
+from knowledge_base.language.syntax.text import parse_condition, to_text
+
+WATCH = "watch_values"
+"""Name of the skill by which charts watch a condition on the values of a component with push ports."""
+Flip = Callable[[bool, dict[str, Any]], None]
+"""Function that receives the truth of a condition after each change, and the values that it reads."""
+Fail = Callable[[Exception], None]
+"""Function that receives the error of an evaluation, after which the condition is not evaluated again."""
+
+
+class ValueCondition:
+    """A condition on the values of push ports, which reports its changes in the running loop.
+
+    Args:
+        text: the condition; a name with a dot is a value of a port, e.g. `scan.metres`.
+        ports: the push ports by name.
+        checks: the functions that the condition may use, by name.
+        values: the values of the variables in the condition.
+        hysteresis: as for `KnowledgeBase.install`; 0 means none.
+        hold: seconds for which the condition must stay true before it counts as true.
+        times, out_of: the condition counts as true if it is true for `times` of the last `out_of` values.
+
+    Raises:
+        InputError: the text is not such a condition, or a number is invalid.
+        UnknownNameError: there is no such port, value, check or variable.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        ports: Mapping[str, Push],
+        checks: Mapping[str, Check],
+        values: Mapping[str, Any],
+        *,
+        hysteresis: float = 0.0,
+        hold: float = 0.0,
+        times: int = 1,
+        out_of: int = 1,
+    ) -> None:
+        self._ports, self._checks = ports, checks
+        rise = parse_condition(text)
+        self._rise, self._stay = rise, relaxed(rise, hysteresis) if hysteresis else rise
+        if not 1 <= times <= out_of:
+            raise InputError(f"`times` is from 1 to `out_of`, not {times} of {out_of}")
+        if hold < 0:
+            raise InputError(f"`hold` is a number of seconds, 0 or more, not {hold:g}")
+        self._hold, self._times, self._last = hold, times, deque[bool](maxlen=out_of)
+        self._series: dict[str, Series] = {}
+        self._silences: dict[tuple[str, float], float] = {}  # loop times of the end of silence that counts
+        for name in self._names(rise):
+            port, _, _ = name.partition(".")
+            self._require(name, port)
+            self._series[name] = Series(name)
+        for port, seconds in self._silent(rise):
+            self._require(port, port)
+            self._silences[port, seconds] = 0.0
+        self._read = dict.fromkeys(
+            [*(name.partition(".")[0] for name in self._series), *(p for p, _ in self._silences)]
+        )
+        self._evaluation = ValueEvaluation(self._series, checks, values, self._is_silent)
+        self._truth: bool | None = None
+        self._since: float | None = None  # loop time since which the condition is true
+        self._timers: list[asyncio.TimerHandle] = []
+        self._flip: Flip | None = None
+        self._fail: Fail | None = None
+        self._receivers: list[tuple[Push, Callable[[dict[str, Any], float], None]]] = []
+
+    def listen(self, flip: Flip, fail: Fail) -> None:
+        """Call `flip` with the first truth and each later change, until `end`; must be called in a running loop."""
+        self._flip, self._fail = flip, fail
+        now = asyncio.get_running_loop().time()
+        for silence in self._silences:
+            self._silences[silence] = now + silence[1]
+        for name in self._read:
+            port = self._ports[name]
+            receive = self._receiver(name)
+            self._receivers.append((port, receive))
+            port.listen(receive)
+        if not self._series:
+            self._evaluate()
+
+    def end(self) -> None:
+        """Stop listening."""
+        self._flip = self._fail = None
+        for port, receive in self._receivers:
+            port.leave(receive)
+        for timer in self._timers:
+            timer.cancel()
+
+    def _receiver(self, port: str) -> Callable[[dict[str, Any], float], None]:
+        def receive(values: dict[str, Any], age: float) -> None:
+            at = asyncio.get_running_loop().time() - age
+            for name, value in values.items():
+                series = self._series.get(f"{port}.{name}")
+                if series is not None:
+                    series.kept.append((at, value))
+            for silence in self._silences:
+                if silence[0] == port:
+                    self._silences[silence] = at + silence[1]
+            self._evaluate(by_value=True)
+
+        return receive
+
+    def _evaluate(self, *, by_value: bool = False) -> None:
+        if self._flip is None or self._fail is None or not all(series.kept for series in self._series.values()):
+            return
+        try:
+            with contained():
+                self._report(self._flip, by_value=by_value)
+        except Exception as error:  # noqa: BLE001  # the error fails this condition, not the caller of `put`
+            self._fail(error)
+            self.end()
+
+    def _report(self, flip: Flip, *, by_value: bool) -> None:
+        """Report a change of the truth, and schedule the next evaluation that depends on time."""
+        now = asyncio.get_running_loop().time()
+        holds = self._evaluation.is_true(self._stay if self._truth else self._rise)
+        if by_value or not self._last:
+            self._last.append(holds)
+        truth = holds if self._last.maxlen == 1 else sum(self._last) >= self._times
+        self._since = (now if self._since is None else self._since) if truth else None
+        if truth and not self._truth and self._since is not None and now < self._since + self._hold:
+            truth = False
+        if truth is not self._truth:
+            self._truth = truth
+            flip(truth, {name: series.newest for name, series in self._series.items()})
+        self._schedule(now)
+
+    def _schedule(self, now: float) -> None:
+        for timer in self._timers:
+            timer.cancel()
+        due = [at for at in self._silences.values() if at > now]
+        if self._since is not None and not self._truth:
+            due.append(self._since + self._hold)
+        loop = asyncio.get_running_loop()
+        self._timers = [loop.call_at(at, self._evaluate) for at in due]
+
+    def _is_silent(self, port: str, seconds: float) -> bool:
+        return asyncio.get_running_loop().time() >= self._silences[port, seconds]
+
+    # -- names -------------------------------------------------------------------------------------------
+
+    def _names(self, form: Expression | Term) -> Iterator[str]:
+        """Yield the values of ports that a condition reads; raise `UnknownNameError` for an unknown check."""
+        if isinstance(form, Constant) and not form.quoted and isinstance(form.value, str) and "." in form.value:
+            yield form.value
+        if isinstance(form, Atom | Call):
+            name = form.predicate if isinstance(form, Atom) else form.function
+            if name not in self._checks and name not in {SILENT, "list"}:
+                valid = (SILENT, *self._checks)
+                raise UnknownNameError(f"there is no check '{name}'", place=form.place, found=name, valid=valid)
+        for part in parts_of(form):
+            yield from self._names(part)
+
+    def _silent(self, form: Expression | Term) -> Iterator[tuple[str, float]]:
+        match form:
+            case Atom("silent", (Constant(str(port)), Constant(int() | float() as seconds))) if seconds > 0:
+                yield port, float(seconds)
+            case Atom("silent"):
+                message = f"{to_text(form)} is not of the form (silent port seconds)"
+                raise InputError(message, place=form.place)
+            case _:
+                for part in parts_of(form):
+                    yield from self._silent(part)
+
+    def _require(self, name: str, port: str) -> None:
+        if port not in self._ports or ("." in name and name.partition(".")[2] not in self._ports[port].values):
+            valid = [f"{port}.{value}" for port, push in self._ports.items() for value in push.values]
+            if "." not in name:
+                valid = list(self._ports)
+            raise UnknownNameError(f"the component pushes no '{name}'", found=name, valid=valid)
+
+
+class BecameTrue(Outcome):
+    """The condition has become true, or is true at the beginning."""
+
+    values: dict[str, Any]
+
+
+class BecameFalse(Outcome):
+    """The condition has become false, or is false at the beginning."""
+
+    values: dict[str, Any]
+
+
+async def watch(component: Any, _: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
+    """Report each change of a condition's truth until the action is cancelled, or an evaluation fails."""
+    failed: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
+    options = {name: value for name, value in arguments.items() if name not in {"condition", "values"}}
+    checks = {**LIBRARY, **by_name(*component.checks)}
+    condition = ValueCondition(arguments["condition"], component.pushes, checks, arguments.get("values", {}), **options)
+    condition.listen(
+        lambda truth, values: call.report(BecameTrue(values=values) if truth else BecameFalse(values=values)),
+        lambda error: None if failed.done() else failed.set_exception(error),
+    )
+    try:
+        return await failed
+    finally:
+        condition.end()
+
+
+def declare_watch(body: SkillBody) -> SkillBody:
+    """Declare the method that stands for the conditions of a component as an event with two outcomes."""
+    types = {
+        "condition": "text", "values": "map of any", "hysteresis": "number from 0", "hold": "number from 0",
+        "times": "integer from 1", "out_of": "integer from 1",
+    }  # fmt: skip
+    outcomes = {"became_true": {"values": "map of any"}, "became_false": {"values": "map of any"}}
+    return Declared(types, outcomes, watch, own=1, pattern="event", after_crash="repeat")(body)
