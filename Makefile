@@ -3,13 +3,14 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 BENCH  := .venv-bench
+ORACLE := .venv-oracle
 LONG   := $(shell cat tests/long.txt)
 
 # The tests start hundreds of programs, which share the compiled modules.
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-long test-engines test-all check types limits conformance sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
+.PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-long test-engines test-all check types limits conformance oracle-trees sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
 .PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-choice bench-learned-costs bench-transforms bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
@@ -74,6 +75,14 @@ house: $(VENV)/.test   ## sizes, imports, names and circles of the code, with th
 
 conformance: $(VENV)/.test   ## the SCXML charts of SCION and of the W3C, fetched with npm into .conformance/, on this engine (WRITE=1 writes the docs)
 	$(BIN)/python tests/conformance/charts.py $(if $(WRITE),--write)
+
+$(ORACLE)/.trees:   # BehaviorTree.CPP 4.8.2 as a wheel
+	$(PYTHON) -m venv $(ORACLE)
+	$(ORACLE)/bin/python -m pip install --quiet --disable-pip-version-check behaviortreepy==0.1.4
+	@touch $@
+
+oracle-trees: $(ORACLE)/.trees   ## record the results of BehaviorTree.CPP, with which `make test` compares behaviour trees
+	$(ORACLE)/bin/python tests/conformance/record_trees.py
 
 sweep-pddl: $(VENV)/.engines   ## the PDDL files that come with unified-planning: read, planned for, plans checked by their validator (WRITE=1 writes the docs)
 	$(BIN)/python -W ignore tests/conformance/pddl_sweep.py $(if $(WRITE),--write)
@@ -227,4 +236,4 @@ docs: $(SITE)/.made   ## build the pages and the reference as a site into site/;
 	NO_MKDOCS_2_WARNING=1 $(SITE)/bin/mkdocs build --strict
 
 clean:   ## forget the environment and caches
-	rm -rf $(VENV) $(BENCH) $(LOWER) $(MUTATION) $(SITE) site .mutation frontend/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) $(BENCH) $(ORACLE) $(LOWER) $(MUTATION) $(SITE) site .mutation frontend/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

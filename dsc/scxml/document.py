@@ -100,15 +100,20 @@ class Element:
             yield from child.walk()
 
 
-def read_xml(text: str, source: str | None = None) -> Element:
-    """Return the root element of an XML text; `source` is the file name in messages.
+def read_xml(text: str, source: str | None = None, deepest: int = MAX_DEPTH) -> Element:
+    """Return the root element of an XML text.
+
+    Args:
+        text: the document.
+        source: the file name in messages.
+        deepest: upper bound of the depth of elements.
 
     Raises:
         ParseError: the text is not well-formed XML, has a document type or entity declaration, or is too large or deep.
     """
     data = text.encode(errors="surrogatepass")  # the parser then reports half a surrogate pair with its place
     check_size(len(data), Place(source))
-    reader = _Reader(source)
+    reader = _Reader(source, deepest)
     try:
         reader.parser.Parse(data, True)  # noqa: FBT003  # expat takes no keywords here
     except expat.ExpatError as error:
@@ -123,8 +128,9 @@ def written(element: Element) -> str:
 
 
 class _Reader:
-    def __init__(self, source: str | None) -> None:
+    def __init__(self, source: str | None, deepest: int) -> None:
         self._source = source
+        self._deepest = deepest
         self._open: list[Element] = []
         self.root: Element
         self.parser = expat.ParserCreate("utf-8", namespace_separator=" ")
@@ -141,8 +147,8 @@ class _Reader:
         space, _, name = tag.rpartition(" ")
         own = {key: value for key, value in attributes.items() if " " not in key}
         element = Element(name, own, self._place(), namespace=space)
-        if len(self._open) >= MAX_DEPTH:
-            raise ParseError(f"nested deeper than {MAX_DEPTH} levels", place=element.place)
+        if len(self._open) >= self._deepest:
+            raise ParseError(f"nested deeper than {self._deepest} levels", place=element.place)
         if self._open:
             self._open[-1].children.append(element)
         else:
