@@ -18,21 +18,18 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
 from contextvars import ContextVar
-from typing import Any, TypeVar, Union
+from typing import Any, TypeVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Repeat, Retry
 
-from dsc.annotations import FoundRecords, names_around
 from dsc.calls import SkillCall
-from dsc.components.hooks import contained
-from dsc.outcomes import Outcome, declared_outcomes
-from dsc.skills import AfterCrash, SkillBody, declaration, named
-from knowledge_base.errors import InputError
+from dsc.components.tree_skills import declare_tree, execute_action
+from dsc.outcomes import Outcome
+from dsc.skills import AfterCrash, SkillBody
 from knowledge_base.facts import Delta
-from knowledge_base.language.checking.inputs import shown
 
 PERIOD = 0.1
 """Seconds between two ticks."""
@@ -67,8 +64,6 @@ def tree_skill(
         InputError: an outcome is not a class, or `success` or `failure` has attributes.
         SchemaError: an annotation has no valid type.
     """
-    for end in (success, failure):
-        _require_bare(end)
 
     async def execute(_: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
         _observe.set(call.observe)
@@ -83,20 +78,7 @@ def tree_skill(
             await _halt(root)
         return Outcome((success if succeeded else failure).event)
 
-    def declare(body: _Body) -> _Body:
-        records, names = FoundRecords(), names_around(body.__globals__)
-        classes = Union.__getitem__((success, failure, *reports))
-        outcomes = declared_outcomes(classes, names, f"'{named(body)}'", records)
-        return declaration(body, 2, names, outcomes, records, execute=execute, after_crash=after_crash)(body)
-
-    return declare
-
-
-def _require_bare(end: object) -> None:
-    if not (isinstance(end, type) and issubclass(end, Outcome)):
-        raise InputError(f"a tree ends with a class of an outcome, as in success=Served, not with {shown(end)}")
-    if end.declared:
-        raise InputError(f"a tree ends with {end.__name__}, for whose attributes it has no values", found=end.__name__)
+    return declare_tree((success, failure), reports, after_crash, execute)
 
 
 def sequence(*children: Behaviour, name: str = "sequence", reactive: bool = False) -> Behaviour:
@@ -162,13 +144,7 @@ class _Action(Behaviour):
         self._task = asyncio.ensure_future(self._execute())
 
     async def _execute(self) -> Outcome:
-        with contained():
-            outcome = await self._begin()
-        if not isinstance(outcome, Outcome):
-            raise InputError(f"the action '{self.name}' ended with {shown(outcome)}, which is not an outcome")
-        if outcome.observed:
-            _observe.get()(outcome.observed)
-        return outcome
+        return await execute_action(self.name, self._begin, _observe.get())
 
     def update(self) -> Status:
         if self._task is None or not self._task.done():

@@ -11,7 +11,7 @@ from dsc.trees.model import Node, TreeFile
 from dsc.trees.running import branches, decorators, leaves, parallels, sequences, timers
 from dsc.trees.running.node import Run, RunningNode
 from dsc.trees.running.ports import key_of
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError
 
 MakeLeaf = Callable[[Node, Board, Run], RunningNode]
 """Function that makes the running node of a leaf that is not built in."""
@@ -48,20 +48,6 @@ _CLASSES: Mapping[str, type[RunningNode]] = {
     "SetBlackboard": leaves.SetBlackboard,
     "UnsetBlackboard": leaves.UnsetBlackboard,
 }
-
-
-def main_tree(file: TreeFile, name: str | None = None) -> str:
-    """Return the name of the tree that runs.
-
-    Raises:
-        UnknownNameError: no tree has this name, or the file names no main tree.
-    """
-    wanted = name or file.main
-    if wanted is None:
-        raise UnknownNameError("the file has several trees and names no main tree", valid=file.trees)
-    if wanted not in file.trees:
-        raise UnknownNameError(f"the file has no tree '{wanted}'", found=wanted, valid=file.trees)
-    return wanted
 
 
 def build_tree(file: TreeFile, name: str, run: Run, make_leaf: MakeLeaf, board: Board | None = None) -> RunningNode:

@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 
 from dsc.trees.blackboard import EMPTY, Board
-from dsc.trees.building import build_tree, main_tree
+from dsc.trees.building import build_tree
 from dsc.trees.kinds import KINDS, SCRIPTS
+from dsc.trees.main_tree import main_tree
 from dsc.trees.reading.reader import parse_trees
 from dsc.trees.running.leaves import ActionLeaf, ConditionLeaf
 from dsc.trees.running.node import Run, Status

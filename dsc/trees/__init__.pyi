@@ -1,0 +1,14 @@
+from dsc.trees.binding import Action as Action
+from dsc.trees.binding import BoundTree as BoundTree
+from dsc.trees.binding import Condition as Condition
+from dsc.trees.binding import Leaf as Leaf
+from dsc.trees.binding import bind_tree as bind_tree
+from dsc.trees.model import Node as Node
+from dsc.trees.model import NodeModel as NodeModel
+from dsc.trees.model import Port as Port
+from dsc.trees.model import Tree as Tree
+from dsc.trees.model import TreeFile as TreeFile
+from dsc.trees.reading.reader import load_trees as load_trees
+from dsc.trees.reading.reader import parse_trees as parse_trees
+from dsc.trees.skill import tree_skill as tree_skill
+from dsc.trees.writer import trees_to_xml as trees_to_xml
