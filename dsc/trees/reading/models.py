@@ -47,7 +47,7 @@ def _read_ports(declared: Element) -> Iterator[Port]:
         require_attributes(child, _PORT)
         name = require_attribute(child, "name")
         if name in names:
-            raise InputError(f"the port '{name}' is declared twice", place=child.place, found=name)
+            raise InputError(f"<{child.name}>: the port '{name}' is declared twice", place=child.place, found=name)
         names.add(name)
         text = child.attributes.get("description", "") or child.text
         default = child.attributes.get("default") or None

@@ -69,7 +69,8 @@ def _kind(element: Element, models: Models) -> tuple[str, Role]:
         return "SubTree", "subtree"
     if stated is None and "ID" in element.attributes:
         message = f"<{element.name}> has no attribute 'ID', which only the explicit form has"
-        raise InputError(message, place=element.place, found="ID")
+        valid = [] if element.name in KINDS else EXPLICIT
+        raise UnknownNameError(message, place=element.place, found=element.name, valid=valid)
     kind = element.name if stated is None else require_attribute(element, "ID")
     if kind in KINDS:
         role = KINDS[kind].role
@@ -93,7 +94,7 @@ def _leaf_role(element: Element, kind: str, stated: Role | None, models: Models)
         message = f"<{element.name} ID='{kind}'>: TreeNodesModel declares '{kind}' as {model.role}"
         raise InputError(f"{message} at line {model.place.line}", place=element.place)
     if role not in {"action", "condition", "leaf"}:
-        message = f"'{kind}' is a {role} of another program, which has no counterpart: write it with supported nodes"
+        message = f"<{element.name}> '{kind}' is a {role} of another program: write it with supported nodes"
         raise UnknownNameError(message, place=element.place, found=kind, valid=KINDS)
     if element.children:
         valid = [name for name, one in KINDS.items() if one.role in {"control", "decorator"}]

@@ -50,7 +50,7 @@ def parse_trees(text: str, source: str | None = None) -> TreeFile:
     _require_no_text(root)
     written = root.attributes.get("BTCPP_format", "3")
     if written not in FORMATS:
-        message = f"the format {written} is unknown"
+        message = f"<root>: the format '{written}' is unknown"
         raise InputError(message, place=root.place, found=written, valid=FORMATS)
     for part in root.children:
         _require_part(part)
@@ -90,11 +90,11 @@ def _read(root: Element) -> TreeFile:
         tree = _read_tree(part, models, alone=len(parts) == 1)
         if tree.name in trees:
             first = trees[tree.name].place.line
-            raise InputError(f"the tree '{tree.name}' exists already, at line {first}", place=tree.place)
+            raise InputError(f"<BehaviorTree ID='{tree.name}'> exists already, at line {first}", place=tree.place)
         trees[tree.name] = tree
     main = root.attributes.get("main_tree_to_execute") or (next(iter(trees)) if len(trees) == 1 else None)
     if main is not None and main not in trees:
-        message = f"main_tree_to_execute: the file has no tree '{main}'"
+        message = f"<root>: main_tree_to_execute names no tree of the file, but '{main}'"
         raise UnknownNameError(message, place=root.place, found=main, valid=trees)
     file = TreeFile(trees, main, models)
     _check(file)
@@ -105,7 +105,7 @@ def _add_models(models: dict[str, NodeModel], part: Element) -> None:
     for model in read_models(part):
         if model.kind in models:
             first = models[model.kind].place.line
-            raise InputError(f"'{model.kind}' is declared already, at line {first}", place=model.place)
+            raise InputError(f"<TreeNodesModel> declares '{model.kind}' already, at line {first}", place=model.place)
         models[model.kind] = model
 
 
