@@ -17,6 +17,7 @@ from dsc.cli.logs import PROGRAMMING_ERROR
 from dsc.cli.monitor import monitor_command
 from dsc.cli.runs import app as runs_app
 from dsc.cli.runs import kept_relations, view_command
+from dsc.cli.trees import app as trees_app
 from dsc.cli.wire import call_command, ps_command
 from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import register_reader, register_relations
@@ -61,6 +62,7 @@ app.add_typer(plots.app, name="plot")
 app.add_typer(kb_app, name="kb")
 app.add_typer(runs_app, name="runs")
 app.add_typer(deployment_app, name="deployment")
+app.add_typer(trees_app, name="tree")
 app.command("new")(new_command)
 app.command("run")(run_command)
 app.command("host")(host_command)
