@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, get_origin, get_type_hints
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import PydanticUserError, TypeAdapter, ValidationError
 
 from dsc.outcomes import Outcome
 from dsc.trees.evaluation import Enums, text_of_value
@@ -19,6 +19,12 @@ from dsc.trees.running.ports import key_of
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.checking.inputs import shown
 
+_WITHOUT_NAME = frozenset({
+    inspect.Parameter.VAR_POSITIONAL,
+    inspect.Parameter.VAR_KEYWORD,
+    inspect.Parameter.POSITIONAL_ONLY,
+})  # fmt: skip
+"""Kinds of parameters that cannot be passed by name."""
 _NO_ENTRIES: Mapping[str, Any] = {}
 
 
@@ -146,7 +152,9 @@ def bind_leaf(bound: BoundTree, node: Node) -> BoundLeaf:
     model = bound.file.models.get(node.kind)
     declared = {port.name: port for port in model.ports} if model else {}
     function = function_of(leaf)
-    parameters = inspect.signature(function).parameters
+    parameters = {
+        name: one for name, one in inspect.signature(function).parameters.items() if one.kind not in _WITHOUT_NAME
+    }
     outputs = {name for name, port in declared.items() if port.direction != "input"}
     outputs |= set(leaf.outputs) if isinstance(leaf, Action) else set()
     defaults = {name: port.default for name, port in declared.items() if port.default is not None}
@@ -201,7 +209,16 @@ def _converters(function: Callable[..., Any], inputs: Mapping[str, str]) -> dict
         hints = get_type_hints(function)
     except (NameError, TypeError):
         hints = {}
-    return {name: partial(_convert, hints[name], TypeAdapter(hints[name])) for name in inputs if name in hints}
+    adapters = {name: _adapter(hints[name]) for name in inputs if name in hints}
+    return {name: partial(_convert, hints[name], one) for name, one in adapters.items() if one is not None}
+
+
+def _adapter(annotation: Any) -> TypeAdapter[Any] | None:
+    """Return the conversion for an annotation; `None` for a class without one, whose values are passed unchanged."""
+    try:
+        return TypeAdapter(annotation)
+    except PydanticUserError:
+        return None
 
 
 def _convert(annotation: Any, adapter: TypeAdapter[Any], value: object) -> object:

@@ -17,6 +17,8 @@ MakeLeaf = Callable[[Node, Board, Run], RunningNode]
 """Function that makes the running node of a leaf that is not built in."""
 MAX_LEVELS = 150
 """Upper bound of nested nodes, those of subtrees included."""
+MAX_NODES = 10_000
+"""Upper bound of the nodes of a running tree; each use of a subtree counts."""
 _CLASSES: Mapping[str, type[RunningNode]] = {
     "Sequence": sequences.SequenceNode,
     "AsyncSequence": sequences.AsyncSequence,
@@ -61,7 +63,7 @@ def build_tree(file: TreeFile, name: str, run: Run, make_leaf: MakeLeaf, board: 
         board: the blackboard of the tree; a new one by default.
 
     Raises:
-        InputError: the nodes are nested too deep.
+        InputError: the nodes are nested too deep, or too many.
     """
     builder = _Builder(file, run, make_leaf)
     return builder.node(file.trees[name].root, board or Board(), 1)
@@ -72,10 +74,14 @@ class _Builder:
         self._file = file
         self._run = run
         self._make_leaf = make_leaf
+        self._nodes = 0
 
     def node(self, node: Node, board: Board, level: int) -> RunningNode:
         if level > MAX_LEVELS:
             raise InputError(f"{node.element} is nested deeper than {MAX_LEVELS} levels", place=node.place)
+        self._nodes += 1
+        if self._nodes > MAX_NODES:
+            raise InputError(f"{node.element}: the tree has more than {MAX_NODES} nodes", place=node.place)
         if node.role == "subtree":
             root = self._file.trees[node.tree].root
             child = self.node(root, self._inner_board(node, board), level + 1)
@@ -91,7 +97,7 @@ class _Builder:
     def _inner_board(self, node: Node, outer: Board) -> Board:
         """Return the board of a subtree, with the keys that it shares with the outer board, and its constants."""
         model = self._file.models.get(node.tree)
-        autoremap = node.ports.get("_autoremap") == "true"
+        autoremap = node.ports.get("_autoremap") in {"true", "1"}
         declared = {} if model is None or autoremap else {port.name: port.default for port in model.ports}
         texts = {name: text for name, text in declared.items() if text is not None} | dict(node.ports)
         texts.pop("_autoremap", None)
