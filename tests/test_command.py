@@ -397,6 +397,7 @@ def test_the_sweep_has_every_command_that_takes_a_file():
     assert {words for words, _ in leaves(get_command(app))} - swept == {
         ("doctor",),
         ("bundles",),
+        ("lsp",),
         ("new",),
         ("plot", "schema"),
     }

@@ -35,6 +35,7 @@ class ButlerFlat(Simulation):
     """
 
     reads_scenarios = True
+    scenario_form = Scenario
     turning = 0.0
     """Seconds of a turn on the spot."""
 

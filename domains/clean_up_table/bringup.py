@@ -42,6 +42,7 @@ class TableSimulation(Simulation):
     """
 
     reads_scenarios = True
+    scenario_form = Scenario
     lasts = True
 
     def __init__(self, setup: Setup) -> None:

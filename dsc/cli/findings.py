@@ -45,7 +45,7 @@ def _with_codes(found: Found, selection: str | None) -> Found:
 def _print(found: Found, form: Form, nothing: str) -> None:
     """Print findings; without findings, text for people is `nothing`."""
     if form == "json":
-        print_json([_as_data(file, finding) for file, finding in found])
+        print_json([as_data(file, finding) for file, finding in found])
     elif form == "sarif":
         print_json(_sarif(found))
     else:
@@ -69,7 +69,8 @@ def lines(found: Found) -> list[str]:
     return [f"{text} ({shared[key]} times)" if shared[key] > 1 else text for key, text in texts.items()]
 
 
-def _as_data(file: Path | str, finding: Finding) -> dict[str, Any]:
+def as_data(file: Path | str, finding: Finding) -> dict[str, Any]:
+    """Return a finding as JSON data, as `--json` prints it; `file` is the checked file or target."""
     error, place = finding.error, finding.place
     return {
         "file": (place.source if place else None) or str(file),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState
 from dsc.model.transitions import case_value
-from dsc.text.yaml import dump, load_document, path_of, read_file, read_model
+from dsc.text.yaml import Document, dump, load_document, path_of, read_file, read_model
 from knowledge_base.errors import InputError, Place, tolerated
 
 
@@ -22,7 +22,11 @@ def parse_plot(text: str, source: str | None = None) -> ActionPlot:
     Raises:
         InputError: the text is not a plot; the message has the place and the nearest valid key.
     """
-    document = load_document(text, source)
+    return plot_in(load_document(text, source))
+
+
+def plot_in(document: Document) -> ActionPlot:
+    """Return the plot in a YAML document; errors as for `parse_plot`."""
     if isinstance(document.data, Mapping) and "profile" in document.data and "plot" not in document.data:
         message = "this is a profile, not a plot; `dsc check` validates profiles"
         raise InputError(message, place=document.place(("profile",)))
@@ -109,9 +113,14 @@ _DECLARES = re.compile(r"""\bplot["']?\s*:\s*["']?([\w\-#.]+)""")
 
 
 class Neighbours:
-    """A cache of plot folders: each file is read once for all plots of its folder."""
+    """A cache of plot folders: each file is read once for all plots of its folder.
 
-    def __init__(self) -> None:
+    Args:
+        parse: returns the plot in a text with a source, as `parse_plot` does.
+    """
+
+    def __init__(self, parse: Callable[[str, str], ActionPlot] = parse_plot) -> None:
+        self._parse = parse
         self._folders: dict[Path, dict[Path, str | InputError]] = {}
         self._plots: dict[Path, ActionPlot | InputError] = {}
 
@@ -151,7 +160,7 @@ class Neighbours:
     def _plot(self, file: Path, text: str | InputError) -> ActionPlot | InputError:
         if file not in self._plots:
             try:
-                self._plots[file] = parse_plot(text, str(file)) if isinstance(text, str) else text
+                self._plots[file] = self._parse(text, str(file)) if isinstance(text, str) else text
             except InputError as error:
                 self._plots[file] = error
         return self._plots[file]

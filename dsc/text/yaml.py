@@ -105,8 +105,25 @@ class Document:
         return None
 
 
-def load_document(text: str, source: str | None = None) -> Document:
-    """Return the one YAML document in a text; `source` is the file name in messages.
+Span = tuple[int, int]
+"""Begin and end of a part of a text, as offsets in characters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spans:
+    """Spans of the parts of a YAML text by path, quotes included.
+
+    Attributes:
+        keys: the spans of the keys of mappings, by the path of the value.
+        values: the spans of the values; a mapping or list without brackets ends with its last part.
+    """
+
+    keys: dict[FormPath, Span] = field(default_factory=dict)
+    values: dict[FormPath, Span] = field(default_factory=dict)
+
+
+def load_document(text: str, source: str | None = None, spans: Spans | None = None) -> Document:
+    """Return the one YAML document in a text; `source` is the file name in messages, and `spans` receives all spans.
 
     Raises:
         ParseError: the text is not YAML, or uses a refused feature.
@@ -115,7 +132,7 @@ def load_document(text: str, source: str | None = None) -> Document:
     require_text(text, "the YAML text")
     check_size(len(text), Place(source))
     places: dict[FormPath, Place] = {(): Place(source, 1)}
-    reader = _Reader(text, source, places)
+    reader = _Reader(text, source, places, spans)
     try:
         return Document(reader.document(), places)
     except MarkedYAMLError as error:
@@ -141,13 +158,15 @@ def dump(data: Mapping[str, Any]) -> str:
 class _Reader:
     """Builder of one document's data from the parser's events."""
 
-    def __init__(self, text: str, source: str | None, places: dict[FormPath, Place]) -> None:
-        yaml = YAML(typ="safe", pure=True)
+    def __init__(self, text: str, source: str | None, places: dict[FormPath, Place], spans: Spans | None) -> None:
+        yaml = YAML(typ="safe", pure=True, plug_ins=[])
         yaml.Scanner = _Scanner
         self._events: Iterator[Any] = yaml.parse(text)
         self._source = source
         self._places = places
+        self._spans = spans
         self._parts = 0
+        self._end = 0
 
     def document(self) -> Any:
         data, begun = None, False
@@ -164,11 +183,19 @@ class _Reader:
 
     def _node(self, event: Event, path: FormPath) -> Any:
         self._refuse_surprises(event, path)
+        data: Any
+        begin = event.start_mark.index
         if isinstance(event, MappingStartEvent):
-            return self._mapping(path)
-        if isinstance(event, SequenceStartEvent):
-            return self._sequence(path)
-        return self._scalar(event)
+            data = self._mapping(path)
+        elif isinstance(event, SequenceStartEvent):
+            data = self._sequence(path)
+        else:
+            data = self._scalar(event)
+            self._end_of(event)
+            begin = min(begin, self._end)  # an empty value has the mark of the next part
+        if self._spans is not None:
+            self._spans.values[path] = (begin, self._end)
+        return data
 
     def _mapping(self, path: FormPath) -> dict[str | int, Any]:
         found: dict[str | int, Any] = {}
@@ -180,8 +207,17 @@ class _Reader:
                 message = f'not readable as YAML: duplicate key "{event.value}", which is in line {first} too'
                 raise ParseError(message, place=self._place(event))
             self._places[here] = self._place(event)
+            self._end_of(event)
+            if self._spans is not None:
+                self._spans.keys[here] = (event.start_mark.index, event.end_mark.index)
             found[name] = self._node(next(self._events), here)
+        self._end_of(event)
         return found
+
+    def _end_of(self, event: Any) -> None:
+        """Note the end of a part; an empty value, and a list or mapping without brackets, end with the part before."""
+        if event.end_mark.index > event.start_mark.index:
+            self._end = event.end_mark.index
 
     def _key(self, event: Event, path: FormPath) -> str | int:
         """Return a key; only the cases of a `select` may be numbers or truth values, any other key must be a name."""
@@ -201,6 +237,7 @@ class _Reader:
             here = (*path, len(found))
             self._places[here] = self._place(event)
             found.append(self._node(event, here))
+        self._end_of(event)
         return found
 
     def _scalar(self, event: Any) -> Any:

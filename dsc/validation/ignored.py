@@ -10,6 +10,7 @@ from pathlib import Path
 from dsc.codes import CODES
 from dsc.errors import Finding
 from knowledge_base.errors import InputError, Place, UnknownNameError
+from knowledge_base.pddl.unsaved_texts import unsaved_text
 
 _COMMENT = re.compile(r"^(?P<code>.*?)[#;]\s*dsc:\s*ignore\[(?P<codes>[^\]]*)\](?P<reason>.*)$")
 _EXAMPLE = "`# dsc: ignore[known-object] the camera finds it`"
@@ -72,8 +73,9 @@ def without_ignored(findings: Iterable[Finding], files: Iterable[Path]) -> list[
 
 
 def _comments(file: Path, source: str) -> Iterator[Ignore]:
+    unsaved = unsaved_text(file)
     try:
-        lines = file.read_text("utf-8").splitlines()
+        lines = (file.read_text("utf-8") if unsaved is None else unsaved).splitlines()
     except (OSError, UnicodeDecodeError):  # another finding reports it
         return
     for number, line in enumerate(lines, 1):

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from knowledge_base.errors import InputError, ParseError, Place
+from knowledge_base.pddl.unsaved_texts import unsaved_text
 
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of a PDDL file in bytes: about a million facts.
@@ -93,6 +94,12 @@ def read_lines(path: Path, most: int, longest: int, errors: str = "strict") -> I
 
 def _pieces(path: Path, most: int) -> Iterator[bytes]:
     """Yield the bytes of a file, device or pipe in pieces; errors as for `read_text`."""
+    unsaved = unsaved_text(path)
+    if unsaved is not None:
+        data = unsaved.encode("utf-8", "surrogatepass")
+        require_size(len(data), most, str(path))
+        yield data
+        return
     try:
         # A blocking `open` of a pipe would wait for its writer.
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)

@@ -26,6 +26,7 @@ from planning.cli.check import check_command
 from planning.cli.deployment import app as deployment_app
 from planning.cli.doctor import doctor_command
 from planning.cli.host import host_command
+from planning.cli.lsp import lsp_command
 from planning.cli.new import new_command
 from planning.cli.run import components_of_target, robot_knowledge, run_command
 from planning.cli.wiring import wiring_command
@@ -74,6 +75,7 @@ app.command("wiring")(wiring_command)
 app.command("plan")(plan_command)
 app.command("doctor")(doctor_command)
 app.command("bundles")(bundles_command)
+app.command("lsp")(lsp_command)
 app.command("view")(view_command)
 register_reader(robot_knowledge)
 register_relations(kept_relations)

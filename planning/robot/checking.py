@@ -66,6 +66,7 @@ from planning.robot.project_files import (
     text_of,
     without_consequences,
 )
+from planning.robot.scenario_files import check_scenarios
 from planning.robot.simulation import Setup, Simulation
 from planning.robot.soundness import check_implementations, interfaces
 from planning.robot.targets import bundle_at
@@ -401,6 +402,7 @@ class _Robot:
             choose_sources(self._components, wiring_of(self._bundles))
         with tolerated():
             configure(self._components)
+        check_scenarios(self._bundle, self._files)
         for file in self._profiles():
             with tolerated():
                 profile = load_profile(file)

@@ -17,6 +17,7 @@ from dsc.validation import review_plot, validate_plot
 from knowledge_base.errors import InputError, Place, collecting, tolerated
 from knowledge_base.pddl import read_problem
 from knowledge_base.pddl.domain_text import read_domain
+from knowledge_base.pddl.unsaved_texts import unsaved_text
 from knowledge_base.world.schema import Schema
 from planning.model.domain import PlanningDomain
 from planning.robot.soundness import IMPLEMENTED
@@ -152,6 +153,9 @@ def _declared_near(folder: Path, schema: Schema) -> dict[str, str] | None:
 
 def text_of(file: Path) -> str:
     """Return the text of a file; nothing if it is not readable."""
+    unsaved = unsaved_text(file)
+    if unsaved is not None:
+        return unsaved
     try:
         return file.read_text("utf-8")
     except (OSError, UnicodeDecodeError):

@@ -16,6 +16,8 @@ from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from dsc.sequencer.run_end import RunEnd
     from dsc.trace import Record, Trace
     from knowledge_base.store import KnowledgeBase
@@ -77,6 +79,7 @@ class Simulation(ABC):
         chance: the chance of a fault per skill call, in [0, 1].
         fired: the faults that happened, in order.
         reads_scenarios: whether `setup.scenario` may name a file.
+        scenario_form: the class of scenarios, a pydantic model, whose keys editors complete; `None` without one.
         lasts: whether the world survives a crash of the robot program. Such a world keeps its state and the ids of
             executed actions next to `setup.store`, and loads both if `setup.resumes`. Without `lasts`, a kept run can
             be inspected, but not resumed.
@@ -86,6 +89,7 @@ class Simulation(ABC):
     """
 
     reads_scenarios: ClassVar[bool] = False
+    scenario_form: ClassVar[type[BaseModel] | None] = None
     lasts: ClassVar[bool] = False
 
     def __init__(self, setup: Setup) -> None:

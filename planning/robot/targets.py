@@ -68,7 +68,7 @@ def full_target(target: str) -> str:
 
 
 def _of_folder(folder: Path) -> object:
-    points = _entry_points(folder)
+    points = entry_points_of(folder)
     for inside in (folder / "src", folder):
         if inside.is_dir() and str(inside.resolve()) not in sys.path:
             sys.path.insert(0, str(inside.resolve()))
@@ -85,7 +85,7 @@ def _of_folder(folder: Path) -> object:
     raise InputError(message, place=Place(str(folder)))
 
 
-def _entry_points(folder: Path) -> Mapping[str, str]:
+def entry_points_of(folder: Path) -> Mapping[str, str]:
     """Return the entry points `GROUP` of the folder's `pyproject.toml`; the project need not be installed."""
     file = folder / "pyproject.toml"
     if not file.is_file():

@@ -1,0 +1,1 @@
+"""Help for editors: findings, completion, hover, definitions and renames of plots, profiles and domains (S1.16)."""
