@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-long test-engines test-all check types limits conformance oracle-trees sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
-.PHONY: bench-startup bench-broken bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-choice bench-learned-costs bench-transforms bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
+.PHONY: bench-startup bench-broken bench-editor bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-choice bench-learned-costs bench-transforms bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -163,6 +163,9 @@ corrupt-stores: $(VENV)/.test   ## stores damaged in every way: does any reader 
 
 bench-startup: $(VENV)/.run   ## what `dsc --help` costs, as a ratio to a bare interpreter
 	$(BIN)/python benchmarks/startup.py
+
+bench-editor: $(VENV)/.run   ## the time from an edit of a plot with 1,000 lines to its diagnostics
+	$(BIN)/python benchmarks/editor.py
 
 bench-broken: $(VENV)/.run   ## how long the error in a broken plot takes, median and longest (RUNS=N)
 	$(BIN)/python benchmarks/broken_plots.py --runs $(or $(RUNS),3)

@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 
 from lsprotocol import types as lsp
+from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 
+from dsc.editing import navigation
 from dsc.editing.checks import Checks
+from dsc.editing.completion import Proposal, complete, word_before
 from dsc.editing.diagnostics import Diagnostic
-from dsc.editing.lines import Spot
+from dsc.editing.lines import Lines, Spot
 from dsc.editing.projects import Examiner, Project
+from dsc.editing.workspace import View, Workspace, text_of
+from knowledge_base.errors import InputError
 
 _SOURCE = "dsc"
 _LEVELS = {"error": lsp.DiagnosticSeverity.Error, "warning": lsp.DiagnosticSeverity.Warning}
+
+_ITEM_KINDS = {
+    "key": lsp.CompletionItemKind.Property, "state": lsp.CompletionItemKind.EnumMember,
+    "plot": lsp.CompletionItemKind.Module, "skill": lsp.CompletionItemKind.Function,
+    "variable": lsp.CompletionItemKind.Variable, "event": lsp.CompletionItemKind.Event,
+    "relation": lsp.CompletionItemKind.Function, "type": lsp.CompletionItemKind.Class,
+}  # fmt: skip
+_SYMBOL_KINDS = {
+    "state": lsp.SymbolKind.Class, "variable": lsp.SymbolKind.Variable, "action": lsp.SymbolKind.Function,
+    "relation": lsp.SymbolKind.Boolean, "type": lsp.SymbolKind.Struct,
+}  # fmt: skip
+_Asking = lsp.CompletionParams | lsp.HoverParams | lsp.DefinitionParams | lsp.ReferenceParams | lsp.RenameParams
 
 
 class Server(LanguageServer):
@@ -34,7 +51,17 @@ class Server(LanguageServer):
         super().__init__("dsc", version("dynamic-state-charts"))
         self.checks = Checks(find, examiner.examine, self._publish, self._report)
         self.findings_page = findings_page
+        self._workspace = Workspace()
         add_text_features(self)
+        add_answers(self)
+
+    def view(self, file: Path) -> View:
+        """Return the page of a file, with the pages and facts of its project."""
+        texts, project = self.checks.texts, self.checks.project(file)
+        page = self._workspace.page(file, texts.get(file, "") or text_of(file))
+        root = file.parent if project is None else project.root
+        pages = [page] if project is None else self._workspace.pages(root, texts)
+        return View(page, tuple(pages), self.checks.facts(file), root)
 
     def _publish(self, file: Path, version: int | None, found: list[Diagnostic]) -> None:
         items = [_diagnostic(one, self._page(file)) for one in found]
@@ -75,6 +102,107 @@ def add_text_features(server: Server) -> None:
     @server.feature(lsp.SHUTDOWN)
     async def stop(_: None) -> None:
         await server.checks.stop()
+
+
+def add_answers(server: Server) -> None:
+    """Let the server answer questions about positions in the editor's texts."""
+
+    def question(given: _Asking) -> tuple[View, int]:
+        view = server.view(path_of(given.text_document.uri))
+        return view, Lines(view.page.text).offset(Spot(given.position.line, given.position.character))
+
+    @server.feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=[" ", "(", "?", "{", "."]))
+    def answer_completion(given: lsp.CompletionParams) -> lsp.CompletionList:
+        view, offset = question(given)
+        return lsp.CompletionList(is_incomplete=False, items=_items(complete(view, offset), view.page.text, offset))
+
+    @server.feature(lsp.TEXT_DOCUMENT_HOVER)
+    def answer_hover(given: lsp.HoverParams) -> lsp.Hover | None:
+        text = navigation.hover(*question(given))
+        return lsp.Hover(lsp.MarkupContent(lsp.MarkupKind.Markdown, text)) if text else None
+
+    @server.feature(lsp.TEXT_DOCUMENT_DEFINITION)
+    def answer_definition(given: lsp.DefinitionParams) -> list[lsp.Location]:
+        return _locations(navigation.definitions(*question(given)), server.checks.texts)
+
+    @server.feature(lsp.TEXT_DOCUMENT_REFERENCES)
+    def answer_references(given: lsp.ReferenceParams) -> list[lsp.Location]:
+        return _locations(navigation.references(*question(given)), server.checks.texts)
+
+    @server.feature(lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
+    def answer_symbols(given: lsp.DocumentSymbolParams) -> list[lsp.DocumentSymbol]:
+        page = server.view(path_of(given.text_document.uri)).page
+        return [_symbol(one, Lines(page.text)) for one in navigation.symbols(page)]
+
+    @server.feature(lsp.TEXT_DOCUMENT_RENAME)
+    def answer_rename(given: lsp.RenameParams) -> lsp.WorkspaceEdit:
+        try:
+            found = navigation.rename(*question(given), given.new_name)
+        except InputError as error:
+            raise JsonRpcInvalidParams(str(error)) from None
+        if found.in_python:
+            places = ", ".join(f"{file}:{line}" for file, line in found.in_python)
+            line = f"Python code also has this name, and is not changed: {places}"
+            server.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, line))
+        changes: dict[str, list[lsp.TextEdit]] = {}
+        for place in _locations(found.edits, server.checks.texts):
+            changes.setdefault(place.uri, []).append(lsp.TextEdit(place.range, given.new_name.removeprefix("?")))
+        return lsp.WorkspaceEdit(changes=changes)
+
+    @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions([lsp.CodeActionKind.QuickFix]))
+    def answer_fixes(given: lsp.CodeActionParams) -> list[lsp.CodeAction]:
+        return [fix for one in given.context.diagnostics for fix in _fixes(given.text_document.uri, one)]
+
+
+def _fixes(uri: str, found: lsp.Diagnostic) -> Iterator[lsp.CodeAction]:
+    """Yield the quick fix that writes the nearest valid name, if the diagnostic has one."""
+    data = found.data if isinstance(found.data, dict) else {}
+    meant = data.get("nearest")
+    if found.source == _SOURCE and meant:
+        edit = lsp.WorkspaceEdit(changes={uri: [lsp.TextEdit(found.range, str(meant))]})
+        title, kind = f"Write '{meant}'", lsp.CodeActionKind.QuickFix
+        yield lsp.CodeAction(title, kind, [found], is_preferred=True, edit=edit)
+
+
+def _items(proposals: Iterable[Proposal], text: str, offset: int) -> list[lsp.CompletionItem]:
+    """Return completion items that replace the word before the cursor."""
+    begin = offset - len(word_before(text, offset))
+    lines = Lines(text)
+    around = lsp.Range(_position(lines.spot(begin)), _position(lines.spot(offset)))
+    return [
+        lsp.CompletionItem(
+            one.label,
+            kind=_ITEM_KINDS.get(one.kind, lsp.CompletionItemKind.Value),
+            detail=one.kind,
+            documentation=one.about or None,
+            text_edit=lsp.TextEdit(around, one.label),
+        )
+        for one in proposals
+    ]
+
+
+def _locations(ranges: Iterable[navigation.Range], texts: Mapping[Path, str]) -> list[lsp.Location]:
+    found = []
+    for one in ranges:
+        if one.line is None:
+            lines = Lines(texts[one.file] if one.file in texts else text_of(one.file))
+            begin, end = _position(lines.spot(one.begin)), _position(lines.spot(one.end))
+        else:
+            begin = end = lsp.Position(one.line, 0)
+        found.append(lsp.Location(uri_of(one.file), lsp.Range(begin, end)))
+    return found
+
+
+def _symbol(one: navigation.Symbol, lines: Lines) -> lsp.DocumentSymbol:
+    begin, end, first, last = (_position(lines.spot(at)) for at in (one.begin, one.end, one.name_begin, one.name_end))
+    return lsp.DocumentSymbol(
+        one.name,
+        _SYMBOL_KINDS.get(one.kind, lsp.SymbolKind.Object),
+        lsp.Range(begin, end),
+        lsp.Range(first, last),
+        detail=one.kind,
+        children=[_symbol(each, lines) for each in one.inside],
+    )
 
 
 def path_of(uri: str) -> Path:

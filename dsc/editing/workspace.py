@@ -1,0 +1,148 @@
+"""The texts of a project, open or on disk, with the names in each."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dsc.editing.kinds import Kind, kind_of
+from dsc.editing.names import Occurrence, plot_names, profile_names
+from dsc.editing.pddl_names import pddl_names
+from dsc.editing.project_facts import ProjectFacts
+from dsc.text.incremental import IncrementalReader
+from dsc.text.yaml import Spans
+from knowledge_base.errors import InputError
+
+_SKIPPED = frozenset({"build", "dist", "node_modules", "site-packages", "__pycache__"})
+_ENDINGS = frozenset({".yaml", ".yml", ".pddl"})
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A text with its names.
+
+    Attributes:
+        file: the file of the text.
+        text: the text, of an editor or from disk.
+        kind: the kind of the file.
+        names: the names in the text; of half-written YAML, those of its last version without a mistake.
+        data: the content of YAML, of the same version as the names.
+        spans: the spans of the content of YAML.
+        fresh: whether the names are of this text.
+    """
+
+    file: Path
+    text: str
+    kind: Kind
+    names: tuple[Occurrence, ...]
+    data: Any
+    spans: Spans
+    fresh: bool
+
+    @property
+    def plot(self) -> str:
+        """The name of the plot in the text; empty for other files."""
+        return str(self.data.get("plot", "")) if isinstance(self.data, dict) else ""
+
+    def name_at(self, offset: int) -> Occurrence | None:
+        """Return the name at an offset; of several, the definition."""
+        found = [one for one in self.names if one.begin <= offset <= one.end] if self.fresh else []
+        return max(found, key=lambda one: one.defines, default=None)
+
+
+class Workspace:
+    """The pages of projects; each text is read once."""
+
+    def __init__(self) -> None:
+        self._reader = IncrementalReader()
+        self._pages: dict[Path, Page] = {}
+
+    def page(self, file: Path, text: str) -> Page:
+        """Return the page of a file with this text."""
+        known = self._pages.get(file)
+        if known is None or known.text != text:
+            known = self._pages[file] = self._read(file, text, known)
+        return known
+
+    def pages(self, root: Path, texts: Mapping[Path, str]) -> list[Page]:
+        """Return the pages of all YAML and PDDL files in a folder.
+
+        Args:
+            root: the folder.
+            texts: the texts of open files, in place of those on disk.
+        """
+        return [
+            self.page(file, texts[file] if file in texts else text_of(file)) for file in sorted(_files(root, texts))
+        ]
+
+    def _read(self, file: Path, text: str, before: Page | None) -> Page:
+        kind = kind_of(file, text)
+        if kind is Kind.PDDL:
+            return Page(file, text, kind, tuple(pddl_names(text)), None, Spans(), fresh=True)
+        try:
+            document, spans = self._reader.load(text, str(file))
+        except InputError:
+            names: tuple[Occurrence, ...] = ()
+            data, old = None, Spans()
+            if before is not None:
+                names, data, old = before.names, before.data, before.spans
+            return Page(file, text, kind, names, data, old, fresh=False)
+        names = tuple(plot_names(document, spans, text) if kind is Kind.PLOT else ())
+        names = tuple(profile_names(spans)) if kind is Kind.PROFILE else names
+        return Page(file, text, kind, names, document.data, spans, fresh=True)
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The material of an answer: the page of the cursor, the pages of its project, and the facts of its robot."""
+
+    page: Page
+    pages: tuple[Page, ...]
+    facts: ProjectFacts
+    root: Path
+
+    def names(self) -> Iterator[tuple[Page, Occurrence]]:
+        """Yield all names of the project with their pages."""
+        return ((page, one) for page in self.pages for one in page.names)
+
+    def definitions(self, kind: str, scope: str | None = None) -> dict[str, str]:
+        """Return the defined names of a kind with a line about each; of one scope, or of all."""
+        return {
+            one.name: one.about
+            for _, one in self.names()
+            if one.kind == kind and one.defines and (scope is None or one.scope == scope)
+        }
+
+
+def text_of(file: Path) -> str:
+    """Return the text of a file on disk; nothing if it is not readable."""
+    try:
+        return file.read_text("utf-8")
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
+def places_in_python(root: Path, name: str) -> list[tuple[Path, int]]:
+    """Return file and line, from 1, of each place in a folder's Python code that has a name in quotes."""
+    quoted = re.compile(rf"""["']{re.escape(name)}["']""")
+    return [
+        (file, number)
+        for file in sorted(_walk(root, {".py"}))
+        for number, line in enumerate(text_of(file).splitlines(), 1)
+        if quoted.search(line)
+    ]
+
+
+def _files(root: Path, texts: Mapping[Path, str]) -> set[Path]:
+    opened = {file for file in texts if file.suffix in _ENDINGS and root in file.parents}
+    return opened | set(_walk(root, _ENDINGS))
+
+
+def _walk(root: Path, endings: set[str] | frozenset[str]) -> Iterator[Path]:
+    for folder, folders, files in os.walk(root):
+        folders[:] = [one for one in folders if not one.startswith(".") and one not in _SKIPPED]
+        yield from (Path(folder) / one for one in files if Path(one).suffix in endings)
