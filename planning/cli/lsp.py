@@ -16,7 +16,7 @@ def lsp_command() -> None:
     try:
         from dsc.editing.server import Server
     except ModuleNotFoundError as error:
-        if error.name not in {"pygls", "lsprotocol"}:
+        if (error.name or "").partition(".")[0] not in {"pygls", "lsprotocol"}:
             raise
         message = "dsc lsp needs pygls: pip install 'dynamic-state-charts[edit]'"
         raise InputError(message, found=error.name) from None
