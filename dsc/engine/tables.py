@@ -357,7 +357,7 @@ class _Layout:
             raise SchemaError(f"targets of a transition of '{node.name}' exclude each other", found=node.name)
         guard, effect, bind = transition.guard, transition.effect, None
         if transition.bind or transition.bind_all:
-            effect = tuple([self._typed(action) for action in effect])
+            effect = tuple([self._with_types(action) for action in effect])
             first = effect[0]
             if isinstance(first, Bind) and not first.every:
                 guard, bind = first.condition, first
@@ -368,7 +368,7 @@ class _Layout:
             transition.keep and node.holds_plot and targets == (node.index,), bind=bind,
         )  # fmt: skip
 
-    def _typed(self, action: Internal) -> Internal:
+    def _with_types(self, action: Internal) -> Internal:
         return with_types(action, self._types, self._records) if isinstance(action, Bind) else action
 
     def _together(self, targets: Sequence[int]) -> bool:

@@ -55,14 +55,14 @@ def as_format_4(tree: Element) -> None:
         former = _FORMER_PORTS.get(kind, {})
         attributes = {former.get(name, name): text for name, text in element.attributes.items()}
         if element.name in {"SubTree", "SubTreePlus"}:
-            attributes = _remapped(element.name, attributes)
+            attributes = _remap(element.name, attributes)
         if explicit in FORMER_KINDS:
             attributes["ID"] = FORMER_KINDS[explicit]
         element.name = FORMER_KINDS.get(element.name, element.name)
         element.attributes = attributes
 
 
-def _remapped(kind: str, attributes: Mapping[str, str]) -> dict[str, str]:
+def _remap(kind: str, attributes: Mapping[str, str]) -> dict[str, str]:
     """Return the attributes of a subtree in format 4; `SubTree` of format 3 has keys without braces."""
     found: dict[str, str] = {}
     for name, text in attributes.items():
