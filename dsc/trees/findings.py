@@ -27,7 +27,8 @@ def check_trees(path: Path | str) -> list[Finding]:
                 raise
             errors.append(error)
     found = [Finding(error, "behaviour-tree") for error in errors]
-    found += [] if file is None else _warnings(file)
+    refused = {error.place for error in errors}
+    found += [] if file is None else [one for one in _warnings(file) if one.place not in refused]
     return sorted(found, key=lambda one: (one.place and one.place.line) or 0)
 
 

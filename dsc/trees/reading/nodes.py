@@ -11,7 +11,7 @@ from dsc.trees.kinds import KINDS, NO_COUNTERPART, SCRIPTS
 from dsc.trees.model import Node, NodeModel, Role
 from dsc.trees.reading.attributes import require_attribute
 from dsc.trees.reading.format_3 import FORMER_KINDS
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, UnknownNameError, tolerated
 
 EXPLICIT: Mapping[str, Role] = {
     "Action": "action",
@@ -34,7 +34,9 @@ def read_node(element: Element, models: Models) -> Node:
         UnknownNameError: the kind of node does not exist.
         InputError: the kind has no counterpart here, or an attribute is missing or not allowed.
     """
-    kind, role = _kind(element, models)
+    kind, role = element.name, cast("Role", "leaf")
+    with tolerated():  # a check reports all unknown kinds of a file
+        kind, role = _kind(element, models)
     attributes = element.attributes
     tree = require_attribute(element, "ID") if role == "subtree" else ""
     ports = {name: text for name, text in attributes.items() if name not in _RESERVED}

@@ -73,3 +73,22 @@ def test_a_file_is_shown_as_json_and_as_xml():
     assert [one["tree"] for one in trees] == ["Serve", "Fetch"]
     assert trees[0]["root"]["children"][0]["role"] == "condition"
     assert parse_trees(dsc("show", FILES / "format_3.xml", "--xml").stdout) == load_trees(FILES / "format_3.xml")
+
+
+def test_all_kinds_without_a_counterpart_are_reported(tmp_path):
+    file = tmp_path / "navigate.xml"
+    file.write_text(
+        """<root main_tree_to_execute="Main"><BehaviorTree ID="Main">
+<RecoveryNode number_of_retries="6">
+<PipelineSequence>
+<RateController hz="1.0"><ComputePathToPose goal="{goal}" path="{path}"/></RateController>
+<FollowPath path="{path}"/>
+</PipelineSequence>
+<ReactiveFallback><GoalUpdated/><Wait wait_duration="5"/></ReactiveFallback>
+</RecoveryNode>
+</BehaviorTree></root>""",
+        "utf-8",
+    )
+    found = json.loads(dsc("check", file, "--json").stdout)
+    lines = [(one["line"], one["found"]) for one in found]
+    assert lines == [(2, "RecoveryNode"), (3, "PipelineSequence"), (4, "RateController")]
