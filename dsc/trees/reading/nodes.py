@@ -34,7 +34,8 @@ def read_node(element: Element, models: Models) -> Node:
         UnknownNameError: the kind of node does not exist.
         InputError: the kind has no counterpart here, or an attribute is missing or not allowed.
     """
-    kind, role = element.name, cast("Role", "leaf")
+    role: Role = "leaf"
+    kind = element.name
     with tolerated():  # a check reports all unknown kinds of a file
         kind, role = _kind(element, models)
     attributes = element.attributes
