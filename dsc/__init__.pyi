@@ -5,6 +5,7 @@ from dsc.calls import SkillCall as SkillCall
 from dsc.calls import Status as Status
 from dsc.chance import uniform as uniform
 from dsc.components.assembly import component_of as component_of
+from dsc.components.checks import Series as Series
 from dsc.components.clients import EventClient as EventClient
 from dsc.components.clients import ParameterClient as ParameterClient
 from dsc.components.clients import QueryClient as QueryClient

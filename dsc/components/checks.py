@@ -1,6 +1,7 @@
 """Checks of pushed values: functions with names that conditions at the source use (S2.4, S2.18).
 
-A component lists its own checks in `checks`; a name of Python such as `near_edge` is written `near-edge` in conditions.
+A port has further checks: `Push(values, checks=(near_edge,))`. A name of Python such as `near_edge` is written
+`near-edge` in conditions.
 """
 
 from __future__ import annotations

@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 
 from dsc.annotations import Namespace, class_statement, evaluated
 from dsc.calls import Ended, SkillCall, Status
-from dsc.components.checks import Check
 from dsc.components.demands import Demand, read_demands
 from dsc.components.interface import Interface
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
@@ -47,7 +46,6 @@ class ComponentHooks:
             it maps each mode to the modes that may follow. From and to `neutral`, each transition is permitted.
         device_errors: exceptions that report a failed device, e.g. `(OSError,)`: a skill that raises one ends with
             `skill_error`, and a hook leads to FatalError. Every other exception is a programming error.
-        checks: the component's own checks for conditions on its pushed values, see `dsc.components.checks`.
         period: seconds between two calls of `step`; `None` without such steps.
         needs: for each mode, a tuple of names of required components, or of the component's required ports, whose
             providers it then needs; the key `ALWAYS` applies in every mode.
@@ -65,7 +63,6 @@ class ComponentHooks:
     device_errors: ClassVar[tuple[type[BaseException], ...]] = ()
     needs: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     demands: ClassVar[Mapping[str, Demand]] = {}
-    checks: ClassVar[tuple[Check, ...]] = ()
     period: float | None = None
 
     parameters: Parameters
@@ -200,7 +197,9 @@ class Component(ComponentHooks, RestartHooks):
         self.requirements: dict[str, Requirement] = {}
         for port, declared in self._ports.items():
             if isinstance(declared, Push):
-                self.pushes[port] = Push(declared.values, declared.period, f"{self.name}.{port}", self.life)
+                self.pushes[port] = Push(
+                    declared.values, declared.period, f"{self.name}.{port}", self.life, declared.checks
+                )
                 setattr(self, port, self.pushes[port])
             else:
                 self.requirements[port] = declared.of(self.name, port)

@@ -6,10 +6,11 @@ import asyncio
 import json
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from typing import Any
 
+from dsc.components.checks import Check
 from dsc.components.frames import encoded
 from dsc.components.life_cycle import Life, LifeCycle
 from dsc.components.requirement import Provider, Requirement
@@ -32,22 +33,30 @@ class Push:
         period: seconds between pushes of the newest values (*push timed*); without a period, each `put` pushes.
         name: `component.port`, for messages; the component sets it.
         life: the component's life cycle; in FatalError and Shutdown, a timed port does not push.
+        checks: further checks for conditions on the values, see `dsc.components.checks`.
 
     Attributes:
         values: the names and types of the values.
         period: seconds between pushes, or `None`.
+        checks: the further checks.
 
     Raises:
         InputError: the period is not a positive number, or the values are not names with types.
     """
 
     def __init__(
-        self, values: Values, period: float | None = None, name: str = "", life: LifeCycle | None = None
+        self,
+        values: Values,
+        period: float | None = None,
+        name: str = "",
+        life: LifeCycle | None = None,
+        checks: Iterable[Check] = (),
     ) -> None:
         self.values = declared_values(values, "a push port")
         if period is not None and not (isinstance(period, int | float) and 0 < period < math.inf):
             raise InputError(f"the period of a push port is a positive number of seconds, not {shown(period)}")
         self.period = period
+        self.checks = tuple(checks)
         self._name = name
         self._life = life
         self._newest: bytes | None = None

@@ -210,7 +210,7 @@ async def watch(component: Any, _: SkillBody, call: SkillCall[Any], arguments: M
     """Report each change of a condition's truth until the action is cancelled, or an evaluation fails."""
     failed: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
     options = {name: value for name, value in arguments.items() if name not in {"condition", "values"}}
-    checks = {**LIBRARY, **by_name(*component.checks)}
+    checks = {**LIBRARY, **by_name(*(check for port in component.pushes.values() for check in port.checks))}
     condition = ValueCondition(arguments["condition"], component.pushes, checks, arguments.get("values", {}), **options)
     condition.listen(
         lambda truth, values: call.report(BecameTrue(values=values) if truth else BecameFalse(values=values)),

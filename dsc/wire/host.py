@@ -358,7 +358,7 @@ class HostedActions:
 
     def _tell(self, action_id: str, action: _Action, form: dict[str, Any]) -> None:
         action.messages.append(form)
-        self._endpoint.push(action.client, f"news {action_id}", len(action.messages))
+        self._endpoint.push(action.client, f"news {action_id}", {"n": len(action.messages), "message": form})
 
     async def _execute(self, said: dict[str, Any], action: _Action, reports: Reports) -> None:
         end: dict[str, Any]

@@ -27,6 +27,7 @@ from dsc.errors import NoAnswerError, PreemptedError, ProgrammingError, RefusedE
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
 from dsc.skills import SkillSignature
+from dsc.wire.action_news import ActionNews
 from dsc.wire.endpoint import AGAIN, RESOLUTION, WITHIN, Endpoint, Transport
 from dsc.wire.heartbeat import Heartbeat
 from dsc.wire.host import CONDITION, outcome_of
@@ -37,6 +38,8 @@ from knowledge_base.language.checking.inputs import require_text
 
 WATCH = 1.0
 """Seconds between queries of an action's state."""
+MOST_UNACKNOWLEDGED = 1_000
+"""Number of messages about an action that a client receives before it acknowledges them."""
 SILENCE = 3.0
 """Seconds after which a host without an answer, or without any message, counts as failed."""
 
@@ -300,8 +303,8 @@ class RemoteComponent(Component):
             ProgrammingError: the skill's code failed there.
             NoAnswerError: the host does not answer.
         """
-        news = asyncio.Event()
-        self._endpoint.receive(f"news {call.action_id}", lambda _, __: news.set())
+        news = ActionNews(self.name)
+        self._endpoint.receive(f"news {call.action_id}", news.receive)
         seconds = call.remaining if call.remaining < float("inf") else None
         try:
             said: dict[str, Any] = {
@@ -319,12 +322,19 @@ class RemoteComponent(Component):
         finally:
             self._endpoint.deafen(f"news {call.action_id}")
 
-    async def _end_of(self, call: SkillCall[Any], news: asyncio.Event) -> Outcome:
-        """Pass the action's reports to `call.report`, and return its outcome."""
-        received = 0
+    async def _end_of(self, call: SkillCall[Any], news: ActionNews) -> Outcome:
+        """Pass the action's reports to `call.report`, and return its outcome.
+
+        The host pushes each message. The question `how` acknowledges the messages, and gets those that were lost.
+        """
+        loop = asyncio.get_running_loop()
+        received, acknowledged, asked_at = 0, 0, -math.inf
         while True:
-            news.clear()
-            messages = await self._ask_about(call.action_id, "how", heard=received)
+            messages: list[Any] | None = news.take_after(received)
+            is_due = loop.time() - asked_at >= WATCH or received - acknowledged >= MOST_UNACKNOWLEDGED
+            if not messages or is_due:
+                messages = await self._ask_about(call.action_id, "how", heard=received)
+                acknowledged, asked_at = received, loop.time()
             if messages is None:
                 raise RefusedError(f"'{self.name}' does not know '{call.action_id}' any longer")
             for form in messages:
@@ -341,9 +351,7 @@ class RemoteComponent(Component):
                     raise RefusedError(text_of(form["failed"], str))
                 else:
                     return outcome_of(form["ended"])
-            if not messages:
-                with suppress(TimeoutError):
-                    await asyncio.wait_for(news.wait(), WATCH)
+            await news.wait(WATCH)
 
     async def status(self, action_id: str, skill_name: str, arguments: Mapping[str, Any]) -> Status | Ended:  # noqa: ARG002
         """Return `RUNNING` if the host knows the action, also after its end; else `UNKNOWN`.

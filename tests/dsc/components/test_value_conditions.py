@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from typing import ClassVar
 
 import pytest
 from dsc_charts import plot
@@ -39,8 +38,7 @@ def beyond(value: Series, limit: float) -> bool:
 class Hand(Component):
     name = "hand"
     concurrent = True
-    checks: ClassVar = (beyond,)
-    pose = Push({"distance": "number", "xyz": "list of number"})
+    pose = Push({"distance": "number", "xyz": "list of number"}, checks=[beyond])
     force = Push({"z": "number", "label": "text"})
 
     def __init__(self, script=()) -> None:
@@ -209,7 +207,7 @@ def test_ten_thousand_updates_cost_frames_only_for_flips():
     flips = len(truths(some))
     assert len(truths(none)) == 1
     assert flips == 20
-    assert (some[2] - none[2]) / (flips - 1) < 5  # a notice, a question, its answer, and an acknowledgement
+    assert (some[2] - none[2]) / (flips - 1) < 2
 
 
 @given(

@@ -127,7 +127,7 @@ def test_whatever_arrives_the_host_answers_an_honest_caller_afterwards(frames):
             transport.deliver(sender, BROADCAST, frame)
             await asyncio.sleep(0.01)
         remote = await RemoteComponent.connect("robot", transport)
-        assert set(remote.skills()) == {"go", "exits", "closes", "cancels", "waits"}
+        assert set(remote.skills()) == {"go", "exits", "closes", "cancels", "waits", "watch_values"}
         assert await user.call("robot", "diagnose")
         assert subscription.value is None or isinstance(subscription.value, object)
         await host.close()
