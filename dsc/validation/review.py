@@ -159,7 +159,8 @@ def _transitions(subject: Subject) -> Iterator[Finding]:
                     which = f"transition on '{trigger}'" if here[len(path)] == "on" else "transition"
                     message = f"this {which} out of '{name}' is never taken: {why}"
                     yield subject.finding(here, "transitions", message, _REMEDY, level="warning")
-                guards.append(way.guard)
+                if not way.bind:  # else nothing may fulfil it
+                    guards.append(way.guard)
 
 
 def _never(condition: Expression | None, earlier: Sequence[Expression | None]) -> str | None:

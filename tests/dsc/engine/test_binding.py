@@ -4,6 +4,7 @@ import pytest
 
 from dsc import Component, Library, Outcome, SkillCall, parse_plot, skill, validate_plot
 from dsc.text.plot_files import plot_to_yaml
+from dsc.validation import review_plot
 from knowledge_base import Schema
 from planning import Robot
 
@@ -166,6 +167,12 @@ def test_mistakes_are_findings(transition, message):
     plot = parse_plot(f"{HEAD}states:\n  a: {{always: [{{to: b, {transition}}}, b]}}\n  b: {{final: true}}")
     found = validate_plot(plot, Library([plot]), SCHEMA)
     assert any(message in str(one) for one in found), found
+
+
+def test_a_transition_after_one_that_binds_is_taken_if_nothing_is_found():
+    plot = parse_plot(HEAD + "states:" + SERVE)
+    assert validate_plot(plot, Library([plot]), SCHEMA) == []
+    assert [str(one) for one in review_plot(plot, Library([plot])) if one.code == "transitions"] == []
 
 
 def test_order_without_bind_is_refused():
