@@ -149,7 +149,7 @@ def _nobody_waits() -> Iterator[None]:
         patch("dsc.cli.runs.until_interrupt", lambda viewer: None),
         patch("webbrowser.open", lambda url: True),
         patch("knowledge_base.cli.queries.time", SimpleNamespace(sleep=_interrupted, monotonic=time.monotonic)),
-        patch("sys.stdin", io.StringIO("")),
+        patch("sys.stdin", io.TextIOWrapper(io.BytesIO())),
         patch("sys.path", list(sys.path)),
     ):
         yield
