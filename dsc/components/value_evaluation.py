@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsc.components.checks import Check, Series
 from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.language.evaluation.terms import FOLD, ORDER, same
 from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
@@ -26,10 +26,6 @@ from knowledge_base.language.syntax.text import to_text
 
 SILENT = "silent"
 """Name of the check `(silent port seconds)`: nothing has come from a port for that time."""
-_COMPARE: Mapping[str, Callable[[Any, Any], bool]] = {
-    "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "=": operator.eq, "!=": operator.ne,
-}  # fmt: skip
-_COMPUTE = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 
 
 class ValueEvaluation:
@@ -77,11 +73,12 @@ class ValueEvaluation:
                 raise InputError(f"a condition on values has no quantifiers: {to_text(e)}", place=e.place)
 
     def _compares(self, compare: str, left: Any, right: Any, e: Comparison) -> bool:
-        if compare not in {"=", "!="}:
-            for one in (left, right):
-                if isinstance(one, bool) or not isinstance(one, int | float):
-                    raise InputError(f"{to_text(e)} compares numbers, not {one!r}", place=e.place)
-        return _COMPARE[compare](left, right)
+        if compare in {"=", "!="}:
+            return same(left, right) is (compare == "=")
+        for one in (left, right):
+            if isinstance(one, bool) or not isinstance(one, int | float):
+                raise InputError(f"{to_text(e)} compares numbers, not {one!r}", place=e.place)
+        return ORDER[compare](left, right)
 
     def _value(self, term: Term) -> Any:
         match term:
@@ -91,7 +88,7 @@ class ValueEvaluation:
                 return value
             case Variable(name):
                 return self._variable(name, term)
-            case Call("list", args):
+            case Call("list", args) | Arithmetic("geometry", args):
                 return [self._value(arg) for arg in args]
             case Call(name, args):
                 return self._call_check(name, args, term)
@@ -130,5 +127,5 @@ def _compute(sign: str, values: list[Any], term: Term) -> Any:
     for one in rest:
         if sign == "/" and one == 0:
             raise InputError(f"{to_text(term)} divides by zero", place=term.place)
-        first = _COMPUTE[sign](first, one)
+        first = FOLD[sign](first, one)
     return first

@@ -12,7 +12,7 @@ from dsc.editing.project_facts import ProjectFacts
 from dsc.editing.projects import Examined, Project
 from dsc.editing.quick_check import QuickCheck
 from knowledge_base.errors import InputError
-from knowledge_base.pddl.unsaved_texts import unsaved_texts
+from knowledge_base.pddl.unsaved_texts import readable_text, unsaved_texts
 
 TEXT_S, PROJECT_S = 0.08, 0.4
 """Times in seconds without a change, after which a text and its project are checked."""
@@ -174,16 +174,9 @@ class Checks:
     ) -> None:
         """Publish the findings about a file, and store those that the check of its text does not make."""
         found = list(found)
-        text = buffer.text if buffer is not None else _text_of(file)
+        text = buffer.text if buffer is not None else readable_text(file)
         if buffer is not None:
             quick = {(one.line, one.code, one.text) for one in await self._quick(file, text, desk.facts)}
             desk.extra[file] = text, [one for one in found if (one.line, one.code, one.text) not in quick]
         if self._buffers.get(file) is buffer:
             self._publish(file, None if buffer is None else buffer.version, diagnostics(found, text))
-
-
-def _text_of(file: Path) -> str:
-    try:
-        return file.read_text("utf-8")
-    except (OSError, UnicodeDecodeError):
-        return ""

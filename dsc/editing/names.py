@@ -107,7 +107,7 @@ def expression_names(text: str, start: int, scope: str, variables: Iterable[str]
 
 
 def _part(data: Any, path: Iterable[str | int]) -> Any:
-    """Return the part of data at a path; a list of one may be written without brackets."""
+    """Return the part of data at a path; `None` if there is none."""
     for key in path:
         try:
             data = data[key]

@@ -58,7 +58,7 @@ class Server(LanguageServer):
     def view(self, file: Path) -> View:
         """Return the page of a file, with the pages and facts of its project."""
         texts, project = self.checks.texts, self.checks.project(file)
-        page = self._workspace.page(file, texts.get(file, "") or text_of(file))
+        page = self._workspace.page(file, text_of(file, texts))
         root = file.parent if project is None else project.root
         pages = [page] if project is None else self._workspace.pages(root, texts)
         return View(page, tuple(pages), self.checks.facts(file), root)
@@ -185,7 +185,7 @@ def _locations(ranges: Iterable[navigation.Range], texts: Mapping[Path, str]) ->
     found = []
     for one in ranges:
         if one.line is None:
-            lines = Lines(texts[one.file] if one.file in texts else text_of(one.file))
+            lines = Lines(text_of(one.file, texts))
             begin, end = _position(lines.spot(one.begin)), _position(lines.spot(one.end))
         else:
             begin = end = lsp.Position(one.line, 0)

@@ -16,6 +16,7 @@ from dsc.editing.project_facts import ProjectFacts
 from dsc.text.incremental import IncrementalReader
 from dsc.text.yaml import Spans
 from knowledge_base.errors import InputError
+from knowledge_base.pddl.unsaved_texts import readable_text
 
 _SKIPPED = frozenset({"build", "dist", "node_modules", "site-packages", "__pycache__"})
 _ENDINGS = frozenset({".yaml", ".yml", ".pddl"})
@@ -75,9 +76,7 @@ class Workspace:
             root: the folder.
             texts: the texts of open files, in place of those on disk.
         """
-        return [
-            self.page(file, texts[file] if file in texts else text_of(file)) for file in sorted(_files(root, texts))
-        ]
+        return [self.page(file, text_of(file, texts)) for file in sorted(_files(root, texts))]
 
     def _read(self, file: Path, text: str, before: Page | None) -> Page:
         kind = kind_of(file, text)
@@ -118,12 +117,9 @@ class View:
         }
 
 
-def text_of(file: Path) -> str:
-    """Return the text of a file on disk; nothing if it is not readable."""
-    try:
-        return file.read_text("utf-8")
-    except (OSError, UnicodeDecodeError):
-        return ""
+def text_of(file: Path, texts: Mapping[Path, str]) -> str:
+    """Return the text of an open file, else the text on disk; nothing if it is not readable."""
+    return texts[file] if file in texts else readable_text(file)
 
 
 def places_in_python(root: Path, name: str) -> list[tuple[Path, int]]:
@@ -132,7 +128,7 @@ def places_in_python(root: Path, name: str) -> list[tuple[Path, int]]:
     return [
         (file, number)
         for file in sorted(_walk(root, {".py"}))
-        for number, line in enumerate(text_of(file).splitlines(), 1)
+        for number, line in enumerate(readable_text(file).splitlines(), 1)
         if quoted.search(line)
     ]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from dsc.codes import CODES
 from dsc.errors import Finding
 from knowledge_base.errors import InputError, Place, UnknownNameError
-from knowledge_base.pddl.unsaved_texts import unsaved_text
+from knowledge_base.pddl.unsaved_texts import readable_text
 
 _COMMENT = re.compile(r"^(?P<code>.*?)[#;]\s*dsc:\s*ignore\[(?P<codes>[^\]]*)\](?P<reason>.*)$")
 _EXAMPLE = "`# dsc: ignore[known-object] the camera finds it`"
@@ -73,12 +73,7 @@ def without_ignored(findings: Iterable[Finding], files: Iterable[Path]) -> list[
 
 
 def _comments(file: Path, source: str) -> Iterator[Ignore]:
-    unsaved = unsaved_text(file)
-    try:
-        lines = (file.read_text("utf-8") if unsaved is None else unsaved).splitlines()
-    except (OSError, UnicodeDecodeError):  # another finding reports it
-        return
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(readable_text(file).splitlines(), 1):  # another finding reports an unreadable file
         found = _COMMENT.match(line) if "dsc:" in line else None
         if found is not None:
             codes = tuple(code.strip() for code in found["codes"].split(",") if code.strip())

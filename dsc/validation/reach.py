@@ -46,8 +46,9 @@ def check_connectors(subject: Subject) -> Iterator[Finding]:
 def _branches(subject: Subject, name: str, path: Path) -> Iterator[Finding]:
     *earlier, (last_path, _, last) = subject.leaving(path)
     if last.has_guard:
-        message = f"'{name}' may lead nowhere: its last branch has a `when`"
-        yield subject.finding(last_path, "choice", message, "end with a branch without `when`")
+        key = "bind" if last.guard is None else "when"
+        message = f"'{name}' may lead nowhere: its last branch has a `{key}`"
+        yield subject.finding(last_path, "choice", message, f"end with a branch without `{key}`")
     for here, _, transition in earlier:
         if not transition.has_guard:
             message = f"this branch of '{name}' has no `when`, so later branches are never reached"

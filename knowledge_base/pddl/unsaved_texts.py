@@ -25,6 +25,15 @@ def unsaved_texts(texts: Mapping[Path, str]) -> Iterator[None]:
         _unsaved.reset(token)
 
 
+def readable_text(file: Path) -> str:
+    """Return the unsaved text of a file, else its text on disk; nothing if it is not readable."""
+    unsaved = unsaved_text(file)
+    try:
+        return file.read_text("utf-8") if unsaved is None else unsaved
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
 def unsaved_text(file: Path) -> str | None:
     """Return the unsaved text of a file; `None` if the file on disk is valid."""
     texts = _unsaved.get()

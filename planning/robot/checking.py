@@ -29,6 +29,7 @@ from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.syntax.expression import Constant, Expression, free_variables
 from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.pddl.unsaved_texts import readable_text
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.analysis.explanation import proven_reasons
@@ -63,7 +64,6 @@ from planning.robot.project_files import (
     is_monitoring,
     is_profile,
     objects_in,
-    text_of,
     without_consequences,
 )
 from planning.robot.scenario_files import check_scenarios
@@ -259,7 +259,7 @@ class _Robot:
             found += () if world is None else missing_values(self._domain, world)
             found += review_types(skills or (), self._domain.schema)
             found += wrong_facts(files, self._domain.schema)
-            quoted = quoted_names(map(text_of, {*files, *(one for one in self._files if one.suffix == ".py")}))
+            quoted = quoted_names(map(readable_text, {*files, *(one for one in self._files if one.suffix == ".py")}))
             found += unused_plots(self._plots, self._bundle.main, quoted)
             if world is not None and not self._bundle.remote:  # else other programs may make a fact true
                 found += never_true(self._plots, self._domain, world, quoted)
@@ -383,7 +383,7 @@ class _Robot:
     def _check_main(self, main: str) -> None:
         plots = {plot.name: plot for plot in self._plots}
         if main not in plots:
-            if main in {name for file in self._broken_files() for name in NAMES_PLOT.findall(text_of(file))}:
+            if main in {name for file in self._broken_files() for name in NAMES_PLOT.findall(readable_text(file))}:
                 return  # its file has the mistake
             raise UnknownNameError(f"the bundle '{self._bundle.name}' has no plot '{main}'", found=main, valid=plots)
         for name, parameter in plots[main].parameters.items():

@@ -14,7 +14,8 @@ from dsc.sequencer.sequencer import Sequencer
 from dsc.text.plot_files import parse_plot
 from dsc.text.profiles import Profile, with_profile
 from knowledge_base.errors import InputError
-from planning.robot.project_files import YAML, plot_name, text_of
+from knowledge_base.pddl.unsaved_texts import readable_text
+from planning.robot.project_files import YAML, plot_name
 
 SECONDS = 0.3
 """Real time between two looks at the files."""
@@ -63,7 +64,7 @@ class PlotFiles:
     def _read(self, before: Mapping[Path, str]) -> dict[Path, str]:
         """Return the texts of the plot files; a file without a plot that had one is being written by an editor."""
         files = [file for folder in self._folders for file in sorted(folder.iterdir()) if file.suffix in YAML]
-        texts = {file: text_of(file) for file in files}
+        texts = {file: readable_text(file) for file in files}
         plots = {file: text for file, text in texts.items() if plot_name(file, text) is not None}
         return {**{file: text for file, text in before.items() if file in texts}, **plots}
 

@@ -17,7 +17,7 @@ from dsc.validation import review_plot, validate_plot
 from knowledge_base.errors import InputError, Place, collecting, tolerated
 from knowledge_base.pddl import read_problem
 from knowledge_base.pddl.domain_text import read_domain
-from knowledge_base.pddl.unsaved_texts import unsaved_text
+from knowledge_base.pddl.unsaved_texts import readable_text
 from knowledge_base.world.schema import Schema
 from planning.model.domain import PlanningDomain
 from planning.robot.soundness import IMPLEMENTED
@@ -56,12 +56,12 @@ def is_monitoring(file: Path) -> bool:
 
 def _has_key(file: Path, key: str) -> bool:
     """Return whether a file is YAML whose outermost mapping has a key."""
-    return file.suffix in YAML and re.search(rf"^{key}:", text_of(file), re.MULTILINE) is not None
+    return file.suffix in YAML and re.search(rf"^{key}:", readable_text(file), re.MULTILINE) is not None
 
 
 def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) -> list[Finding]:
     """Return the findings without those about plots, actions and outcomes that are in files with errors."""
-    texts = [text_of(file) for file in broken]
+    texts = [readable_text(file) for file in broken]
     plots = {name for text in texts for name in NAMES_PLOT.findall(text)}
     actions = {name for text in texts for name in _IMPLEMENTS.findall(text)}
     missing = {(_KNOWN_PLOT, name) for name in plots} | {(IMPLEMENTED, name) for name in actions}
@@ -73,7 +73,7 @@ def without_consequences(findings: Iterable[Finding], broken: Iterable[Path]) ->
 def check_files(files: Iterable[Path]) -> list[Finding]:
     """Return the findings about files without a robot: their form, and the agreement of plots with their domain."""
     files = list(files)
-    texts = {file: text_of(file) for file in files}
+    texts = {file: readable_text(file) for file in files}
     found: list[Finding] = []
     with collecting() as errors:
         for file in files:
@@ -139,7 +139,7 @@ def _schema(folder: Path) -> Schema | None:
 
 def objects_in(file: Path, schema: Schema) -> Mapping[str, str]:
     """Return the objects of a problem for the schema with their types; empty for another file."""
-    if file.suffix == ".pddl" and _DEFINES_PROBLEM.search(text_of(file)):
+    if file.suffix == ".pddl" and _DEFINES_PROBLEM.search(readable_text(file)):
         with suppress(InputError):  # it is a problem for another domain, or has an error
             return read_problem(file, schema).objects
     return {}
@@ -149,14 +149,3 @@ def _declared_near(folder: Path, schema: Schema) -> dict[str, str] | None:
     """Return the objects of the problems in a folder or the folder above; `None` without a problem."""
     files = [*folder.glob("*.pddl"), *folder.parent.glob("*.pddl")]
     return {name: kind for file in files for name, kind in objects_in(file, schema).items()} or None
-
-
-def text_of(file: Path) -> str:
-    """Return the text of a file; nothing if it is not readable."""
-    unsaved = unsaved_text(file)
-    if unsaved is not None:
-        return unsaved
-    try:
-        return file.read_text("utf-8")
-    except (OSError, UnicodeDecodeError):
-        return ""

@@ -21,18 +21,20 @@ Argument = Callable[[World, Bindings], Value]
 Test = Callable[[World, Bindings], bool]
 Number = int | float
 
-_ORDER: Mapping[str, Callable[[Number, Number], bool]] = {
+ORDER: Mapping[str, Callable[[Number, Number], bool]] = {
     "<": operator.lt,
     "<=": operator.le,
     ">": operator.gt,
     ">=": operator.ge,
 }
-_FOLD: Mapping[str, Callable[[Number, Number], Number]] = {
+"""The comparisons of numbers; `same` compares all values."""
+FOLD: Mapping[str, Callable[[Number, Number], Number]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
     "/": operator.truediv,
 }
+"""The operators of arithmetic, for two numbers."""
 
 
 def compile_term(term: Term, schema: Vocabulary) -> Getter:
@@ -93,7 +95,7 @@ def compile_comparison(e: Comparison, schema: Vocabulary) -> Test:
         return lambda world, b: same(left(world, b), right(world, b))
     if e.operator == "!=":
         return lambda world, b: not same(left(world, b), right(world, b))
-    ordered, name = _ORDER[e.operator], e.operator
+    ordered, name = ORDER[e.operator], e.operator
     places = (e.left.place or e.place, e.right.place or e.place)
     if isinstance(e.right, Constant):
         bound = as_number(e.right.value, name, places[1])
@@ -148,7 +150,7 @@ def _arithmetic(term: Arithmetic, schema: Vocabulary) -> Getter:
     if name == GEOMETRY:
         numbers = compile_arguments(term.args, schema)
         return lambda world, bindings: tuple([as_number(v, name, place) for v in numbers(world, bindings)])
-    combine, arguments = _FOLD[name], compile_arguments(term.args, schema)
+    combine, arguments = FOLD[name], compile_arguments(term.args, schema)
 
     def compute(world: World, bindings: Bindings) -> Number:
         first, *rest = (as_number(v, name, place) for v in arguments(world, bindings))

@@ -142,6 +142,8 @@ def test_only_changes_of_the_truth_arrive(far):
         ("(< (mean pose.distance 2) 10)", {}, [(0.0, False), (3.0, True), (4.0, False)]),
         ("(< (magnitude pose.xyz) 10)", {}, [(0.0, False), (2.0, True), (4.0, False)]),
         ("(< (distance pose.xyz (list 20 0 0)) 1)", {}, [(0.0, False), (1.0, True), (2.0, False)]),
+        ("(< (distance pose.xyz (geometry 20 0 0)) 1)", {}, [(0.0, False), (1.0, True), (2.0, False)]),
+        ("(= (- pose.distance 29) true)", {}, [(0.0, False)]),
         ("(beyond pose.distance 25)", {}, [(0.0, True), (1.0, False)]),
         ("(imply (> pose.distance 8) (< pose.distance 10))", {}, [(0.0, False), (2.0, True), (4.0, False)]),
         ("(> (- (* 2 pose.distance) 1) 30)", {}, [(0.0, True), (2.0, False)]),

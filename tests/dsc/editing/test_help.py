@@ -12,7 +12,7 @@ from dsc.editing.completion import complete
 from dsc.editing.cursor import cursor_at
 from dsc.editing.navigation import definitions, hover, references, rename, symbols
 from dsc.editing.project_facts import ComponentFacts, ProjectFacts
-from dsc.editing.workspace import View, Workspace
+from dsc.editing.workspace import View, Workspace, text_of
 from dsc.skills import SkillSignature
 from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
@@ -222,3 +222,10 @@ def test_a_cursor_has_surroundings_in_any_text(text, data):
 @pytest.mark.parametrize("at", range(0, len(TAKE), 7))
 def test_a_text_that_ends_anywhere_is_completed_without_an_error(at):
     complete(view("plots/take.yaml", TAKE[:at], TAKE), at)
+
+
+def test_an_emptied_text_replaces_the_text_on_disk(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("plot: a", "utf-8")
+    assert text_of(file, {file: ""}) == ""
+    assert text_of(file, {}) == "plot: a"
