@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.facts import Value
-from knowledge_base.language.checking.vocabulary import Vocabulary
+from knowledge_base.language.checking.vocabulary import VALUE_TYPES, Vocabulary
 from knowledge_base.language.syntax.expression import (
     And,
     Atom,
@@ -53,20 +53,29 @@ def object_variables(
 ) -> tuple[TypedVariable, ...]:
     """Return the variables of `(exists variables body)` whose choices are objects.
 
-    A variable without a type has the values in the rows of a live relation instead if `body` finds its values there.
+    A variable without a type that `body` finds in rows of a live relation, or as text or number in facts, has
+    the values there.
     """
-    untyped = {v.name for v in variables if not v.types}
-    rows = untyped.intersection(row_variables(body, schema)) if untyped else untyped
-    found = rows and rows.intersection(found_variables(body, schema))
+    found = row_variables(variables, body, schema)
     return tuple(v for v in variables if v.name not in found) if found else variables
 
 
-def row_variables(e: Expression | Term, schema: Vocabulary) -> Iterator[str]:
-    """Yield the variables that are arguments of live relations."""
+def row_variables(variables: tuple[TypedVariable, ...], body: Expression, schema: Vocabulary) -> frozenset[str]:
+    """Return the variables of `(exists variables body)` whose choices are values in rows, see `object_variables`."""
+    untyped = frozenset(v.name for v in variables if not v.types)
+    rows = untyped.intersection(_in_rows(body, schema)) if untyped else untyped
+    return rows.intersection(found_variables(body, schema)) if rows else rows
+
+
+def _in_rows(e: Expression | Term, schema: Vocabulary) -> Iterator[str]:
+    """Yield the variables that are arguments of live relations, or texts, numbers and truth values in facts."""
     for part in parts_of(e):
-        yield from row_variables(part, schema)
-    if isinstance(e, Atom) and not schema.is_type(e.predicate, len(e.args)) and schema.predicate(e.predicate).live:
-        yield from (arg.name for arg in e.args if isinstance(arg, Variable))
+        yield from _in_rows(part, schema)
+    if isinstance(e, Atom) and not schema.is_type(e.predicate, len(e.args)):
+        known = schema.predicate(e.predicate, e.place)
+        for parameter, arg in zip(known.parameters, e.args, strict=False):  # `check` compares the number of arguments
+            if isinstance(arg, Variable) and (known.live or not set(VALUE_TYPES).isdisjoint(parameter.types)):
+                yield arg.name
 
 
 def only_tested(e: Expression, schema: Vocabulary, bound: frozenset[str] = _NONE) -> frozenset[str]:

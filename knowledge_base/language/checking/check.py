@@ -29,6 +29,7 @@ from knowledge_base.language.syntax.expression import (
     TypedVariable,
     Variable,
 )
+from knowledge_base.language.syntax.rewriting import opposite
 
 Free = Literal["error", "answers"]
 
@@ -176,7 +177,7 @@ class _Checker:
             case Comparison():
                 self.comparison(e)
             case Exists(variables, body) | Forall(variables, body):
-                with self.inside(variables, body):
+                with self.inside(variables, body if isinstance(e, Exists) else opposite(body)):
                     self.condition(body)
             case And(parts) | Or(parts):
                 for part in parts:
@@ -344,15 +345,14 @@ class _Checker:
 
     @contextmanager
     def inside(self, variables: tuple[TypedVariable, ...], body: Expression) -> Iterator[None]:
-        """Open the scope of a quantifier for a block; values of live relations have any type."""
+        """Open the scope of `(exists variables body)` for a block; values in rows have any type."""
         for variable in variables:
             for type_name in variable.types:
                 self.schema.require_type(type_name, variable.place)
         outer = self.scope
         self.scope = {**outer, **{v.name: v.types or ("object",) for v in variables}}
-        untyped = {v.name for v in variables if not v.types}
-        if untyped:
-            self.scope.update(dict.fromkeys(untyped.intersection(row_variables(body, self.schema))))
+        if self.live:
+            self.scope.update(dict.fromkeys(row_variables(variables, body, self.schema)))
         try:
             yield
         finally:

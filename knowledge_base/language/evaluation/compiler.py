@@ -36,7 +36,6 @@ from knowledge_base.language.evaluation.lookups import (
     candidates,
     conjuncts,
     distinct,
-    opposite,
     order,
     smallest,
     things,
@@ -67,6 +66,7 @@ from knowledge_base.language.syntax.expression import (
     free_variables,
     is_equality,
 )
+from knowledge_base.language.syntax.rewriting import opposite
 
 _MOST_STAGES = 1000
 Answers = Callable[[World, Bindings], list[Answer]]

@@ -10,7 +10,7 @@ from typing import Any
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
-from knowledge_base.language.checking.binding import check_bound
+from knowledge_base.language.checking.binding import check_bound, row_variables
 from knowledge_base.language.checking.vocabulary import Read
 from knowledge_base.language.evaluation.compiler import counterexamples, witnesses
 from knowledge_base.language.evaluation.evaluator import NO_BINDINGS, asked, choices, evaluate_term, holds
@@ -174,6 +174,8 @@ def _existence(text: str, e: Exists, world: World, bindings: Bindings) -> Explan
     witness = next(witnesses(e, world.schema)(world, bindings), None)
     if witness is not None:
         return _shown(text, e.body, names, world, witness, truth=True)
+    if row_variables(e.variables, e.body, world.schema):
+        return Explanation(text, truth=False, detail="no row fulfils it")
     tried = itertools.islice(choices(e.variables, world), MOST_TRIED)
     nearest = max(({**bindings, **one} for one in tried), key=partial(_nearness, e.body, world), default=None)
     if nearest is None:

@@ -24,9 +24,6 @@ from knowledge_base.language.syntax.expression import (
     Atom,
     Comparison,
     Expression,
-    Imply,
-    Not,
-    Or,
     Term,
     TypedVariable,
     Variable,
@@ -99,19 +96,6 @@ def as_range(conjunct: Conjunct, schema: Vocabulary) -> Conjunct:
             return TypeRange(TypedVariable(variable, (name,), place=conjunct.place))
         case _:
             return conjunct
-
-
-def opposite(e: Expression) -> Expression:
-    """Return the negation of `e`, with `not` moved to the parts, so that these can be looked up."""
-    match e:
-        case Not(body):
-            return body
-        case Or(parts):
-            return And(tuple(opposite(p) for p in parts), place=e.place)
-        case Imply(premise, conclusion):
-            return And((premise, opposite(conclusion)), place=e.place)
-        case _:
-            return Not(e, place=e.place)
 
 
 def order(conditions: Iterable[Conjunct], bound: frozenset[str], schema: Vocabulary) -> list[JoinStep]:

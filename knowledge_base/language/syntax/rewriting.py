@@ -31,6 +31,19 @@ def name_in(e: Expression | Term) -> str | None:
     return e.function if isinstance(e, ex.Call) else e.predicate if isinstance(e, Atom) else None
 
 
+def opposite(e: Expression) -> Expression:
+    """Return the negation of `e`, with `not` moved to the parts, so that these can be looked up."""
+    match e:
+        case ex.Not(body):
+            return body
+        case ex.Or(parts):
+            return ex.And(tuple(opposite(p) for p in parts), place=e.place)
+        case ex.Imply(premise, conclusion):
+            return ex.And((premise, opposite(conclusion)), place=e.place)
+        case _:
+            return ex.Not(e, place=e.place)
+
+
 def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
     """Yield the atoms under an odd number of negations; if `wanted` is false, under an even number."""
     match e:
