@@ -58,11 +58,14 @@ def _wires(
 ) -> Iterator[dict[str, Any]]:
     """Yield each required port with its provider, with what has chosen the provider, and with its error."""
     from dsc.components.wiring import provider_for, wiring_errors
+    from planning.execution.goal_skills import planner_services
 
-    errors = {port.name: str(error) for port, error in wiring_errors(components.values())}
+    planner = planner_services()
+    providers = {**components, planner.name: planner}
+    errors = {port.name: str(error) for port, error in wiring_errors(providers.values())}
     for component in components.values():
         for port in component.requirements.values():
-            provider = None if port.name in errors else provider_for(port, component, components)
+            provider = None if port.name in errors else provider_for(port, component, providers)
             by = "service"
             if profile is not None and port.name in profile.wiring:
                 by = "profile"

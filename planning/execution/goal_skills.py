@@ -1,4 +1,4 @@
-"""Skills with which the plot `serve_goals` serves a robot's queue of goals."""
+"""Skills with which the plot `serve_goals` serves a robot's queue of goals, and the query that sets a goal."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from collections.abc import Callable
 
 from dsc.calls import SkillCall
 from dsc.components.component import Component
+from dsc.components.ports import query
 from dsc.skills import skill
+from knowledge_base.errors import InputError
 from planning.execution.goals import LATE, GoalQueue
-from planning.execution.outcomes import GoalEnded, GoalOver, GoalTaken
+from planning.execution.outcomes import GoalEnded, GoalOver, GoalPursued, GoalTaken
 
 
 class GoalSkills(Component):
@@ -18,6 +20,9 @@ class GoalSkills(Component):
     Args:
         goals: returns the queue of goals, which one state at a time serves.
     """
+
+    name = "planner"
+    concurrent = True
 
     def __init__(self, goals: Callable[[], GoalQueue]) -> None:
         super().__init__()
@@ -51,3 +56,31 @@ class GoalSkills(Component):
         """Note the end of a goal; a goal that is withdrawn stays withdrawn."""
         self._goals().end(number, reached=reached, reason=reason)
         return GoalEnded()
+
+    @query
+    async def pursue(self, goal: str, priority: float = 0.0) -> GoalPursued:
+        """Put a goal in the queue, and wait for its end; the goal is withdrawn if the caller is cancelled.
+
+        If an equal goal waits or runs already, the query waits for that goal: a restarted caller finds its goal again.
+        """
+        goals = self._goals()
+        equal = (one.id for one in goals.list() if one.goal == goal)
+        try:
+            number = next(equal, None) or goals.put(goal, priority=priority)
+        except InputError as error:
+            return GoalPursued(reached=False, reason=str(error))
+        try:
+            ended = await goals.ended(number)
+        except asyncio.CancelledError:
+            goals.withdraw(number, "the caller was cancelled")
+            raise
+        return GoalPursued(reached=ended.state == "reached", reason=ended.reason)
+
+
+def planner_services() -> GoalSkills:
+    """Return a component with the ports that the planning component of a run provides, for checks before a run."""
+
+    def none() -> GoalQueue:
+        raise InputError("only a run has a queue of goals")
+
+    return GoalSkills(none)

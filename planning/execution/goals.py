@@ -67,6 +67,7 @@ class GoalQueue:
         self._goals: dict[int, QueuedGoal] = {}
         self._cancel: dict[int, Callable[[str], object]] = {}
         self._arrival = asyncio.Event()
+        self._ends: dict[int, asyncio.Event] = {}
         if kept:
             with self._file() as connection:
                 connection.execute(_TABLE)
@@ -125,6 +126,12 @@ class GoalQueue:
         found = (one for one in self._goals.values() if one.state in wanted)
         return tuple(sorted(found, key=lambda one: (one.state == "waiting", -one.priority, one.id)))
 
+    async def ended(self, number: int) -> QueuedGoal:
+        """Wait until a goal has ended, and return it; raise `UnknownNameError` if there is no such goal."""
+        while self.get(number).state in ("waiting", "running"):
+            await self._ends.setdefault(number, asyncio.Event()).wait()
+        return self.get(number)
+
     # -- for those who serve the goals -----------------------------------------------------------------------
 
     def recover(self) -> None:
@@ -173,6 +180,8 @@ class GoalQueue:
                 connection.execute("INSERT OR REPLACE INTO goals VALUES (?, ?, ?, ?, ?, ?)", row)
                 connection.executemany("DELETE FROM goals WHERE id = ?", [(number,) for number in dropped])
         self._goals[queued.id] = queued
+        if queued.state not in ("waiting", "running") and (end := self._ends.pop(queued.id, None)) is not None:
+            end.set()
         for number in dropped:
             self._goals.pop(number, None)
 

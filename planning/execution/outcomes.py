@@ -72,6 +72,13 @@ class GoalOver(Outcome):
     reason: str
 
 
+class GoalPursued(Outcome):
+    """A goal of the queue has ended: it was reached, or the reason why not."""
+
+    reached: bool
+    reason: str
+
+
 class GoalEnded(Outcome):
     """The end of the goal is noted in the queue."""
 

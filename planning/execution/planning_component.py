@@ -83,9 +83,6 @@ class PlanningComponent(GoalSkills):
         foresight: simulates each plan before its execution.
     """
 
-    name = "planner"
-    concurrent = True
-
     def __init__(
         self,
         domain: PlanningDomain,

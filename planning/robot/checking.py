@@ -34,6 +34,7 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.analysis.explanation import proven_reasons
 from planning.engines.registry import able, installed, refusal
+from planning.execution.goal_skills import planner_services
 from planning.execution.planning_component import PlanningComponent
 from planning.execution.shipped_plots import shipped_plots
 from planning.model.cancellable_work import WorkLimit, WorkLimitError
@@ -265,7 +266,7 @@ class _Robot:
                 found += never_true(self._plots, self._domain, world, quoted)
         self._check_components()
         if self._components is not None and not self._lacks_remote:
-            found += [Finding(error, "wiring") for _, error in wiring_errors(self._components)]
+            found += [Finding(error, "wiring") for _, error in wiring_errors([*self._components, planner_services()])]
         return found
 
     def _skills(self) -> list[SkillSignature] | None:
@@ -440,7 +441,7 @@ class _Robot:
 
     def _check_wiring(self, components: Sequence[Component], profile: Profile) -> None:
         """Raise an error for each wire of a profile that does not fit."""
-        for port, error in () if self._lacks_remote else wiring_errors(components):
+        for port, error in () if self._lacks_remote else wiring_errors([*components, planner_services()]):
             if port.name in profile.wiring:
                 error.place = profile.place(("wiring", port.name))
                 with tolerated():

@@ -20,6 +20,7 @@ from dsc.model.reading import FormPath
 from dsc.profiles import configure
 from dsc.text.profiles import find_profile
 from knowledge_base.errors import InputError, UnknownNameError
+from planning.execution.goal_skills import planner_services
 from planning.robot.bringup import components_for
 from planning.robot.bundles import gathered, wiring_of
 from planning.robot.project_files import READABLE
@@ -108,7 +109,9 @@ def check_robot(deployment: Deployment, robot: Parts) -> list[Finding]:
         if name not in whole.components
     ]
     unknown = list(_unknown(deployment, robot)) if components or robot.remote else []
-    errors = [] if robot.remote else wiring_errors(components.values())  # the ports of other programs are unknown
+    errors = (
+        [] if robot.remote else wiring_errors([*components.values(), planner_services()])
+    )  # the ports of other programs are unknown
     unwired = [Finding(error, "wiring") for _, error in errors]
     needs = [] if unwired or unknown or robot.remote else _inactive(deployment, components)
     other_periods = _other_periods(whole, components)

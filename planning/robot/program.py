@@ -38,6 +38,7 @@ from knowledge_base.world.schema_compatibility import require_extension
 from planning.engines.planner import Planner
 from planning.engines.race import CachingPlanner, PlannerRace
 from planning.engines.registry import repeatable
+from planning.execution.goal_skills import planner_services
 from planning.execution.goals import GoalQueue
 from planning.execution.planning_component import PlanningComponent
 from planning.execution.search import Foresight
@@ -111,7 +112,7 @@ class RobotProgram:
         configure(self.components)
         choose_sources(self.components, wiring or {})
         require_deployed(self.components, [PlanningComponent.name])
-        require_wired(self.components)
+        require_wired([*self.components, planner_services()])
         self.room = None if resources is None else Room(resources)
         if self.room is not None:
             self.room.require(self.components)
