@@ -202,6 +202,7 @@ pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc plot show domains/clean_up_table/plots/search.yaml --svg docs/pictures/search.svg
 	$(BIN)/dsc plot show planning/plots/achieve.yaml --svg docs/pictures/achieve.svg
 	$(BIN)/dsc plot show docs/plots/life_cycle.yaml --svg docs/pictures/life_cycle.svg
+	$(BIN)/dsc plot show domains/elevator/plots/take_elevator.yaml --svg docs/pictures/take_elevator.svg
 	$(BIN)/dsc deployment draw examples/strangers/lab.yaml --svg docs/pictures/deployment.svg
 	$(BIN)/dsc deployment draw examples/strangers/lab.yaml --timeline --svg docs/pictures/worst_cases.svg
 	$(BIN)/dsc kb draw examples/kitchen/problem.pddl --to docs/pictures/kitchen.svg

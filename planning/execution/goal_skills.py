@@ -70,7 +70,7 @@ class GoalSkills(Component):
         except InputError as error:
             return GoalPursued(reached=False, reason=str(error))
         try:
-            ended = await goals.ended(number)
+            ended = await goals.end_of(number)
         except asyncio.CancelledError:
             goals.withdraw(number, "the caller was cancelled")
             raise

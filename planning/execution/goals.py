@@ -126,7 +126,7 @@ class GoalQueue:
         found = (one for one in self._goals.values() if one.state in wanted)
         return tuple(sorted(found, key=lambda one: (one.state == "waiting", -one.priority, one.id)))
 
-    async def ended(self, number: int) -> QueuedGoal:
+    async def end_of(self, number: int) -> QueuedGoal:
         """Wait until a goal has ended, and return it; raise `UnknownNameError` if there is no such goal."""
         while self.get(number).state in ("waiting", "running"):
             await self._ends.setdefault(number, asyncio.Event()).wait()
