@@ -13,7 +13,8 @@ from domains.dialogue.bringup import NAME as DIALOGUE
 from domains.dialogue.channels import Console
 from domains.dialogue.speech import Dialogue
 from domains.elevator.base import Base
-from domains.elevator.lift import FLOORS, PERSONS, Lift, scene
+from domains.elevator.floors import FLOORS
+from domains.elevator.lift import PERSONS, Lift, scene
 from domains.elevator.mission import Mission
 from domains.elevator.perception import Door, Head, People
 from domains.elevator.ride import LIFT, Ride
@@ -65,10 +66,11 @@ class ElevatorRide(Simulation):
         return [*senses, Base(self.ride), self._mission]
 
     def knowledge(self) -> Delta:
-        """Return the persons, the floor of the robot, and its destination."""
+        """Return the persons, the floors with their places, the floor of the robot, and its destination."""
         assigned = fact("assigned", "robot", self.scenario.destination)
         nodes = {**dict.fromkeys(FLOORS, "floor"), **dict.fromkeys(PERSONS, "person")}
-        return Delta(nodes, added=(fact("arrived", self.scenario.start), assigned))
+        values = {fact("position", name): floor.place for name, floor in FLOORS.items()}
+        return Delta(nodes, added=(fact("arrived", self.scenario.start), assigned), values=values)
 
     def scene(self) -> list[dict[str, Any]]:
         """Return the house for the page."""

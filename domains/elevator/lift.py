@@ -6,16 +6,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from domains.elevator.floors import FLOORS
 from dsc.chance import choose, uniform
 
-FLOORS = tuple(f"floor{number}" for number in range(5))
-"""The floors by their names, from the lobby upwards."""
+NAMES = tuple(FLOORS)
+"""The names of the floors, from below."""
 PERSONS = ("anna", "bert", "cleo", "dora", "emil")
 OPEN = 25.0
 """Seconds for which the door is open."""
 TRAVEL = 5.0
 """Seconds of a ride, for each floor."""
-_HEIGHT = 1.5
 _BOARDING = 0.3
 _LEAVING = 0.3
 
@@ -53,7 +53,7 @@ class Lift:
     def __init__(self, seed: int, persons: tuple[str, ...] = PERSONS) -> None:
         self._seed = seed
         self._persons = persons
-        self._stops = [Stop(0, FLOORS[0], 4.0, persons[:2])]
+        self._stops = [Stop(0, NAMES[0], 4.0, persons[:2])]
 
     def last_stop(self, second: float) -> Stop | None:
         """Return the last stop whose door has opened; `None` before the first one."""
@@ -75,9 +75,9 @@ class Lift:
 
     def _after(self, stop: Stop) -> Stop:
         number = stop.number + 1
-        others = [floor for floor in FLOORS if floor != stop.floor]
+        others = [floor for floor in NAMES if floor != stop.floor]
         floor = choose(self._seed, f"stop {number}", "floor", others)
-        ride = TRAVEL * abs(FLOORS.index(floor) - FLOORS.index(stop.floor))
+        ride = TRAVEL * abs(NAMES.index(floor) - NAMES.index(stop.floor))
         return Stop(number, floor, stop.closes + ride, tuple(self._riders(stop, number)))
 
     def _riders(self, stop: Stop, number: int) -> Iterator[str]:
@@ -95,19 +95,18 @@ def scene(lift: Lift, robot: str, second: float) -> list[dict[str, Any]]:
         robot: the floor of the robot, or `lift`.
         second: the second of the run.
     """
-    heights = {floor: _HEIGHT * number for number, floor in enumerate(FLOORS)}
     stop = lift.last_stop(second)
-    level = heights[FLOORS[0] if stop is None else stop.floor]
+    level = FLOORS[NAMES[0] if stop is None else stop.floor].place[1]
     things: list[dict[str, Any]] = [
-        {"id": floor, "shape": "room", "x": 0.0, "y": y, "label": floor, "width": 3.0, "depth": 1.3}
-        for floor, y in heights.items()
+        {"id": name, "shape": "room", "x": 0.0, "y": floor.place[1], "label": name, "width": 3.0, "depth": 1.3}
+        for name, floor in FLOORS.items()
     ]
     is_open = lift.open_stop(second) is not None
     label = "lift, open" if is_open else "lift, closed"
     things.append(
-        {"id": "lift", "shape": "furniture", "x": 3.0, "y": level, "label": label, "width": 2.4, "depth": 1.3}
+        {"id": "lift", "shape": "furniture", "x": 3.7, "y": level, "label": label, "width": 3.6, "depth": 1.3}
     )
     for number, name in enumerate(() if stop is None else stop.persons):
-        things.append({"id": name, "shape": "operator", "x": 2.2 + 0.4 * number, "y": level + 0.3, "label": name})
-    at = {"x": 2.6, "y": level - 0.3} if robot == "lift" else {"x": 0.6, "y": heights[robot]}
-    return [*things, {"id": "robot", "shape": "robot", "label": "robot", **at}]
+        things.append({"id": name, "shape": "operator", "x": 2.3 + 0.7 * number, "y": level + 0.25, "label": name})
+    x, y = (2.6, level - 0.35) if robot == "lift" else FLOORS[robot].place
+    return [*things, {"id": "robot", "shape": "robot", "label": "robot", "x": x, "y": y}]

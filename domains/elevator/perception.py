@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from domains.elevator.lift import FLOORS, PERSONS
+from domains.elevator.lift import NAMES, PERSONS
 from domains.elevator.ride import Ride
 from dsc.calls import SkillCall
 from dsc.components.component import Component
@@ -34,7 +34,7 @@ class Door(Component):
     @skill(after_crash="repeat", unlimited=True)
     async def perceive(self, call: SkillCall) -> Over:
         """Report each change of the door; a closed door outdates what the robot knows about its floor."""
-        unknown = (fact("door-open"), fact("floor-known"), *(fact("at-floor", "robot", floor) for floor in FLOORS))
+        unknown = (fact("door-open"), fact("floor-known"), *(fact("at-floor", "robot", floor) for floor in NAMES))
         while True:
             now = call.clock.now()
             is_open = self._ride.visible_stop(now) is not None

@@ -6,7 +6,8 @@ import re
 from typing import Annotated
 
 from domains.dialogue.channels import Script
-from domains.elevator.lift import FLOORS
+from domains.elevator.floors import FLOORS
+from domains.elevator.lift import NAMES
 from domains.elevator.ride import Ride
 from dsc.calls import SkillCall
 from dsc.conversions import conversion
@@ -21,16 +22,15 @@ DOMAIN = """
     :parameters (?person - person ?floor - floor)
     :precondition (and (inside) (door-open) (not (floor-known)) (in-lift ?person) (looks-at robot ?person))
     :effect (and (at-floor robot ?floor) (floor-known))))"""
-_WORDS = ("lobby", "first", "second", "third", "fourth")
 
 
 @conversion
 def floor_in(words: str) -> Annotated[str, "symbol"]:
     """Return the floor in an answer, e.g. `we are on the third floor`; `none` if there is none."""
     lower = words.lower()
-    for number, floor in enumerate(FLOORS):
-        if _WORDS[number] in lower or re.search(rf"\b(floor\s*)?{number}\b", lower):
-            return floor
+    for number, (name, floor) in enumerate(FLOORS.items()):
+        if any(word in lower for word in floor.words) or re.search(rf"\b(floor\s*)?{number}\b", lower):
+            return name
     return "none"
 
 
@@ -51,5 +51,5 @@ class Riders(Script):
         mishap = self._ride.mishap(call.action_id, "no answer", "wrong floor")
         if mishap == "no answer":
             return None
-        number = FLOORS.index(stop.floor)
+        number = NAMES.index(stop.floor)
         return f"We are on floor {(number + 1) % len(FLOORS) if mishap else number}."

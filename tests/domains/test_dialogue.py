@@ -145,6 +145,41 @@ def test_text_files_as_a_channel(tmp_path):
     assert said.read_text() == "person1: Which floor is this?\n" * 2
 
 
+def test_equal_arcs_by_console_page_files_and_script(tmp_path):
+    """One arc serves all channels (S4.18)."""
+    answers = tmp_path / "answers.txt"
+
+    class Later(TextFiles):
+        async def receive(self, call, to, topic):
+            answers.write_text("3\n")
+            return await super().receive(call, to, topic)
+
+    class Page:
+        async def show(self, call, to, words): ...
+
+        async def receive(self, call, to, topic):
+            robot.knowledge.apply(Delta(added=(fact("reply", to, "robot", topic, "3"),)), author="page")
+            await call.clock.sleep(60)
+
+    read, write = os.pipe()
+    os.write(write, b"3\n")
+    os.close(write)
+    found = []
+    with os.fdopen(read) as console:
+        for channel, clock in [
+            (Console(console, io.StringIO()), "real"),
+            (Page(), "simulated"),
+            (Later(tmp_path / "said.txt", answers), "simulated"),
+            (Script(lambda *_: "3"), "simulated"),
+        ]:
+            with with_channels(channel, clock=clock) as robot:
+                end = asked(robot)
+                added = [one for change in robot.knowledge.changes(since=1) for one in change.delta.added]
+                found.append((end.outputs, [str(one) for one in added if one.predicate != "pending"]))
+    arcs = ['(ask robot person1 "Which floor is this?")', '(reply person1 robot "Which floor is this?" "3")']
+    assert found == [({"answer": "3", "reason": ""}, arcs)] * 4
+
+
 SERVING = parse_plot("""
 plot: serving
 receives: {enough: {}}

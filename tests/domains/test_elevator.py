@@ -9,7 +9,7 @@ from itertools import groupby
 import pytest
 
 from domains.elevator import Scenario, bundle
-from domains.elevator.lift import FLOORS
+from domains.elevator.floors import FLOORS
 from domains.elevator.talk import floor_in
 from dsc.sequencer.clock import SimulatedEventLoop
 from dsc.trace import Record
