@@ -317,8 +317,7 @@ class KnowledgeBase(View):
     ) -> Condition:
         """Evaluate a condition at every later version, and fire when it becomes true (S2.4).
 
-        The cost of an update depends on the size of the change, see `conditions.join`. A condition that is true at its
-        installation does not fire, but its hold time begins.
+        A condition that is true at its installation does not fire, but its hold time begins.
 
         Args:
             text: a condition. The condition is true if some values of its free variables make it true; these values are
@@ -328,14 +327,11 @@ class KnowledgeBase(View):
                 witnesses while the condition is true.
             hold_s: time in seconds for which the condition must stay true before it fires.
             once: whether the first firing cancels the condition.
-            hysteresis: margin by which the comparisons must fail before the condition is false. `(> (level) 9)` becomes
-                true above 9, and false when `(> (level) (- 9 hysteresis))` is false.
+            hysteresis: margin by which the comparisons must fail before the condition is false.
             clock: measures `hold_s`.
 
         Raises:
-            InputError: as for `query`; a hold time that is negative, not finite or without a clock; a hysteresis
-                without a comparison; a value of `fire` other than `edge` and `each`.
-            StoreError: the knowledge base is closed.
+            InputError: as for `query`; a wrong hold time, hysteresis or `fire`; `StoreError` if closed.
         """
         firing = terms(fire, hold_s=hold_s, once=once, clock=clock)
         with self._lock:
@@ -345,6 +341,11 @@ class KnowledgeBase(View):
             condition = self._installed.install(e, params, firing, hysteresis)
         self._notifier.deliver()
         return condition
+
+    def conditions(self, *, cancelled: bool = False) -> list[Condition]:
+        """Return the installed conditions in order, or the latest hundred cancelled ones (S2.19)."""
+        with self._lock:
+            return self._installed.conditions(cancelled=cancelled)
 
     def watch(
         self, pattern: str | Expression | None = None, params: Mapping[str, Value] | None = None, *, limit: int = 1000

@@ -6,6 +6,7 @@ from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import count
+from pathlib import Path
 from threading import Lock
 from types import TracebackType
 from typing import Self
@@ -15,6 +16,9 @@ from knowledge_base.conditions.join import ConditionRow
 from knowledge_base.conditions.notification import Notifier, Waiters
 from knowledge_base.errors import ConditionCancelledError, InputError
 from knowledge_base.facts import Value
+from knowledge_base.tracebacks import calling_place
+
+_HERE = str(Path(__file__).parents[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +60,7 @@ class Condition:
         number: the number in the order of installation; within a version, conditions fire in this order.
         truth: whether the condition is true at the latest version; a cancelled condition keeps its last truth.
         version: the latest version that changed the truth or the witness.
+        origin: the line that has installed the condition; `None` if it is unknown.
     """
 
     def __init__(
@@ -73,6 +78,7 @@ class Condition:
         self.number = number
         self.truth = rise.truth
         self.version = notifier.version
+        self.origin = calling_place(_HERE)
         self._witness = rise.witness
         self._names = names
         self._terms = terms

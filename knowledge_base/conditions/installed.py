@@ -6,6 +6,7 @@ conditions that a changed fact, value or type can affect; no other condition is 
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from operator import attrgetter
 
@@ -20,6 +21,8 @@ from knowledge_base.language.syntax.text import to_text
 from knowledge_base.world.state import WorldState
 
 MORE, LESS = 1, -1
+MOST_CANCELLED = 100
+"""Maximum number of cancelled conditions that are kept for inspection."""
 
 Event = tuple[Kind, str, Args, int]
 """One fact, value or type that a change affects: kind, name, arguments, and `MORE`, `LESS` or `BOTH`."""
@@ -37,6 +40,7 @@ class Installed:
         self._conditions: dict[ConditionRow, dict[Condition, None]] = {}
         self._changed: dict[ConditionRow, None] = {}
         self._numbers = 0
+        self._cancelled: deque[Condition] = deque(maxlen=MOST_CANCELLED)
 
     def install(self, e: Expression, params: Mapping[str, Value], terms: Terms, hysteresis: float | None) -> Condition:
         """Install a checked condition and return it.
@@ -58,8 +62,10 @@ class Installed:
         condition.begin()
         return condition
 
-    def conditions(self) -> list[Condition]:
-        """Return the installed conditions in the order of installation."""
+    def conditions(self, *, cancelled: bool = False) -> list[Condition]:
+        """Return the installed conditions in the order of installation, or the latest cancelled ones."""
+        if cancelled:
+            return list(self._cancelled)
         return sorted({c for several in self._conditions.values() for c in several}, key=lambda c: c.number)
 
     def departures(self, effective: Delta) -> list[Event]:
@@ -154,6 +160,7 @@ class Installed:
                 row.relation.drop(row)
                 if not row.relation.rows:
                     self._joins.pop(row.relation.shape, None)
+        self._cancelled.append(condition)
 
     def _row(self, found: Lifted) -> ConditionRow:
         join = self._joins.get(found.shape)

@@ -389,3 +389,22 @@ def test_whatever_a_condition_reads_reaches_it(kb, text, change, truths) -> None
     before = condition.truth
     kb.apply(change, author="test")
     assert (before, condition.truth) == truths
+
+
+def test_installed_and_cancelled_conditions_with_their_origin(kb):
+    kept, once = kb.install("(heavy cup1)"), kb.install("(exists (?i - item) (heavy ?i))", once=True)
+    assert kb.conditions() == [kept, once]
+    kb.apply(Delta(added=(fact("heavy", "can1"),)), author="test")
+    assert kb.conditions() == [kept]
+    assert kb.conditions(cancelled=True) == [once]
+    assert (once.truth, once.version, once.fired) == (True, kb.version, 1)
+    assert (kept.truth, kept.version) == (False, 1)
+    assert kept.origin is not None
+    assert str(kept.origin.source).endswith("test_conditions_firing.py")
+
+
+def test_the_number_of_cancelled_conditions_is_bounded(kb):
+    for _ in range(250):
+        kb.install("(heavy cup1)").cancel()
+    cancelled = kb.conditions(cancelled=True)
+    assert [one.number for one in cancelled] == [*range(151, 251)]
