@@ -148,7 +148,7 @@ def test_a_ride_that_a_crash_has_interrupted(tmp_path, second):
         report = robot.report()
         assert robot.simulation.ride.place == "floor3"
     assert report.goal_reached
-    assert report.simulated_s == pytest.approx(whole.simulated_s, abs=30)
+    assert report.simulated_s == pytest.approx(whole.simulated_s, abs=2)
 
 
 @pytest.mark.parametrize(
