@@ -61,8 +61,8 @@ class People(Component):
         self._ride = ride
 
     @skill(after_crash="repeat", unlimited=True)
-    async def perceive(self, call: SkillCall, every: float = 1.0) -> Over:
-        """Report the persons in the lift each second if they change."""
+    async def perceive(self, call: SkillCall, every: float = 0.1) -> Over:
+        """Report the persons in the lift when they change; `every` is the period of a look in seconds."""
         before: tuple[str, ...] | None = None
         while True:
             seen = self._ride.persons(call.clock.now())
