@@ -1,0 +1,32 @@
+"""Identifiers of both target languages for the names of a plot."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Iterable
+
+_C_WORDS = frozenset(
+    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
+    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false".split()
+)
+
+
+def identifier(name: str) -> str:
+    """Return a name as an identifier of Python and C."""
+    text = re.sub(r"\W", "_", name, flags=re.ASCII) or "_"
+    if text[0].isdigit():
+        text = f"_{text}"
+    return f"{text}_" if text in _C_WORDS or keyword.iskeyword(text) or keyword.issoftkeyword(text) else text
+
+
+def identifiers(names: Iterable[str], *, upper: bool = False) -> list[str]:
+    """Return an identifier for each name; later names that would have the same one get a number."""
+    found: list[str] = []
+    for name in names:
+        text = base = identifier(name).upper() if upper else identifier(name)
+        number = 2
+        while text in found:
+            text, number = f"{base}_{number}", number + 1
+        found.append(text)
+    return found

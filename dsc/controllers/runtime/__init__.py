@@ -1,0 +1,1 @@
+"""Text of Python controllers: modules that each of them contains."""
