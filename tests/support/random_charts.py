@@ -39,6 +39,7 @@ class Grower:
         private: whether plots may do what depends on where they end: internal events, outcomes, `?event`, history.
         depth: of states inside states.
         bare: whether the chart is one plot without variables and actions, whose state is its configuration alone.
+        alone: whether the chart is one plot, without submachine states.
         quiet: whether states and transitions mostly have no actions, so that steps are mere moves; drawn.
     """
 
@@ -47,6 +48,7 @@ class Grower:
     private: bool = True
     depth: int = 3
     bare: bool = False
+    alone: bool = False
     quiet: bool = False
     plots: list[Any] = field(default_factory=list)
     names: Iterator[int] = field(default_factory=count)
@@ -117,7 +119,7 @@ class Inside:
         if not is_last:
             kinds += ["choice"] if bare else ["choice", "select"]
         if depth > 0:
-            kinds += ["composite", "orthogonal"] if bare else ["composite", "orthogonal", "plot", "plot"]
+            kinds += ["composite", "orthogonal", *(() if bare or self.grower.alone else ("plot", "plot"))]
         return self.pick(kinds)
 
     def shown(self, name):

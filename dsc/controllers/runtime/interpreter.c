@@ -57,9 +57,9 @@ static void chart_arm(struct chart *c, int timer)
     const double least = chart_timers[timer].kind == CHART_EVERY ? 0.001 : 0.0;
     if (seconds.bad) {
         chart_fail(c, seconds.bad);
-    } else if (!(seconds.value >= least && seconds.value < 9e9)) {
+    } else if (seconds.value < least) {
         chart_fail(c, CHART_ERROR);
-    } else {
+    } else if (seconds.value < 9e9) { /* others are never due: nanoseconds have 64 bits */
         c->armed[timer] = true;
         c->due[timer] = c->clock + (int64_t)(seconds.value * 1e9 + 0.5);
         c->order[timer] = ++c->orders;

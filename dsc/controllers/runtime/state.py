@@ -85,9 +85,9 @@ class ControllerState:
         least = SHORTEST_PERIOD if self.timers[timer].kind == EVERY else 0
         if isinstance(seconds, Failure):
             self._fail(seconds)
-        elif not least <= seconds < MAX_SECONDS:
+        elif seconds < least:
             self._fail(ERROR)
-        else:
+        elif seconds < MAX_SECONDS:
             self.armed += 1
             self.due[timer] = (self.clock + int(seconds * 1e9 + 0.5), self.armed)
 

@@ -11,6 +11,7 @@ MAX_MICROSTEPS = 1000
 MAX_EVENTS = 1000
 """Upper bound of events and timers that one call of `step` handles."""
 MAX_SECONDS = 9e9
+"""The time from which a timer is never due: nanoseconds have 64 bits."""
 DONE_EVENT, ERROR_EVENT = 1, 2
 AT_LEAST, AFTER, EVERY, WITHIN = range(4)
 SHORTEST_PERIOD = 0.001

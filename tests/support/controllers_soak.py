@@ -1,0 +1,98 @@
+"""Random charts and plays: do the engine, the Python controller and the C controller do the same, call by call?
+
+`make controllers` runs it. Each chart gets several plays; the record of each call has the status, the configuration,
+the skills started and stopped, the commands, the outcomes and the variables. After an overflow of 64 bits, which the
+engine does not have, only the two controllers are compared. At the end, a table has the sizes and times of one chart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import shutil
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+from controller_charts import draw_play, grow
+from controller_players import NOT_OF_THE_ENGINE, CPlayers, EnginePlayer, PythonPlayer
+
+
+class DiffersError(AssertionError):
+    """Two players do not agree."""
+
+
+def compare(first, second, where):
+    """Raise `DiffersError` for the first call about which two players have different records."""
+    for number, (one, other) in enumerate(zip(first, second, strict=True)):
+        if one != other:
+            raise DiffersError(f"{where}, call {number}:\n  {one}\n  {other}")
+
+
+class Chart:
+    """A random chart with its plays by the engine and by the Python controller."""
+
+    def __init__(self, seed, plays, counts):
+        self.seed, scxml = seed, seed % 2 == 1
+        pick = random.Random(seed).choice
+        self.plot = grow(pick, scxml).model_copy(update={"name": f"c{seed}"})
+        self.plays = []
+        seen = Counter()
+        for _ in range(plays):
+            engine = EnginePlayer(self.plot)
+            engine.play(draw_play(pick, scxml))
+            records = [*PythonPlayer(self.plot).play(engine.calls)]
+            compared = self._compared(records)
+            compare(engine.records[:compared], records[:compared], f"seed {seed}, engine and Python")
+            self.plays.append((engine.calls, records))
+            seen.update(calls=len(records), compared=compared, transitions=engine.taken, dropped=engine.dropped)
+            seen.update(timers=engine.timed, plays=1, overflows=int(compared < len(records)))
+            seen.update(starts=engine.runs, failed=int(bool(records[-1].status & 16)))
+        text = self.plot.text
+        seen.update(charts=1, regions=int('"regions"' in text), with_timers=int(seen["timers"] > 0))
+        seen.update(with_overflow=int(seen["dropped"] > 0), with_history=int('"history"' in text))
+        counts.update(seen)
+
+    @staticmethod
+    def _compared(records):
+        ends = (number for number, one in enumerate(records) if one.status & NOT_OF_THE_ENGINE)
+        return next(ends, len(records))
+
+
+def run(seeds, plays, cc, counts, batch=25):
+    """Compare the charts of these seeds; with a compiler, also with C."""
+    left = [*seeds]
+    while left:
+        some, left = left[:batch], left[batch:]
+        charts = [Chart(seed, plays, counts) for seed in some]
+        if cc is None:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            program = CPlayers(Path(folder), [chart.plot for chart in charts], cc)
+            wanted = [(n, calls) for n, chart in enumerate(charts) for calls, _ in chart.plays]
+            found = program.play(wanted)
+        expected = [(chart, records) for chart in charts for _, records in chart.plays]
+        for (chart, records), own in zip(expected, found, strict=True):
+            compare(records, own, f"seed {chart.seed}, Python and C")
+            counts.update(c_calls=len(own))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--charts", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--plays", type=int, default=4)
+    options = parser.parse_args()
+    cc, counts, began = shutil.which("cc"), Counter(), time.monotonic()
+    if cc is None:
+        print("there is no C compiler `cc`: only Python controllers are compared")
+    run(range(options.first, options.first + options.charts), options.plays, cc, counts)
+    for name, count in counts.items():
+        print(f"{name:14} {count}")
+    print(f"{time.monotonic() - began:.0f} s: all players agree")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
