@@ -21,6 +21,7 @@ CODES: Mapping[str, str] = {
     "component-parameter": "A component has the parameter that `set` names, and the value is in its range.",
     "condition": "A condition can be evaluated: its predicates, functions, types and arguments are declared.",
     "connectors-lead-on": "Choices and other connectors lead to a state where a run can rest.",
+    "controller": "A plot for `dsc controller build` has only forms that a controller can have.",
     "declared-leaf": "`TreeNodesModel` of a file, if it exists, declares each leaf.",
     "declared-outcome": "An outcome that a plot emits is declared under `emits`.",
     "declared-variable": "A variable that a plot reads or assigns is declared.",

@@ -194,7 +194,7 @@ def diff(
     from knowledge_base.output_files import Output
 
     out = None if svg is None else Output(svg, "--svg", old, new)
-    before, after = _load(old), _load(new)
+    before, after = load_chart(old), load_chart(new)
     found = differences(before, after)
     if json:
         print_json([asdict(difference) for difference in found])
@@ -253,7 +253,7 @@ def types(
     from dsc.text.plot_files import load_library
     from dsc.text.typed_plots import typed_plots
 
-    plots = [plot for one in sources for plot in (load_library(one) if one.is_dir() else [_load(one)])]
+    plots = [plot for one in sources for plot in (load_library(one) if one.is_dir() else [load_chart(one)])]
     first = sources[0]
     typer.echo(typed_plots(plots, _schema(first / "any" if first.is_dir() else first, domain)), nl=False)
 
@@ -267,7 +267,7 @@ def _findings(
 
     known = _schema(file, domain)
     try:
-        plot = _load(file)
+        plot = load_chart(file)
         library, broken = neighbours.of(file, plot)
         skills = None if components is None else [one for c in components for one in c.skills().values()]
         declared = None if components is None else {c.name: c.interface() for c in components}
@@ -280,7 +280,7 @@ def _findings(
     return findings
 
 
-def _load(file: Path) -> ActionPlot:
+def load_chart(file: Path) -> ActionPlot:
     """Return the plot in a file; the file is read as SCXML if its name ends in `.scxml`."""
     from dsc.scxml.reader import parse_scxml
     from dsc.text.plot_files import load_plot

@@ -1,1 +1,1 @@
-"""Stand-alone controllers of plots: one Python module or one C99 file without this package (S3.4, S3.8)."""
+"""Controllers of plots: one Python module or one C99 file, which needs nothing of this package (S3.4, S3.8)."""

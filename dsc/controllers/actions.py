@@ -22,7 +22,7 @@ from dsc.controllers.model import (
     Timer,
     Value,
 )
-from dsc.controllers.names import AnyAction, arguments_of, converted
+from dsc.controllers.names import AnyAction, arguments_of, convert
 from dsc.controllers.refusals import REFUSED_ACTIONS, Refusals
 from dsc.data_types import data_type
 from dsc.engine.tables import CompiledPlot
@@ -42,13 +42,13 @@ class BlockBuilder:
 
     def add(self, about: str, actions: Iterable[AnyAction], path: FormPath, node: int) -> int:
         """Add a block of actions of a node, and return its number; 0 for a block without actions."""
-        made = self._made(about, actions, path, node)
+        made = self._make_all(about, actions, path, node)
         if not made:
             return 0
         self._controller.blocks.append(Block(about, tuple(made)))
         return len(self._controller.blocks) - 1
 
-    def _made(self, about: str, actions: Iterable[AnyAction], path: FormPath, node: int) -> list[Action]:
+    def _make_all(self, about: str, actions: Iterable[AnyAction], path: FormPath, node: int) -> list[Action]:
         made: list[Action] = []
         for action in actions:
             if type(action) in REFUSED_ACTIONS:
@@ -60,13 +60,13 @@ class BlockBuilder:
     def _action(self, about: str, action: AnyAction, path: FormPath, node: int) -> Action:
         match action:
             case model.Assign(assign=terms):
-                return Assign(tuple([(name, self._assigned(name, term)) for name, term in terms.items()]))
+                return Assign(tuple([(name, self._assign(name, term)) for name, term in terms.items()]))
             case model.Emit():
                 return self._fire(action)
             case model.Trigger():
                 return Start(self._activity(action, node), self._arguments(action))
             case model.Choose(condition=condition, then=then, otherwise=otherwise):
-                branches = [tuple(self._made(about, some, path, node)) for some in (then, otherwise)]
+                branches = [tuple(self._make_all(about, some, path, node)) for some in (then, otherwise)]
                 return Branch(self._typing.condition(condition), *branches)
             case model.Block(block=inside):
                 return Group(self.add(f"block of {about}", inside, path, node))
@@ -75,7 +75,7 @@ class BlockBuilder:
             case _:
                 raise AssertionError(action)
 
-    def _assigned(self, name: str, term: TermField) -> Value:
+    def _assign(self, name: str, term: TermField) -> Value:
         plot = self._compiled.plot
         declared = {**plot.parameters, **plot.variables, **plot.outputs}
         if name not in declared:
@@ -90,11 +90,11 @@ class BlockBuilder:
             value = self._typing.value(term)
             if name in types:
                 value = self._typing.of_type(value, data_type(types[name]), term.place)
-            values.append((name, self._typing.converted(value, self._controller.attributes[name])))
+            values.append((name, self._typing.convert(value, self._controller.attributes[name])))
         return Fire(self._controller.events.index(action.emit), tuple(values), action.emit in plot.emits)
 
     def _arguments(self, action: AnyAction) -> Arguments:
-        return converted(arguments_of(action), self._controller.arguments, self._typing)
+        return convert(arguments_of(action), self._controller.arguments, self._typing)
 
     def _activity(self, action: model.Trigger, node: int) -> int:
         controller, number, timer = self._controller, len(self._controller.activities), -1

@@ -8,7 +8,7 @@ from dsc.controllers.actions import BlockBuilder
 from dsc.controllers.declarations import declare
 from dsc.controllers.expressions import Typing
 from dsc.controllers.model import Controller, Edge, Fixed, Node, Timer, Value
-from dsc.controllers.names import completed_events, error_numbers, event_names, hears
+from dsc.controllers.names import completed_events, error_numbers, event_names, triggers
 from dsc.controllers.refusals import Refusals
 from dsc.engine.tables import CompiledPlot, StateNode, TimedEdge, TransitionEdge, compile_plot
 from dsc.events import DONE, TIMED_OUT
@@ -78,7 +78,7 @@ class _Tables:
             "orthogonal": node.orthogonal, "transparent": node.transparent, "final": node.final,
             "entry": entry, "leave": leave, "broken": broken, "outcome": outcome,
             "waits": node.at_least is not None, "done": self._done(node),
-            "at_once": type(state) is State and not self._compiled.scxml and DONE in node.edges,
+            "immediate": type(state) is State and not self._compiled.scxml and DONE in node.edges,
             **self._history(node, path),
         }  # fmt: skip
         return Node(node.name, fields, edges, timers, activities)
@@ -104,23 +104,23 @@ class _Tables:
         found: list[tuple[int, int]] = [(0, self._edge(edge, path)) for edge in node.always]
         by_label = {label: [self._edge(edge, path) for edge in edges] for label, edges in node.edges.items()}
         for number, event in enumerate(self._controller.events):
-            heard = [
+            edges_for_event = [
                 edge
                 for label, edges in by_label.items()
-                if number and hears(self._compiled, label, event)
+                if number and triggers(self._compiled, label, event)
                 for edge in edges
             ]
-            found += [(number, edge) for edge in heard]
+            found += [(number, edge) for edge in edges_for_event]
         timers = []
         if node.at_least is not None:
             timers.append(
                 self._timer(Timer("at_least", node.index, -1, self._seconds(node.at_least, (*path, "at_least"))))
             )
-        timers += self._timed("after", node.timeouts, path)
-        timers += self._timed("every", node.cycles, path)
+        timers += self._add_timed("after", node.timeouts, path)
+        timers += self._add_timed("every", node.cycles, path)
         return tuple(found), tuple(timers)
 
-    def _timed(self, kind: str, timed: Sequence[TimedEdge], path: FormPath) -> list[int]:
+    def _add_timed(self, kind: str, timed: Sequence[TimedEdge], path: FormPath) -> list[int]:
         made = []
         for one in timed:
             seconds = self._seconds(one.seconds, (*path, *one.edge.place, "seconds"))
@@ -133,7 +133,7 @@ class _Tables:
 
     def _seconds(self, term: TermField, path: FormPath) -> Value:
         with self._refusals.at(path):
-            return self._typing.converted(self._typing.value(term), "number", term.place)
+            return self._typing.convert(self._typing.value(term), "number", term.place)
         return Fixed(0.0, "number")
 
     def _edge(self, edge: TransitionEdge, path: FormPath) -> int:

@@ -31,9 +31,7 @@ TYPES: Mapping[Kind, str] = {"integer": "int64_t", "number": "double", "boolean"
 _SMALL = 2**31
 
 
-class CExpressions(ExpressionText):
-    """Writer of expressions in C."""
-
+class _CExpressions(ExpressionText):
     words = ("&&", "||", "!")
 
     def __init__(self, data: Mapping[str, str], attributes: Mapping[str, str]) -> None:
@@ -59,8 +57,8 @@ class CExpressions(ExpressionText):
     def call(self, function: str, args: list[str]) -> str:
         return f"chart_{function}({', '.join(args)})"
 
-    def lift(self, text: str, kind: Kind) -> str:
-        return text if kind == "boolean" else f"chart_{SUFFIX[kind]}({text})"
+    def lift(self, text: str, _kind: Kind) -> str:
+        return text if _kind == "boolean" else f"chart_{SUFFIX[_kind]}({text})"
 
 
 class CFunctions:
@@ -72,7 +70,7 @@ class CFunctions:
         self._attributes = dict(zip(controller.attributes, identifiers(controller.attributes), strict=True))
         self._arguments = dict(zip(controller.arguments, identifiers(controller.arguments), strict=True))
         self._parameters = dict(zip(controller.parameters, identifiers(controller.parameters), strict=True))
-        self._text = CExpressions(self._data, self._attributes)
+        self._text = _CExpressions(self._data, self._attributes)
 
     def lines(self) -> Iterator[str]:
         """Yield the lines of all functions."""
@@ -141,12 +139,12 @@ class CFunctions:
             for text in conditions:
                 yield from (f"    if ({text} != 1) {{", "        return CHART_ERROR;", "    }")
         for name, value in one.initial:
-            yield f"    c->data.{self._data[name]} = {self._taken(value)};"
+            yield f"    c->data.{self._data[name]} = {self._take(value)};"
             if may_fail(value):
                 yield from ("    if (bad) {", "        return bad;", "    }")
         yield from ("    return bad;", "}", "")
 
-    def _taken(self, value: Value) -> str:
+    def _take(self, value: Value) -> str:
         text = self._text.value(value)
         return f"chart_take_{SUFFIX[value.kind]}({text}, &bad)" if may_fail(value) else text
 
@@ -196,7 +194,7 @@ class CFunctions:
         if may_end:
             yield f"{indent}    int bad = {f'{present} ? 0 : CHART_ERROR' if present else 0};"
         for number, value in enumerate(plain):
-            yield f"{indent}    const {TYPES[value.kind]} a{number} = {self._taken(value)};"
+            yield f"{indent}    const {TYPES[value.kind]} a{number} = {self._take(value)};"
         inner = f"{indent}    "
         if may_end:
             yield from (f"{inner}if (bad) {{", f"{inner}    chart_fail(c, bad);")
@@ -224,7 +222,7 @@ class CFunctions:
         yield from (f"{indent}    }}", f"{indent}}}")
 
 
-def _start_value(default: Fixed | None, text: CExpressions) -> str:
+def _start_value(default: Fixed | None, text: _CExpressions) -> str:
     return "0" if default is None else text.constant(default)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dsc.controllers.expressions import RefusedError, Typing, bounded, kind_of
+from dsc.controllers.expressions import RefusedError, Typing, bound, kind_of
 from dsc.controllers.model import Combination, Comparison, Condition, Controller, Fixed, Kind, Parameter, Read
 from dsc.controllers.names import actions_of, arguments_of, declare_attributes, join_all
 from dsc.controllers.refusals import Refusals
@@ -52,14 +52,14 @@ def _parameter(name: str, parameter: PlotParameter, typing: Typing) -> Parameter
     conditions: list[Condition] = []
     for least, most in (*bounds, (parameter.least, parameter.most)):
         if kind != "boolean" and (least is not None or most is not None):
-            conditions.append(Comparison("eq", own, bounded(own, least, most)))
+            conditions.append(Comparison("eq", own, bound(own, least, most)))
     if parameter.among:
-        values = [typing.converted(_fixed(name, one), kind) for one in parameter.among]
+        values = [typing.convert(_fix(name, one), kind) for one in parameter.among]
         conditions.append(Combination(every=False, parts=tuple(Comparison("eq", own, one) for one in values)))
     return Parameter(kind, default, tuple(conditions))
 
 
-def _fixed(name: str, value: object) -> Fixed:
+def _fix(name: str, value: object) -> Fixed:
     if isinstance(value, bool | int | float):
         kind: Kind = "boolean" if isinstance(value, bool) else "integer" if isinstance(value, int) else "number"
         return Fixed(value, kind)
@@ -67,7 +67,7 @@ def _fixed(name: str, value: object) -> Fixed:
 
 
 def _default(name: str, term: TermField, kind: Kind, typing: Typing) -> Fixed:
-    value = typing.converted(typing.value(term), kind)
+    value = typing.convert(typing.value(term), kind)
     if not isinstance(value, Fixed):
         raise RefusedError(f"the default of '{name}' is computed; a controller has constants as defaults")
     return value

@@ -73,7 +73,7 @@ class Typing:
             case lang.Arithmetic("+" | "-" | "*" | "/", args):
                 return self._arithmetic(term, [self._number(arg) for arg in args])
             case _:
-                what = f"'{to_text(term)}' reads knowledge, or data that is no number; a controller has neither"
+                what = f"'{to_text(term)}' reads knowledge, or data other than numbers; a controller has neither"
                 raise RefusedError(what, term.place)
 
     def _constant(self, term: lang.Constant) -> Value:
@@ -114,17 +114,17 @@ class Typing:
         for value in rest:
             both = {first.kind, value.kind} == {"integer"} and term.operator != "/"
             kind: Kind = "integer" if both else "number"
-            sides = (self.converted(first, kind), self.converted(value, kind))
+            sides = (self.convert(first, kind), self.convert(value, kind))
             suffix = "int" if both else "num"
             first = Operation(f"{_NAMES[term.operator]}_{suffix}", sides, kind)
         return first
 
-    def converted(self, value: Value, kind: Kind, place: Place | None = None) -> Value:
+    def convert(self, value: Value, kind: Kind, place: Place | None = None) -> Value:
         """Return a value as one of another kind; raise `RefusedError` if the kinds do not fit."""
         if value.kind == kind:
             return value
         if "boolean" in {value.kind, kind}:
-            raise RefusedError(f"a value of kind {value.kind} stands where a value of kind {kind} belongs", place)
+            raise RefusedError(f"a value of kind {value.kind} is given for one of kind {kind}", place)
         if kind == "number":
             if isinstance(value, Fixed) and abs(value.value) <= EXACT:
                 return Fixed(float(value.value), "number")
@@ -132,15 +132,15 @@ class Typing:
         if isinstance(value, Fixed) and float(value.value).is_integer() and abs(value.value) <= EXACT:
             return Fixed(int(value.value), "integer")
         if not self.checked:
-            raise RefusedError("a number with a fraction stands where an integer belongs", place)
+            raise RefusedError("a number is given for an integer, and may have a fraction", place)
         return Operation("whole", (value,), "integer")
 
     def of_type(self, value: Value, wanted: DataType, place: Place | None = None) -> Value:
         """Return a value as one of a declared type, whose bounds are checked in dialect `dsc`."""
-        value = self.converted(value, kind_of(wanted, "the value"), place)
+        value = self.convert(value, kind_of(wanted, "the value"), place)
         if not self.checked or (wanted.least is None and wanted.most is None):
             return value
-        return bounded(value, wanted.least, wanted.most)
+        return bound(value, wanted.least, wanted.most)
 
     # -- conditions --------------------------------------------------------------------------------------
 
@@ -172,7 +172,7 @@ class Typing:
             equal = Comparison("eq", left, right)
             return equal if e.operator == "=" else Opposite(equal)
         kind: Kind = "integer" if left.kind == right.kind == "integer" else "number"
-        left, right = self.converted(left, kind), self.converted(right, kind)
+        left, right = self.convert(left, kind), self.convert(right, kind)
         if e.operator in {">", ">="}:
             left, right = right, left
         relation: Literal["eq", "lt", "le"] = "eq"
@@ -182,7 +182,7 @@ class Typing:
         return Opposite(compared) if e.operator == "!=" else compared
 
 
-def bounded(value: Value, least: float | None, most: float | None) -> Value:
+def bound(value: Value, least: float | None, most: float | None) -> Value:
     """Return a value that fails outside its bounds."""
     if value.kind == "integer":
         low = INT64_MIN if least is None else max(INT64_MIN, math.ceil(least))

@@ -171,7 +171,7 @@ class Timer:
 
 @dataclass(frozen=True, slots=True)
 class Activity:
-    """A skill that a state starts; `timer` limits its time, -1 is no limit."""
+    """A skill that a state starts; `timer` limits its time; -1 means no limit."""
 
     skill: str
     node: int

@@ -40,7 +40,7 @@ def completed_events(compiled: CompiledPlot) -> dict[int, str]:
 
 
 def event_names(compiled: CompiledPlot) -> tuple[list[str], int]:
-    """Return the names of all events by number, and the first number that may be posted; number 0 is no event."""
+    """Return the names of all events by number, and the first number that may be posted; 0 means no event."""
     plot, actions = compiled.plot, [*actions_of(compiled)]
     inner = ["", DONE, EXECUTION_ERROR if compiled.scxml else ERROR]
     inner += completed_events(compiled).values() if compiled.scxml else ()
@@ -59,7 +59,7 @@ def error_numbers(names: list[str]) -> tuple[int, ...]:
     return tuple(number for number, name in enumerate(names) if name in ERRORS)
 
 
-def hears(compiled: CompiledPlot, label: str, event: str) -> bool:
+def triggers(compiled: CompiledPlot, label: str, event: str) -> bool:
     """Return whether transitions with this label react to an event."""
     return matches(label, event) if compiled.scxml else label == event
 
@@ -96,7 +96,7 @@ def join(kinds: dict[str, Kind], name: str, kind: Kind) -> None:
 def join_all(
     kinds: dict[str, Kind], values: Iterable[Mapping[str, TermField]], typing: Typing, refusals: Refusals
 ) -> None:
-    """Add the kinds of arguments; those that cannot be typed are left out, as their own place refuses them."""
+    """Add the kinds of arguments; it omits those without a type, which are refused at their own places."""
     for terms in values:
         for name, term in terms.items():
             try:
@@ -107,6 +107,6 @@ def join_all(
                 join(kinds, name, kind)
 
 
-def converted(arguments: Mapping[str, TermField], kinds: Mapping[str, Kind], typing: Typing) -> Arguments:
+def convert(arguments: Mapping[str, TermField], kinds: Mapping[str, Kind], typing: Typing) -> Arguments:
     """Return arguments as typed values of the kinds that their names have."""
-    return tuple((name, typing.converted(typing.value(term), kinds[name])) for name, term in arguments.items())
+    return tuple((name, typing.convert(typing.value(term), kinds[name])) for name, term in arguments.items())

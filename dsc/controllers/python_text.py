@@ -19,7 +19,6 @@ from dsc.controllers.model import (
     Fire,
     Fixed,
     Group,
-    Kind,
     Read,
     Start,
     Value,
@@ -76,9 +75,6 @@ class _Expressions(ExpressionText):
 
     def call(self, function: str, args: list[str]) -> str:
         return f"{function}({', '.join(args)})"
-
-    def lift(self, text: str, kind: Kind) -> str:
-        return text
 
 
 class _Writer:
@@ -198,17 +194,17 @@ class _Writer:
                 case Assign(values):
                     yield from self._act(values, indent, [f"self.data.{self.data[name]} = " for name, _ in values])
                 case Fire(event, values, outcome):
-                    given = self._given(values, self.attributes)
+                    given = self._give(values, self.attributes)
                     fired = (
                         f"self.host.emit({event}, {given})" if outcome else f"self._fire(Occurrence({event}, {given}))"
                     )
                     yield from self._act(values, indent, fired)
                 case Start(activity, values):
                     yield from self._act(
-                        values, indent, f"self._start({activity}, {self._given(values, self.arguments)})"
+                        values, indent, f"self._start({activity}, {self._give(values, self.arguments)})"
                     )
                 case Command(command, values):
-                    given = self._given(values, self.arguments)
+                    given = self._give(values, self.arguments)
                     yield from self._act(values, indent, f"self.host.command({command}, {given})")
                 case Group(block):
                     yield f"{indent}self._block_{block}()"
@@ -216,7 +212,7 @@ class _Writer:
                     yield from self._branch(condition, then, otherwise, indent)
 
     @staticmethod
-    def _given(values: Arguments, names: dict[str, str]) -> str:
+    def _give(values: Arguments, names: dict[str, str]) -> str:
         given = [f'"{names[name]}": a{number}' for number, (name, _) in enumerate(values)]
         return f"{{{', '.join(given)}}}"
 

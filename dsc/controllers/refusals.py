@@ -36,7 +36,7 @@ class Refusals:
 
     @contextmanager
     def at(self, path: FormPath) -> Iterator[None]:
-        """Keep a refusal inside the block, with the place of the form at `path` if it has no place of its own."""
+        """Keep a refusal inside the block, with the place of the form at `path` if the error has no place."""
         try:
             yield
         except RefusedError as error:

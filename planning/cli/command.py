@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from dsc.cli import plots
+from dsc.cli.controllers import app as controllers_app
 from dsc.cli.logs import PROGRAMMING_ERROR
 from dsc.cli.monitor import monitor_command
 from dsc.cli.runs import app as runs_app
@@ -64,6 +65,7 @@ app.add_typer(kb_app, name="kb")
 app.add_typer(runs_app, name="runs")
 app.add_typer(deployment_app, name="deployment")
 app.add_typer(trees_app, name="tree")
+app.add_typer(controllers_app, name="controller")
 app.command("new")(new_command)
 app.command("run")(run_command)
 app.command("host")(host_command)

@@ -29,7 +29,7 @@ def grow(pick, scxml):
     (plot,) = Grower(pick, scxml=scxml, alone=True).library()
     form = _Rewriting(pick, scxml).changed(plot.to_form())
     sent = ("e", "e.x", "e.y", "ex", "f", "g") if scxml else ("e", "f", "g")
-    form["receives"] = {**{event: ATTRIBUTES for event in sent}, "leave": {}}
+    form["receives"] = {**dict.fromkeys(sent, ATTRIBUTES), "leave": {}}
     form["emits"] = {"out": {"n": "integer" if scxml else "integer from -3 to 9"}}
     bounds = "" if scxml else " from -1e15 to 1e15"
     form["variables"] = {

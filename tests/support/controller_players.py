@@ -72,9 +72,13 @@ class EnginePlayer:
         self.timers: list[_Timer] = []
         self.queue: deque[Any] = deque()
         self.running: dict[int, Any] = {}
-        self.ended = self.runaway = False
-        self.data = {}
-        self.calls, self.records = [], []
+        self.ended = False
+        self.status = 0
+        self.acts: list[Any] = []
+        self.emitted: list[Any] = []
+        self.data: dict[str, Any] = {}
+        self.calls: list[Call] = []
+        self.records: list[Record] = []
 
     def play(self, happened):
         """Everything that happens, as calls for the other players."""
@@ -171,7 +175,7 @@ class EnginePlayer:
         if step.errors or step.bugs:
             self._fail()
         elif step.state.root is None:
-            self._close(step)
+            self.ended = True
 
     def _fail(self):
         self.status |= FAILED
@@ -179,9 +183,6 @@ class EnginePlayer:
         if root is not None:
             self.data = {name: root.variables[name] for name in self.plot.variables}
             self._act(self.machine.leave(self._situation()))
-        self.ended = True
-
-    def _close(self, step):
         self.ended = True
 
     def _act(self, step):
@@ -312,7 +313,7 @@ static void chart_play(void)
     }
 }
 """
-MAIN = "int main(void)\n{\n    int number;\n    while (scanf(\"%d\", &number) == 1) {\n        switch (number) {\n"
+MAIN = 'int main(void)\n{\n    int number;\n    while (scanf("%d", &number) == 1) {\n        switch (number) {\n'
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O0")
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 
@@ -328,7 +329,9 @@ class CPlayers:
             (folder / f"{name}.c").write_text(c_text(model, QUEUE), encoding="utf-8")
             parts.append(f'#include "{name}.c"\n{_driver(model, name)}')
         calls = [f"        case {n}: {identifier(model.name)}_play(); break;\n" for n, model in enumerate(self.models)]
-        parts.append(f"{MAIN}{''.join(calls)}        default: return 1;\n        }}\n        fflush(stdout);\n    }}\n}}\n")
+        parts.append(
+            f"{MAIN}{''.join(calls)}        default: return 1;\n        }}\n        fflush(stdout);\n    }}\n}}\n"
+        )
         (folder / "main.c").write_text("".join(parts), encoding="utf-8")
         self.program = folder / "players"
         command = [cc, *STRICT, *flags, "-o", str(self.program), str(folder / "main.c")]
@@ -348,12 +351,15 @@ class CPlayers:
             return f"s {call.now}\n"
         event, data = self.models[number].events.index(call.event), dict(call.data)
         has = [(int(name in data), data.get(name, 0)) for name in ("n", "z", "b")]
-        numbers = " ".join(f"{given} {value!r}" if name == 1 else f"{given} {int(value)}" for name, (given, value) in enumerate(has))
+        numbers = " ".join(
+            f"{given} {value!r}" if name == 1 else f"{given} {int(value)}" for name, (given, value) in enumerate(has)
+        )
         return f"p {call.run} {event} {numbers}\n"
 
     @staticmethod
     def _record(model, lines):
-        acts, emitted = [], []
+        acts: list[Any] = []
+        emitted: list[Any] = []
         for line in lines:
             what, *words = line.split(" ")
             if what == "R":
@@ -363,7 +369,9 @@ class CPlayers:
                 return Record(status, bool(ended), active, acts, emitted, _values(values, model.data), dropped)
             number = int(words[0])
             if what == "S":
-                acts.append(("start", model.activities[number].skill, int(words[1]), _values(words[2:], model.arguments)))
+                acts.append(
+                    ("start", model.activities[number].skill, int(words[1]), _values(words[2:], model.arguments))
+                )
             elif what == "X":
                 acts.append(("stop", model.activities[number].skill, int(words[1])))
             elif what == "C":
@@ -396,4 +404,8 @@ def _driver(model, name):
     text = DRIVER.replace("@ARGUMENTS@", shown(model.arguments, "a->", has=True))
     text = text.replace("@ATTRIBUTES@", shown(model.attributes, "a->", has=True))
     text = text.replace("@DATA@", shown(model.data, "chart_it.data.", has=False))
-    return text.replace("CHART_", f"{name.upper()}_").replace("chart_", f"{name}_").replace("struct chart ", f"struct {name} ")
+    return (
+        text.replace("CHART_", f"{name.upper()}_")
+        .replace("chart_", f"{name}_")
+        .replace("struct chart ", f"struct {name} ")
+    )

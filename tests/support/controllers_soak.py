@@ -39,7 +39,7 @@ class Chart:
         pick = random.Random(seed).choice
         self.plot = grow(pick, scxml).model_copy(update={"name": f"c{seed}"})
         self.plays = []
-        seen = Counter()
+        seen: Counter[str] = Counter()
         for _ in range(plays):
             engine = EnginePlayer(self.plot)
             engine.play(draw_play(pick, scxml))
@@ -85,7 +85,8 @@ def main():
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--plays", type=int, default=4)
     options = parser.parse_args()
-    cc, counts, began = shutil.which("cc"), Counter(), time.monotonic()
+    counts: Counter[str] = Counter()
+    cc, began = shutil.which("cc"), time.monotonic()
     if cc is None:
         print("there is no C compiler `cc`: only Python controllers are compared")
     run(range(options.first, options.first + options.charts), options.plays, cc, counts)

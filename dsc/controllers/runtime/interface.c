@@ -2,15 +2,15 @@
 enum chart_status {
     CHART_OK = 0,
     CHART_FULL = 1,      /* the queue is full: the event is dropped, and counted in `dropped` */
-    CHART_UNKNOWN = 2,   /* nobody may post this event or number, or the controller has ended */
-    CHART_LOST = 4,      /* too many internal events at once: one is lost, and counted in `lost` */
+    CHART_UNKNOWN = 2,   /* the event or a number cannot be posted, or the controller has ended */
+    CHART_LOST = 4,      /* a queue of internal events is full: one is lost, and counted in `lost` */
     CHART_OVERFLOW = 8,  /* an integer left the range of 64 bits, or is too large to be a double */
     CHART_FAILED = 16,   /* no transition handles an error or an outcome: the controller has ended */
     CHART_RUNAWAY = 32,  /* the chart goes round: the controller has ended */
     CHART_BUSY = 64      /* there is more to do: call `chart_step` again */
 };
 
-/* What the controller acts on; functions that are NULL are not called. Each may call `chart_post` and `chart_end`. */
+/* The program around a controller; functions that are NULL are not called. Each may call `chart_post` and `chart_end`. */
 struct chart_host {
     void *context;
     /* Start an activity; report its end with `chart_end(controller, run, event, data)`. */

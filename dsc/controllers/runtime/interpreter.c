@@ -408,7 +408,7 @@ static void chart_complete_around(struct chart *c, int index)
 {
     const struct chart_node *node = &chart_nodes[index];
     if (!node->final) {
-        if (node->at_once) {
+        if (node->immediate) {
             chart_complete(c, index);
         }
         return;

@@ -51,7 +51,7 @@ class Microsteps(Selection):
     def _exit(self, leaving: list[bool], own: list[bool]) -> None:
         """Exit nodes, inner nodes first; nodes outside `own` are interrupted."""
         leaves = self._leaves()
-        for index, node in enumerate(self.nodes):
+        for node in self.nodes:
             if node.memory >= 0 and leaving[node.parent]:
                 inside = range(node.parent + 1, self.nodes[node.parent].last + 1)
                 children = [one for one in inside if self.active[one] and self.nodes[one].parent == node.parent]
@@ -97,7 +97,7 @@ class Microsteps(Selection):
             node = self.nodes[target]
             if node.memory >= 0 and node.memory not in self.memory:
                 after[node.parent] = node.default_block
-        return [real for target in targets for real in self._resolved(target)]
+        return [real for target in targets for real in self._resolve(target)]
 
     def _add_ways(self, around: int, targets: list[int], entering: set[int], after: dict[int, int]) -> set[int]:
         """Add the paths from `around` to the targets, then the targets' default content; return the paths' nodes."""
@@ -128,7 +128,7 @@ class Microsteps(Selection):
     def _complete_around(self, index: int, node: Node) -> None:
         """Complete the nodes whose content has ended with the entry of a node."""
         if not node.final:
-            if node.at_once:
+            if node.immediate:
                 self._complete(index)
             return
         around = node.parent

@@ -32,12 +32,16 @@ class Selection(ControllerState):
 
     def _edges_of(self, index: int, occurrence: Occurrence | None) -> list[int]:
         event = 0 if occurrence is None else occurrence.event
-        if occurrence is not None and occurrence.node >= 0 and index != occurrence.node:
-            if occurrence.exact or not self._inside(occurrence.node, index):
-                return []
+        if occurrence is not None and not self._sees(index, occurrence):
+            return []
         if occurrence is not None and occurrence.edge >= 0:
             return [occurrence.edge]
         return [edge for trigger, edge in self.nodes[index].edges if trigger == event]
+
+    def _sees(self, index: int, occurrence: Occurrence) -> bool:
+        if occurrence.node < 0 or index == occurrence.node:
+            return True
+        return not occurrence.exact and self._inside(occurrence.node, index)
 
     def _holds(self, edge: int) -> bool:
         """Return whether the guard of an edge is true; report its failure once in a macrostep, or once for an event."""
@@ -74,7 +78,7 @@ class Selection(ControllerState):
 
     def _domain(self, number: int) -> int:
         edge = self.edges[number]
-        real = [one for target in edge.targets for one in self._resolved(target, edge.cleared)]
+        real = [one for target in edge.targets for one in self._resolve(target, edge.cleared)]
         if edge.internal and all(self._inside(target, edge.source) for target in real):
             return edge.source
         index = self.nodes[edge.source].parent
@@ -85,8 +89,8 @@ class Selection(ControllerState):
             index = node.parent
         return index
 
-    def _resolved(self, target: int, cleared: tuple[int, ...] = ()) -> list[int]:
-        """Return the nodes for which a target stands: the remembered nodes or the default of a history."""
+    def _resolve(self, target: int, cleared: tuple[int, ...] = ()) -> list[int]:
+        """Return the nodes that replace a target: the remembered nodes or the default of a history."""
         node = self.nodes[target]
         if node.memory < 0:
             return [target]

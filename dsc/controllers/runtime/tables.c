@@ -11,7 +11,7 @@ struct chart_node {
     int entry, leave, broken, outcome;
     bool waits;
     int done;
-    bool at_once;
+    bool immediate;
     int trigger, triggers; /* first and number of its triggers */
 };
 

@@ -23,8 +23,8 @@ class Status(IntFlag):
 
     OK = 0
     FULL = 1  # the queue is full: the event is dropped, and counted in `dropped`
-    UNKNOWN = 2  # nobody may post this event or number, or the controller has ended
-    LOST = 4  # too many internal events at once: one is lost, and counted in `lost`
+    UNKNOWN = 2  # the event or a number cannot be posted, or the controller has ended
+    LOST = 4  # a queue of internal events is full: one is lost, and counted in `lost`
     OVERFLOW = 8  # an integer left the range of 64 bits, or is too large to be a double
     FAILED = 16  # no transition handles an error or an outcome: the controller has ended
     RUNAWAY = 32  # the chart goes round: the controller has ended
@@ -52,7 +52,7 @@ class Node(NamedTuple):
     outcome: int = 0
     waits: bool = False
     done: int = 0
-    at_once: bool = False
+    immediate: bool = False
     edges: tuple[tuple[int, int], ...] = ()
     timers: tuple[int, ...] = ()
     activities: tuple[int, ...] = ()
@@ -100,7 +100,7 @@ class Occurrence(NamedTuple):
 
 
 class Host:
-    """What a controller acts on; override what is needed."""
+    """The program around a controller; a subclass overrides what it needs."""
 
     def start(self, activity: int, run: int, arguments: Mapping[str, Any]) -> None:
         """Start an activity; report its end with `end(run, event)`."""

@@ -31,10 +31,10 @@ def whole(value: Number) -> int | Failure:
         return value
     if not value.is_integer():
         return ERROR
-    return _checked(int(value))
+    return _check_range(int(value))
 
 
-def _checked(value: int) -> int | Failure:
+def _check_range(value: int) -> int | Failure:
     return value if INT64_MIN <= value <= INT64_MAX else OVERFLOW
 
 
@@ -42,26 +42,26 @@ def add_int(a: int | Failure, b: int | Failure) -> int | Failure:
     """Return the sum of two integers."""
     if isinstance(a, Failure):
         return a
-    return b if isinstance(b, Failure) else _checked(a + b)
+    return b if isinstance(b, Failure) else _check_range(a + b)
 
 
 def sub_int(a: int | Failure, b: int | Failure) -> int | Failure:
     """Return the difference of two integers."""
     if isinstance(a, Failure):
         return a
-    return b if isinstance(b, Failure) else _checked(a - b)
+    return b if isinstance(b, Failure) else _check_range(a - b)
 
 
 def mul_int(a: int | Failure, b: int | Failure) -> int | Failure:
     """Return the product of two integers."""
     if isinstance(a, Failure):
         return a
-    return b if isinstance(b, Failure) else _checked(a * b)
+    return b if isinstance(b, Failure) else _check_range(a * b)
 
 
 def neg_int(a: int | Failure) -> int | Failure:
     """Return the negative of an integer."""
-    return a if isinstance(a, Failure) else _checked(-a)
+    return a if isinstance(a, Failure) else _check_range(-a)
 
 
 def _finite(value: float) -> Number:
