@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-from knowledge_base.errors import InputError, UnknownNameError
-
-if TYPE_CHECKING:
-    from dsc.controllers.model import Controller
-    from dsc.model.plot import ActionPlot
 
 app = typer.Typer(
     name="controller",
@@ -39,30 +32,8 @@ def build(
 ) -> None:
     """Write a plot as one Python module or one C99 file; report all forms that a controller cannot have."""
     from dsc.cli.plots import load_chart
-    from dsc.controllers.c_text import c_text
-    from dsc.controllers.python_text import python_text
+    from dsc.controllers import build_controller
     from knowledge_base.output_files import Output
 
-    targets: dict[str, Callable[[Controller, int], str]] = {"python": python_text, "c99": c_text}
-    if target not in targets:
-        raise UnknownNameError(f"--target: there is no language '{target}'", found=target, valid=targets)
     output = Output(out, "--out", chart)
-    output.write(targets[target](_compile(load_chart(chart)), queue))
-
-
-def _compile(plot: ActionPlot) -> Controller:
-    """Return the model of a plot without mistakes; a form that a controller cannot have precedes other mistakes."""
-    from dsc.controllers.building import compile_controller
-    from dsc.dynamic.library import Library
-    from dsc.errors import PlotError
-    from dsc.validation import raise_findings, validate_plot
-
-    try:
-        controller = compile_controller(plot)
-    except PlotError:
-        raise
-    except InputError:
-        raise_findings(validate_plot(plot, Library([plot])))
-        raise
-    raise_findings(validate_plot(plot, Library([plot])))
-    return controller
+    output.write(build_controller(load_chart(chart), target, queue))

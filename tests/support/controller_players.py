@@ -229,9 +229,8 @@ class PythonPlayer:
 
     def __init__(self, plot):
         self.model = compile_controller(plot)
-        self.text = python_text(self.model, QUEUE)
         self.module: dict[str, Any] = {"__name__": "controller"}
-        exec(compile(self.text, "controller.py", "exec"), self.module)  # noqa: S102  what is tested
+        exec(compile(python_text(self.model, QUEUE), "controller.py", "exec"), self.module)  # noqa: S102  what is tested
         self.controller = self.module["Controller"]()
         self.acts, self.emitted = [], []
 

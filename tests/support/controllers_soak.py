@@ -2,7 +2,8 @@
 
 `make controllers` runs it. Each chart gets several plays; the record of each call has the status, the configuration,
 the skills started and stopped, the commands, the outcomes and the variables. After an overflow of 64 bits, which the
-engine does not have, only the two controllers are compared. At the end, a table has the sizes and times of one chart.
+engine does not have, only the two controllers are compared. At the end, a table has the sizes and times of the line
+follower of the page.
 """
 
 from __future__ import annotations
@@ -17,7 +18,11 @@ from collections import Counter
 from pathlib import Path
 
 from controller_charts import draw_play, grow
+from controller_times import LINE_FOLLOWER, time_c, time_engine, time_python
 from controller_players import NOT_OF_THE_ENGINE, CPlayers, EnginePlayer, PythonPlayer
+
+from dsc.controllers import build_controller
+from dsc.text.plot_files import load_plot
 
 
 class DiffersError(AssertionError):
@@ -40,10 +45,11 @@ class Chart:
         self.plot = grow(pick, scxml).model_copy(update={"name": f"c{seed}"})
         self.plays = []
         seen: Counter[str] = Counter()
+        controller = PythonPlayer(self.plot)
         for _ in range(plays):
             engine = EnginePlayer(self.plot)
             engine.play(draw_play(pick, scxml))
-            records = [*PythonPlayer(self.plot).play(engine.calls)]
+            records = [*controller.play(engine.calls)]
             compared = self._compared(records)
             compare(engine.records[:compared], records[:compared], f"seed {seed}, engine and Python")
             self.plays.append((engine.calls, records))
@@ -79,6 +85,20 @@ def run(seeds, plays, cc, counts, batch=25):
             counts.update(c_calls=len(own))
 
 
+def print_table(cc):
+    """Print the sizes and the times of a step of the line follower, relative to the Python controller."""
+    plot = load_plot(LINE_FOLLOWER)
+    python, c = build_controller(plot, "python"), build_controller(plot, "c99")
+    rows = [("engine", "", time_engine(plot)), ("python", python, time_python(python))]
+    if cc is not None:
+        with tempfile.TemporaryDirectory() as folder:
+            rows.append(("c99", c, time_c(Path(folder), c, cc)))
+    unit = rows[1][2]
+    print(f"{'player':8} {'lines':>6} {'bytes':>7} {'us a step':>10} {'ratio':>8}")
+    for name, text, seconds in rows:
+        print(f"{name:8} {text.count(chr(10)):6} {len(text):7} {seconds * 1e6:10.3f} {seconds / unit:8.3f}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--charts", type=int, default=200)
@@ -93,6 +113,7 @@ def main():
     for name, count in counts.items():
         print(f"{name:14} {count}")
     print(f"{time.monotonic() - began:.0f} s: all players agree")
+    print_table(cc)
 
 
 if __name__ == "__main__":
