@@ -10,7 +10,7 @@ LONG   := $(shell cat tests/long.txt)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: house mistakes lively soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-long test-engines test-all check types limits conformance oracle-trees sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
+.PHONY: house mistakes lively controllers soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-long test-engines test-all check types limits conformance oracle-trees sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
 .PHONY: bench-startup bench-broken bench-editor bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-choice bench-learned-costs bench-transforms bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
@@ -95,6 +95,9 @@ soak: $(VENV)/.run   ## simulated runs of the clean-up table with faults and cra
 
 soak-robots: $(VENV)/.test   ## random small robots with faults, changes by others, priorities and kills: is every promise kept? (RUNS=N FIRST=SEED)
 	$(BIN)/python tests/support/random_robots.py --runs $(or $(RUNS),2000) --first $(or $(FIRST),0)
+
+controllers: $(VENV)/.test   ## random charts: do the engine, a generated Python module and a generated C file agree, call by call? (CHARTS=N FIRST=SEED PLAYS=N)
+	$(BIN)/python tests/support/controllers_soak.py --charts $(or $(CHARTS),200) --first $(or $(FIRST),0) --plays $(or $(PLAYS),4)
 
 soak-signals: $(VENV)/.test   ## signals at random moments of real runs with a device: is it braked, closed one time, and the run resumed? (RUNS=N FIRST=SEED)
 	$(BIN)/python tests/support/signals_soak.py $(or $(RUNS),25) $(or $(FIRST),0)

@@ -59,8 +59,8 @@ def _runtime(name: str) -> list[str]:
 class _Expressions(ExpressionText):
     words = ("and", "or", "not ")
 
-    def __init__(self, data: dict[str, str], attributes: dict[str, str]) -> None:
-        self._data, self._attributes = data, attributes
+    def __init__(self, data: dict[str, str]) -> None:
+        self._data = data
 
     def constant(self, value: Fixed) -> str:
         return repr(value.value)
@@ -68,7 +68,7 @@ class _Expressions(ExpressionText):
     def read(self, value: Read) -> str:
         if value.source == "data":
             return f"self.data.{self._data[value.name]}"
-        return f'self.event["{self._attributes[value.name]}"]'
+        return f'self.event["{value.name}"]'
 
     def active(self, node: int) -> str:
         return f"self.active[{node}]"
@@ -81,9 +81,7 @@ class _Writer:
     def __init__(self, controller: Controller, queue: int) -> None:
         self.controller, self.queue = controller, queue
         self.data = dict(zip(controller.data, identifiers(controller.data), strict=True))
-        self.attributes = dict(zip(controller.attributes, identifiers(controller.attributes), strict=True))
-        self.arguments = dict(zip(controller.arguments, identifiers(controller.arguments), strict=True))
-        self.text = _Expressions(self.data, self.attributes)
+        self.text = _Expressions(self.data)
 
     def lines(self) -> Iterator[str]:
         controller = self.controller
@@ -124,7 +122,7 @@ class _Writer:
         yield f"    first_event = {one.first_event}"
         yield f"    error_events = frozenset({one.error_events})"
         yield f"    timed_out = {one.timed_out}"
-        kinds = (f'"{self.attributes[name]}": {_TYPES[kind]}' for name, kind in one.attributes.items())
+        kinds = (f'"{name}": {_TYPES[kind]}' for name, kind in one.attributes.items())
         yield f"    attributes = {{{', '.join(kinds)}}}"
         yield f"    scxml = {one.scxml}"
         yield f"    queue_capacity = {self.queue}"
@@ -168,7 +166,7 @@ class _Writer:
     def _functions(self) -> Iterator[str]:
         for number, (about, condition) in enumerate(self.controller.guards):
             yield from ("", f"    def _guard_{number}(self):", f"        # {about}")
-            missing = _missing(condition, self.attributes)
+            missing = _missing(condition)
             if missing:
                 yield from (f"        if {missing}:", "            return ERROR")
             yield f"        return {self.text.condition(condition)}"
@@ -177,7 +175,7 @@ class _Writer:
             yield from self._actions(block.actions, "        ") if block.actions else ("        pass",)
         for number, timer in enumerate(self.controller.timers):
             yield from ("", f"    def _seconds_{number}(self):")
-            missing = _missing(timer.seconds, self.attributes)
+            missing = _missing(timer.seconds)
             if missing:
                 yield from (f"        if {missing}:", "            return ERROR")
             yield f"        return {self.text.value(timer.seconds)}"
@@ -194,17 +192,15 @@ class _Writer:
                 case Assign(values):
                     yield from self._act(values, indent, [f"self.data.{self.data[name]} = " for name, _ in values])
                 case Fire(event, values, outcome):
-                    given = self._give(values, self.attributes)
+                    given = self._give(values)
                     fired = (
                         f"self.host.emit({event}, {given})" if outcome else f"self._fire(Occurrence({event}, {given}))"
                     )
                     yield from self._act(values, indent, fired)
                 case Start(activity, values):
-                    yield from self._act(
-                        values, indent, f"self._start({activity}, {self._give(values, self.arguments)})"
-                    )
+                    yield from self._act(values, indent, f"self._start({activity}, {self._give(values)})")
                 case Command(command, values):
-                    given = self._give(values, self.arguments)
+                    given = self._give(values)
                     yield from self._act(values, indent, f"self.host.command({command}, {given})")
                 case Group(block):
                     yield f"{indent}self._block_{block}()"
@@ -212,14 +208,14 @@ class _Writer:
                     yield from self._branch(condition, then, otherwise, indent)
 
     @staticmethod
-    def _give(values: Arguments, names: dict[str, str]) -> str:
-        given = [f'"{names[name]}": a{number}' for number, (name, _) in enumerate(values)]
+    def _give(values: Arguments) -> str:
+        given = [f'"{name}": a{number}' for number, (name, _) in enumerate(values)]
         return f"{{{', '.join(given)}}}"
 
     def _act(self, values: Arguments, indent: str, then: str | list[str]) -> Iterator[str]:
         """Yield the computation of values, then what is done with them unless one has failed."""
         inner = indent
-        missing = _missing_of([value for _, value in values], self.attributes)
+        missing = _missing_of([value for _, value in values])
         if missing:
             yield from (
                 f"{indent}if {missing}:",
@@ -251,7 +247,7 @@ class _Writer:
     def _branch(
         self, condition: Condition, then: tuple[Action, ...], otherwise: tuple[Action, ...], indent: str
     ) -> Iterator[str]:
-        missing = _missing(condition, self.attributes)
+        missing = _missing(condition)
         text = self.text.condition(condition)
         yield f"{indent}chosen = {f'ERROR if {missing} else ' if missing else ''}{text}"
         yield from (f"{indent}if isinstance(chosen, Failure):", f"{indent}    self._fail(chosen)")
@@ -269,9 +265,9 @@ def _table(name: str, rows: list[str]) -> Iterator[str]:
     yield "    )"
 
 
-def _missing(e: Value | Condition, names: dict[str, str]) -> str:
-    return " or ".join(f'"{names[name]}" not in self.event' for name in attributes_read(e))
+def _missing(e: Value | Condition) -> str:
+    return " or ".join(f'"{name}" not in self.event' for name in attributes_read(e))
 
 
-def _missing_of(values: list[Value], names: dict[str, str]) -> str:
-    return " or ".join(dict.fromkeys(text for value in values if (text := _missing(value, names))))
+def _missing_of(values: list[Value]) -> str:
+    return " or ".join(dict.fromkeys(text for value in values if (text := _missing(value))))

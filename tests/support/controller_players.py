@@ -27,6 +27,8 @@ QUEUE = 4
 """Capacity of the queue, so small that it overflows."""
 FULL, UNKNOWN, LOST, OVERFLOW, FAILED, RUNAWAY, BUSY = 1, 2, 4, 8, 16, 32, 64
 MOST_EVENTS = 1000
+NEVER = 9e9
+"""The seconds from which a timer of a controller is never due."""
 NOT_OF_THE_ENGINE = LOST | OVERFLOW | RUNAWAY
 
 
@@ -76,7 +78,6 @@ class EnginePlayer:
         self.status = 0
         self.acts: list[Any] = []
         self.emitted: list[Any] = []
-        self.data: dict[str, Any] = {}
         self.calls: list[Call] = []
         self.records: list[Record] = []
 
@@ -105,10 +106,9 @@ class EnginePlayer:
         except RunawayError:
             status, self.ended = RUNAWAY, True
         root = self.machine.state.root
-        if root is not None:
-            self.data = {name: root.variables[name] for name in self.plot.variables}
+        data = {} if root is None else {name: root.variables[name] for name in self.plot.variables}
         active = tuple(self.machine.state.configuration())
-        self.records.append(Record(status, self.ended, active, self.acts, self.emitted, self.data, self.dropped))
+        self.records.append(Record(status, self.ended, active, self.acts, self.emitted, data, self.dropped))
 
     def _make(self, call):
         if call.what == "step":
@@ -179,9 +179,7 @@ class EnginePlayer:
 
     def _fail(self):
         self.status |= FAILED
-        root = self.machine.state.root
-        if root is not None:
-            self.data = {name: root.variables[name] for name in self.plot.variables}
+        if self.machine.state.root is not None:
             self._act(self.machine.leave(self._situation()))
         self.ended = True
 
@@ -220,6 +218,8 @@ class EnginePlayer:
                 self.acts.append(("stop", skill, run))
 
     def _set_timer(self, seconds, activation, event, index):
+        if seconds >= NEVER:
+            return
         self.orders += 1
         self.timers.append(_Timer(self.clock + int(seconds * 1e9 + 0.5), self.orders, activation, event, index))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import time
 from pathlib import Path
+from typing import Any
 
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
@@ -57,7 +58,7 @@ def time_engine(plot):
 
 def time_python(text):
     """Seconds of a step."""
-    module = {"__name__": "line_follower"}
+    module: dict[str, Any] = {"__name__": "line_follower"}
     exec(compile(text, "line_follower.py", "exec"), module)  # noqa: S102  what is measured
     controller, event = module["Controller"](), module["Events"].SENSED
     controller.init(module["Host"]())
