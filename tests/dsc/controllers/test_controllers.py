@@ -198,3 +198,32 @@ def test_names_that_are_words_of_the_languages(tmp_path):
     compare(player.records, python, "engine and Python")
     assert python[-1].active == ("a_b",)
     assert len(CPlayers(tmp_path, [odd], CC).play([(0, player.calls[1:])])[0]) == 2
+
+
+@pytest.mark.parametrize("kind", ["shallow", "deep"])
+def test_histories_and_clear(kind, tmp_path):
+    chart = plot(f"""
+        plot: player
+        dialect: scxml
+        receives: {{e: {{n: integer, z: number, b: boolean}}, f: , g: , leave: }}
+        states:
+          playing:
+            initial: one
+            states:
+              h: {{history: {kind}, to: one}}
+              one: {{states: {{slow: {{on: {{e: fast}}}}, fast: {{on: {{e: two}}}}}}}}
+              two: {{states: {{low: {{on: {{e: high}}}}, high: {{}}}}}}
+            on: {{leave: off}}
+          off: {{on: {{f: h, g: {{to: h, clear: playing}}, leave: playing}}}}
+    """)
+    player = EnginePlayer(chart)
+    names = "e leave f e e leave f leave g leave f"
+    player.play([(name, 0, {}, now) for name in names.split() for name, now in ((name, 0), ("step", 1))])
+    python = [*PythonPlayer(chart).play(player.calls)]
+    compare(player.records, python, "engine and Python")
+    assert [one.active[-1] for one in python[2::2]] == {
+        "shallow": ["fast", "off", "slow", "fast", "low", "off", "low", "off", "slow", "off", "slow"],
+        "deep": ["fast", "off", "fast", "low", "high", "off", "high", "off", "slow", "off", "slow"],
+    }[kind]
+    if CC is not None:
+        compare(python, CPlayers(tmp_path, [chart], CC).play([(0, player.calls)])[0], "Python and C")
