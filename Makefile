@@ -96,8 +96,8 @@ soak: $(VENV)/.run   ## simulated runs of the clean-up table with faults and cra
 soak-robots: $(VENV)/.test   ## random small robots with faults, changes by others, priorities and kills: is every promise kept? (RUNS=N FIRST=SEED)
 	$(BIN)/python tests/support/random_robots.py --runs $(or $(RUNS),2000) --first $(or $(FIRST),0)
 
-controllers: $(VENV)/.test   ## random charts: do the engine, a generated Python module and a generated C file agree, call by call? (CHARTS=N FIRST=SEED PLAYS=N)
-	$(BIN)/python tests/support/controllers_soak.py --charts $(or $(CHARTS),200) --first $(or $(FIRST),0) --plays $(or $(PLAYS),4)
+controllers: $(VENV)/.test   ## random charts: do the engine, a generated Python module and a generated C file agree, call by call? (CHARTS=N FIRST=SEED PLAYS=N SECONDS=N)
+	$(BIN)/python tests/support/controllers_soak.py --charts $(or $(CHARTS),200) --first $(or $(FIRST),0) --plays $(or $(PLAYS),4) $(if $(SECONDS),--seconds $(SECONDS))
 
 soak-signals: $(VENV)/.test   ## signals at random moments of real runs with a device: is it braked, closed one time, and the run resumed? (RUNS=N FIRST=SEED)
 	$(BIN)/python tests/support/signals_soak.py $(or $(RUNS),25) $(or $(FIRST),0)

@@ -9,6 +9,7 @@ follower of the page.
 from __future__ import annotations
 
 import argparse
+import math
 import random
 import shutil
 import sys
@@ -24,6 +25,10 @@ from controller_times import LINE_FOLLOWER, time_c, time_engine, time_python
 
 from dsc.controllers import build_controller
 from dsc.text.plot_files import load_plot
+
+
+BATCH = 20
+"""Charts that are compiled to one program."""
 
 
 class DiffersError(AssertionError):
@@ -73,7 +78,7 @@ class Chart:
         return next(ends, len(records))
 
 
-def run(seeds, plays, cc, counts, batch=25):
+def run(seeds, plays, cc, counts, batch=BATCH):
     """Compare the charts of these seeds; with a compiler, also with C."""
     left = [*seeds]
     while left:
@@ -110,12 +115,16 @@ def main():
     parser.add_argument("--charts", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--plays", type=int, default=4)
+    parser.add_argument("--seconds", type=float, default=math.inf, help="no further charts after this time")
     options = parser.parse_args()
     counts: Counter[str] = Counter()
     cc, began = shutil.which("cc"), time.monotonic()
     if cc is None:
         print("there is no C compiler `cc`: only Python controllers are compared")
-    run(range(options.first, options.first + options.charts), options.plays, cc, counts)
+    end = options.first + options.charts
+    for first in range(options.first, end, BATCH):
+        if time.monotonic() - began < options.seconds:
+            run(range(first, min(first + BATCH, end)), options.plays, cc, counts)
     for name, count in counts.items():
         print(f"{name:14} {count}")
     print(f"{time.monotonic() - began:.0f} s: all players agree")
