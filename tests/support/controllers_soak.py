@@ -26,7 +26,6 @@ from controller_times import LINE_FOLLOWER, time_c, time_engine, time_python
 from dsc.controllers import build_controller
 from dsc.text.plot_files import load_plot
 
-
 BATCH = 20
 """Charts that are compiled to one program."""
 
