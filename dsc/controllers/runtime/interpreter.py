@@ -75,7 +75,7 @@ class Interpreter(Microsteps):
         return [index for index, node in enumerate(self.nodes) if self.active[index] and node.state]
 
     def _queue(self, event: int, run: int, data: Mapping[str, Any]) -> Status:
-        data = self._typed(data)
+        data = self._convert(data)
         if self.ended or not self.first_event <= event < len(self.event_names) or not all(map(isfinite, data.values())):
             return Status.UNKNOWN
         if len(self.queue) >= self.queue_capacity:
@@ -84,7 +84,7 @@ class Interpreter(Microsteps):
         self.queue.append(Occurrence(event, data, run=run))
         return Status.OK
 
-    def _typed(self, data: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _convert(self, data: Mapping[str, Any]) -> Mapping[str, Any]:
         for name, value in data.items():
             wanted = self.attributes.get(name)
             if wanted is None or (isinstance(value, bool) is not (wanted is bool)) or isinstance(value, str):
