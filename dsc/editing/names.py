@@ -44,13 +44,19 @@ class Occurrence:
 
 _VALUES: Mapping[str, NameKind] = {
     "target": "state", "ways": "state", "way": "state", "cases": "state", "plot": "plot", "plots": "plot",
-    "skill": "skill", "action": "action", "event": "event", "type": "type", "name": "plot",
+    "skill": "skill", "action": "action", "event": "event", "type": "type", "name": "plot", "history": "state",
+    "variable": "variable",
 }  # fmt: skip
 _KEYS: Mapping[str, NameKind] = {
     "states": "state", "parameters": "variable", "variables": "variable", "on": "event", "events": "event",
 }  # fmt: skip
+_OF_PLOT = frozenset({"state", "variable"})
+"""Kinds of names that are valid in one plot."""
 _TOKEN = re.compile(r"""(?P<head>\(\s*)?(?P<word>\??[^\s()"';{}\[\],]+)""")
-_BORDER = re.compile(r"^[?:]")
+_IN_STATE = "in-state"
+_PATHS = frozenset({"dsc:active", "dsc:running", "dsc:executes", "dsc:waits"})
+"""Relations whose first argument is the path of a state."""
+_SEGMENT = re.compile(r"[^/]+")
 
 
 def plot_names(document: Document, spans: Spans, text: str) -> Iterator[Occurrence]:
@@ -61,10 +67,12 @@ def plot_names(document: Document, spans: Spans, text: str) -> Iterator[Occurren
     for path, (begin, end) in spans.keys.items():
         role, name = role_of(PLOT, path[:-1]), str(path[-1])
         if role in _KEYS:
-            scope = plot if _KEYS[role] in {"state", "variable"} else ""
+            scope = plot if _KEYS[role] in _OF_PLOT else ""
             yield Occurrence(_KEYS[role], name, begin, end, role != "on", scope, _about(_part(data, path)))
             if role == "parameters" and data.get("implements"):
                 yield Occurrence("variable", name, begin, end, False, f"action {data['implements']}")  # noqa: FBT003
+        elif role == "assigned" and name in own:
+            yield Occurrence("variable", name, begin, end, scope=plot)
         elif role == "arguments":
             for used in used_plots(_part(data, path[:-2])):
                 yield Occurrence("variable", name, begin, end, scope=used)
@@ -77,8 +85,9 @@ def plot_names(document: Document, spans: Spans, text: str) -> Iterator[Occurren
         elif role in _VALUES:
             kind = _VALUES[role]
             start = begin + (text[begin : begin + 1] in {"'", '"'})
-            scope, about = (plot, "") if kind == "state" else ("", _signature(data) if role == "name" else "")
-            yield Occurrence(kind, value, start, start + len(value), role == "name", scope, about)
+            scope, about = (plot if kind in _OF_PLOT else ""), (_signature(data) if role == "name" else "")
+            name = value.removesuffix("*") if role == "history" else value
+            yield Occurrence(kind, name, start, start + len(name), role == "name", scope, about)
 
 
 def profile_names(spans: Spans) -> Iterator[Occurrence]:
@@ -93,17 +102,33 @@ def profile_names(spans: Spans) -> Iterator[Occurrence]:
 
 def expression_names(text: str, start: int, scope: str, variables: Iterable[str]) -> Iterator[Occurrence]:
     """Yield the names in the text of a condition, effect or term that begins at an offset of a plot."""
-    after_dash = False
+    before = ""
     for match in _TOKEN.finditer(text):
         word, begin = match["word"], start + match.start("word")
         name = word.removeprefix("?")
         if word.startswith("?"):
-            if name in variables:
-                yield Occurrence("variable", name, begin + 1, begin + len(word), scope=scope)
+            if name.lower() in variables:
+                yield Occurrence("variable", name.lower(), begin + 1, begin + len(word), scope=scope)
+        elif before.lower() == _IN_STATE:
+            yield Occurrence("state", word, begin, begin + len(word), scope=scope)
+        elif before in _PATHS:
+            for part in _SEGMENT.finditer(word):
+                yield Occurrence("state", part[0], begin + part.start(), begin + part.end(), scope=scope)
         elif word not in KEYWORDS and name[:1].isalpha():
-            kind: NameKind = "relation" if match["head"] else "type" if after_dash else "object"
+            kind: NameKind = "relation" if match["head"] else "type" if before == "-" else "object"
             yield Occurrence(kind, name, begin, begin + len(word))
-        after_dash = word == "-"
+        before = word
+
+
+def variables_in(data: Any) -> set[str]:
+    """Return the names of all variables in the conditions, effects and terms of a plot's data."""
+    if isinstance(data, str):
+        return {found.lower() for found in _VARIABLE.findall(data)}
+    inside = data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
+    return {name for one in inside for name in variables_in(one)}
+
+
+_VARIABLE = re.compile(r"\?([\w\-]+)")
 
 
 def _part(data: Any, path: Iterable[str | int]) -> Any:

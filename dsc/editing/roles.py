@@ -7,7 +7,18 @@ from collections.abc import Iterable, Mapping
 PLOT, PROFILE = "document", "profile"
 """The roles of whole documents."""
 
-_WAY = {"to": "target", "also": "target", "do": "actions", "emit": "event", "when": "text", "tell": "text"}
+_WAY = {
+    "to": "target",
+    "also": "target",
+    "do": "actions",
+    "emit": "event",
+    "when": "text",
+    "tell": "text",
+    "assign": "assigned",
+    "bind": "assigned",
+    "bind_all": "assigned",
+    "clear": "history",
+}
 _INSIDE = {"states": "states", "initial": "target"}
 _ROLES: Mapping[str, Mapping[str, str]] = {
     "document": {
@@ -21,13 +32,15 @@ _ROLES: Mapping[str, Mapping[str, str]] = {
         **_INSIDE, "regions": "regions", "connectors": "states", "on": "on", "after": "timed", "every": "timed",
         "always": "ways", "choice": "ways", "cases": "cases", "else": "way", "use": "plot", "dynamic": "plots",
         "with": "arguments", "entry": "actions", "exit": "actions", "on_break": "actions", "emit": "event",
+        "to": "target", "do": "actions",
     },
     "on": {"*": "ways"},
     "cases": {"*": "way"},
     "ways": _WAY,
     "way": _WAY,
     "timed": _WAY,
-    "actions": {"trigger": "skill", "emit": "event", "then": "actions", "else": "actions", "block": "actions"},
+    "actions": {"trigger": "skill", "emit": "event", "then": "actions", "else": "actions", "block": "actions",
+                "assign": "assigned", "into": "variable"},
     "parameters": {"*": "declaration"},
     "variables": {"*": "declaration"},
     "declaration": {"type": "type"},

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
+from dsc.model.reading import FormPath
 from dsc.model.states import DynamicState
 from dsc.model.transitions import case_value
 from dsc.text.yaml import Document, dump, load_document, path_of, read_file, read_model
@@ -103,6 +104,20 @@ def _key(name: str, role: str) -> str | int | float:
     """Return the key of a case as the constant that YAML writes; return every other key unchanged."""
     value = case_value(name) if role == "cases" else name
     return name if isinstance(value, str) else value
+
+
+def may_be_single(path: FormPath) -> bool:
+    """Return whether the list at a path may be written as its only element."""
+    return path[-1:] != () and (path[-1] in _SINGLE | {"choice", "of"} or path[-2:-1] == ("on",))
+
+
+def place_of_key(keys: Iterable[str | int], key: str | int, path: FormPath) -> int:
+    """Return the usual position of a new key in the mapping at a path; new names are the last."""
+    known = [*keys]
+    if path[-1:] and path[-1] in _NAMES:
+        return len(known)
+    before = [number for number, one in enumerate(known, 1) if _rank(str(one)) <= _rank(str(key))]
+    return max(before, default=0)
 
 
 def _rank(key: str) -> int:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -153,6 +154,16 @@ def dump(data: Mapping[str, Any]) -> str:
     yaml.indent(mapping=2, sequence=4, offset=2)
     yaml.dump(_quoted(dict(data)), stream)
     return stream.getvalue()
+
+
+def inline(data: Any) -> str:
+    """Return plain data as YAML in one line, which is also valid inside brackets."""
+    stream = StringIO()
+    yaml = YAML()
+    yaml.default_flow_style = True
+    yaml.width = sys.maxsize
+    yaml.dump({"": _quoted(data)}, stream)
+    return stream.getvalue().strip().removeprefix("{'': ").removesuffix("}")
 
 
 class _Reader:
