@@ -1,4 +1,4 @@
-"""Edits of a plot file's text, which keep its comments, order and style (S2.9)."""
+"""Edits of a plot file's text, which keep its comments, order and style."""
 
 from dsc.editing.surgery.edits import Add, Edit, Move, Remove, RenameState, RenameVariable, Replace
 from dsc.editing.surgery.operation import apply

@@ -74,7 +74,8 @@ def _insert(sheet: Sheet, path: FormPath, carried: Carried, before: str | int | 
         carried = carried.inside(missing, is_item=not in_mapping)
     key, inside = path[known], part(sheet.data, around)
     parts = open_part(inside, around, key)
-    if inside and parts is not inside:
+    is_empty_way = inside == {} and isinstance(parts, list)
+    if (inside or is_empty_way) and parts is not inside:
         word = short_for(around) if isinstance(parts, dict) else None
         return _insert(Sheet(open_short(sheet, around, word)), path, carried, before)
     return put(sheet, around, key, place(parts, around, key, before), carried)
