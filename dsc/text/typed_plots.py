@@ -37,7 +37,7 @@ def typed_plots(plots: Iterable[ActionPlot], schema: Schema | None = None) -> st
     texts = [one.type for plot in wanted for one in (*plot.parameters.values(), *plot.outputs.values())]
     texts += [text for fields in records.values() for text in fields.values()]
     named = {name for text in texts for name in names_in(data_type(text))} - records.keys()
-    types = [_type_definition(name, schema) for name in _with_supertypes(named, schema)]
+    types = [type_definition(name, schema) for name in with_supertypes(named, schema)]
     parts = ["\n".join(types)] if types else []
     parts += [_typed_dict(type_class(name), f"The record `{name}`.", _fields(own)) for name, own in records.items()]
     parts += [part for plot in wanted for part in (_outputs(plot), _function(plot)) if part]
@@ -47,7 +47,7 @@ def typed_plots(plots: Iterable[ActionPlot], schema: Schema | None = None) -> st
     return head + imports + ("\n" if types else "\n\n") + "\n\n\n".join(parts) + "\n"
 
 
-def _with_supertypes(named: Iterable[str], schema: Schema | None) -> list[str]:
+def with_supertypes(named: Iterable[str], schema: Schema | None) -> list[str]:
     """Return the types of objects among names, with their supertypes, each after its supertype."""
     known = schema.types if schema is not None else {}
     found = {one for name in named for one in (name, *(schema.ancestors(name) if schema and name in known else ()))}
@@ -55,7 +55,8 @@ def _with_supertypes(named: Iterable[str], schema: Schema | None) -> list[str]:
     return sorted(found - _VALUES.keys(), key=lambda name: (depth[name], name))
 
 
-def _type_definition(name: str, schema: Schema | None) -> str:
+def type_definition(name: str, schema: Schema | None) -> str:
+    """Return the definition of the type of objects in Python."""
     made, parent = type_class(name), schema.types.get(name) if schema is not None else None
     above = _annotation(parent) if parent else "str"
     if domain_type(made) == name:
@@ -103,7 +104,7 @@ def _outputs(plot: ActionPlot) -> str:
 
 
 def _typed_dict(name: str, about: str, types: Mapping[str, str]) -> str:
-    if all(map(_usable, types)):
+    if all(map(is_python_name, types)):
         lines = [f"    {key}: {annotation}" for key, annotation in types.items()]
         return "\n".join([f"class {name}(TypedDict):", f'    """{about}"""', "", *lines])
     items = ", ".join(f'"{output}": {annotation}' for output, annotation in types.items())
@@ -147,8 +148,9 @@ def _python_names(parameters: Mapping[str, PlotParameter]) -> Iterator[tuple[str
 
 def _python_name(name: str) -> str:
     made = "".join(one if one.isalnum() or one == "_" else "_" for one in name)
-    return made if _usable(made) else f"{made}_"
+    return made if is_python_name(made) else f"{made}_"
 
 
-def _usable(name: str) -> bool:
+def is_python_name(name: str) -> bool:
+    """Return whether a name is one of Python, too."""
     return name.isidentifier() and not iskeyword(name)

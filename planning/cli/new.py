@@ -19,18 +19,66 @@ _DOTTED = {"gitignore": ".gitignore", "vscode": ".vscode"}
 
 def new_command(
     name: Annotated[str, typer.Argument(metavar="NAME", help="The project's name; a new folder with this name.")],
+    plots: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--from",
+            metavar="PLOTS",
+            help="A plot file or a folder with plots, repeatable: make the project of these plots, with simulated"
+            " skills. In an existing project, write only its generated files again.",
+        ),
+    ] = None,
 ) -> None:
     """Make a running robot project: domain, plots, skills, simulation, test, and settings of an editor."""
-    from json import dumps
-
-    from dsc.text.plot_files import json_schema
-    from dsc.text.profiles import profile_schema
-
     package = _package(name)
+    if plots:
+        _new_from(plots, Path(name), package)
+        return
     folder = _free(Path(name))
     texts = {path: text.replace(PACKAGE, package) for path, text in _template(package)}
-    texts[Path(".vscode/plot.schema.json")] = dumps(json_schema(), indent=1) + "\n"
-    texts[Path(".vscode/profile.schema.json")] = dumps(profile_schema(), indent=1) + "\n"
+    _write_new(folder, {**texts, **_schemas()})
+
+
+def _new_from(plots: list[Path], folder: Path, package: str) -> None:
+    """Make a project of plots, or write the generated files of such a project again."""
+    from planning.cli.skeleton import GENERATED, PlotProject
+
+    project = PlotProject.of(package, plots)
+    inside = folder / package
+    if (inside / GENERATED).is_file():
+        _write_again(inside, project.generate(), {**project.skills(), **project.copies()})
+        return
+    _free(folder)
+    parts = {**project.first_texts(), **project.generate(), **project.skills(), **project.copies()}
+    texts = {Path(package) / path: text for path, text in parts.items()}
+    texts[Path("tests") / f"test_{package}.py"] = project.test()
+    common = {Path("pyproject.toml"), Path(".gitignore"), Path(".vscode/settings.json")}
+    template = {path: text.replace(PACKAGE, package) for path, text in _template(package) if path in common}
+    _write_new(folder, {**texts, **template, **_schemas()})
+
+
+def _write_again(folder: Path, generated: dict[Path, str], first: dict[Path, str]) -> None:
+    """Write the generated files of a project, and those files of a person that do not exist yet.
+
+    Raises:
+        InputError: a generated file lacks the mark at its beginning.
+    """
+    from dsc.skeletons.python_code import MARK
+    from knowledge_base.errors import InputError, Place
+
+    for path in generated:
+        if (folder / path).is_file() and not (folder / path).read_text("utf-8").startswith(f'"""{MARK}'):
+            message = f"this file does not begin with '{MARK}', so it may be yours; move it, or restore its first line"
+            raise InputError(message, place=Place(str(folder / path), 1))
+    missing = {path: text for path, text in first.items() if not (folder / path).exists()}
+    for path, text in {**generated, **missing}.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, "utf-8")
+        typer.echo(f"{'made' if path in missing else 'wrote again'} {folder / path}")
+    typer.echo("next:  dsc check    mypy --strict    (both name what your files lack now)")
+
+
+def _write_new(folder: Path, texts: dict[Path, str]) -> None:
     for path, text in texts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, "utf-8")
@@ -38,6 +86,19 @@ def new_command(
     for path in sorted(texts, key=lambda path: (path.parts[0].startswith("."), path)):
         typer.echo(f"  {path}")
     typer.echo(f"next:  cd {folder}    dsc check    dsc run .    dsc run . --view    pytest")
+
+
+def _schemas() -> dict[Path, str]:
+    """Return the JSON Schemas of plots and profiles for an editor."""
+    from json import dumps
+
+    from dsc.text.plot_files import json_schema
+    from dsc.text.profiles import profile_schema
+
+    return {
+        Path(".vscode/plot.schema.json"): dumps(json_schema(), indent=1) + "\n",
+        Path(".vscode/profile.schema.json"): dumps(profile_schema(), indent=1) + "\n",
+    }
 
 
 def _package(name: str) -> str:

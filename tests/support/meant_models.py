@@ -104,7 +104,9 @@ def rename_state(form: Any, old: str, new: str) -> Any:
             renames = key in {"states", "connectors"}
             inner = "to" if key == "on" else None
             return {
-                new if renames and name == old else name: value if name in _NO_STATES and not renames else walk(value, inner or name)
+                new if renames and name == old else name: value
+                if name in _NO_STATES and not renames
+                else walk(value, inner or name)
                 for name, value in one.items()
             }
         if isinstance(one, list):
