@@ -132,7 +132,7 @@ class Skeleton:
         }
         return f"{name}Outcome" if name in taken else name
 
-    def _returned(self, skill: SkillUse) -> str:
+    def _result(self, skill: SkillUse) -> str:
         return " | ".join(map(self.outcome_class, skill.outcomes)) or "Outcome"
 
     def _outcome(self, event: str, types: Types) -> str:
@@ -150,7 +150,7 @@ class Skeleton:
         ]
         lines.append(f'    name = "{name}"')
         methods = [
-            _method("skill", one, skill.parameters, self._returned(skill), self.records, abstract=True)
+            _method("skill", one, skill.parameters, self._result(skill), self.records, abstract=True)
             for one, skill in use.skills.items()
         ]
         methods += [
@@ -167,7 +167,7 @@ class Skeleton:
             for event in others:
                 body += [f'    case "{event}":', f"        return {self._make(event, skill)}"]
         body.append(f"return {self._make(first, skill)}")
-        return _method("skill", name, skill.parameters, self._returned(skill), self.records, body=body)
+        return _method("skill", name, skill.parameters, self._result(skill), self.records, body=body)
 
     def _make(self, event: str, skill: SkillUse) -> str:
         """Return the expression of an outcome: an attribute repeats a parameter of its type, or has a sample."""

@@ -46,7 +46,7 @@ def _new_from(plots: list[Path], folder: Path, package: str) -> None:
     project = PlotProject.of(package, plots)
     inside = folder / package
     if (inside / GENERATED).is_file():
-        _write_again(inside, project.generate(), {**project.skills(), **project.copies()})
+        _write_again(inside, project.generate(), project.skills(), project.copies())
         return
     _free(folder)
     parts = {**project.first_texts(), **project.generate(), **project.skills(), **project.copies()}
@@ -57,8 +57,14 @@ def _new_from(plots: list[Path], folder: Path, package: str) -> None:
     _write_new(folder, {**texts, **template, **_schemas()})
 
 
-def _write_again(folder: Path, generated: dict[Path, str], first: dict[Path, str]) -> None:
+def _write_again(folder: Path, generated: dict[Path, str], first: dict[Path, str], plots: dict[Path, str]) -> None:
     """Write the generated files of a project, and those files of a person that do not exist yet.
+
+    Args:
+        folder: the package of the project.
+        generated: the texts of generated files by path.
+        first: the first texts of a person's files.
+        plots: the texts of the plots; a plot of the project that differs stays, and is named.
 
     Raises:
         InputError: a generated file lacks the mark at its beginning.
@@ -70,11 +76,16 @@ def _write_again(folder: Path, generated: dict[Path, str], first: dict[Path, str
         if (folder / path).is_file() and not (folder / path).read_text("utf-8").startswith(f'"""{MARK}'):
             message = f"this file does not begin with '{MARK}', so it may be yours; move it, or restore its first line"
             raise InputError(message, place=Place(str(folder / path), 1))
-    missing = {path: text for path, text in first.items() if not (folder / path).exists()}
+    missing = {path: text for path, text in {**first, **plots}.items() if not (folder / path).exists()}
     for path, text in {**generated, **missing}.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, "utf-8")
         typer.echo(f"{'made' if path in missing else 'wrote again'} {folder / path}")
+    for path, text in plots.items():
+        if (folder / path).read_text("utf-8") != text:
+            typer.echo(
+                f"{folder / path} differs from the given plot and stays: copy the plot, or name the project's plots"
+            )
     typer.echo("next:  dsc check    mypy --strict    (both name what your files lack now)")
 
 
