@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable, Iterable
 from typing import TextIO
 
+from domains.dialogue.channels import Console
 from dsc.calls import SkillCall
 from dsc.components.component import Component
-from dsc.errors import SkillError
 from dsc.outcomes import Outcome
-from dsc.sequencer.clock import LoopClock
 from dsc.skills import skill
 
 Listen = Callable[[SkillCall], Awaitable[str | None]]
@@ -93,20 +91,8 @@ def command(words: str) -> GoTo | Fetch | Follow | NotUnderstood:
 
 def from_prompt(stream: TextIO) -> Listen:
     """Return a function that waits for the lines of a terminal or pipe, in real time, up to the end of the stream."""
-
-    async def next_sentence(call: SkillCall) -> str | None:
-        if isinstance(call.clock, LoopClock) and call.clock.simulated:
-            raise SkillError("a prompt needs real time: dsc run butler --real-time")
-        loop = asyncio.get_running_loop()
-        ready = asyncio.Event()
-        loop.add_reader(stream, ready.set)
-        try:
-            await ready.wait()
-        finally:
-            loop.remove_reader(stream)
-        return stream.readline().strip() or None
-
-    return next_sentence
+    console = Console(stream)
+    return lambda call: console.receive(call, "", "")
 
 
 def from_list(sentences: Iterable[str]) -> Listen:

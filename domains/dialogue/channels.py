@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -35,28 +36,49 @@ class Channel(Protocol):
 
 
 class Console:
-    """A terminal or a pipe, in real time."""
+    """A terminal or a pipe, in real time.
+
+    Args:
+        reads: has a line for each answer; the standard input by default.
+        writes: receives the words; the standard output by default.
+    """
 
     def __init__(self, reads: TextIO | None = None, writes: TextIO | None = None) -> None:
         self._reads = reads
         self._writes = writes
+        self._left = b""
 
     async def show(self, call: SkillCall, to: str, words: str) -> None:  # noqa: ARG002
         """Print the words."""
         print(f"to {to}: {words}", file=self._writes, flush=True)
 
     async def receive(self, call: SkillCall, to: str, topic: str) -> str | None:  # noqa: ARG002
-        """Return the next line; `None` at the end of the input."""
+        """Return the next line that is not empty; `None` at the end of the input."""
         if isinstance(call.clock, LoopClock) and call.clock.simulated:
             raise SkillError("a console needs real time: dsc run --real-time")
-        reads = self._reads or sys.stdin
-        loop, ready = asyncio.get_running_loop(), asyncio.Event()
-        loop.add_reader(reads, ready.set)
-        try:
-            await ready.wait()
-        finally:
-            loop.remove_reader(reads)
-        return reads.readline().strip() or None
+        reads = (self._reads or sys.stdin).fileno()
+        while True:
+            line, end, left = self._left.partition(b"\n")
+            if end:
+                self._left = left
+                if words := line.decode("utf-8", "replace").strip():
+                    return words
+                continue
+            await _readable(reads)
+            if not (more := os.read(reads, 65536)):
+                self._left = b""
+                return line.decode("utf-8", "replace").strip() or None
+            self._left += more
+
+
+async def _readable(file: int) -> None:
+    """Wait until a file can be read without waiting."""
+    loop, ready = asyncio.get_running_loop(), asyncio.Event()
+    loop.add_reader(file, ready.set)
+    try:
+        await ready.wait()
+    finally:
+        loop.remove_reader(file)
 
 
 class TextFiles:

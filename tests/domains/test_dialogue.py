@@ -121,6 +121,20 @@ def test_a_console_as_a_channel():
     assert said.getvalue() == "to person1: Which floor is this?\n"
 
 
+def test_two_lines_that_arrive_together():
+    read, write = os.pipe()
+    os.write(write, b"fourth floor\n\nfifth floor\nsi")
+    with os.fdopen(read) as reads:
+        console = Console(reads, io.StringIO())
+        with with_channels(console, clock="real") as robot:
+            assert asked(robot).outputs["answer"] == "fourth floor"
+            assert asked(robot).outputs["answer"] == "fifth floor"
+            os.write(write, b"xth floor")
+            os.close(write)
+            assert asked(robot).outputs["answer"] == "sixth floor"
+            assert asked(robot).outputs["reason"] == "nobody answers"
+
+
 def test_a_console_in_simulated_time():
     with with_channels(Console(io.StringIO(), io.StringIO()), clock="simulated") as robot:
         assert "dsc run --real-time" in asked(robot).outputs["reason"]
