@@ -33,6 +33,9 @@ class Dialogue(Component):
 
     Args:
         channels: the ways to the persons, e.g. a voice and a tablet.
+
+    Attributes:
+        questions: the number of questions so far.
     """
 
     name = "dialogue"
@@ -40,6 +43,7 @@ class Dialogue(Component):
     def __init__(self, *channels: Channel) -> None:
         super().__init__()
         self._channels = channels
+        self.questions = 0
 
     @skill(after_crash="repeat")
     async def say(self, call: SkillCall, to: str, words: str) -> Said:
@@ -50,6 +54,7 @@ class Dialogue(Component):
     @skill(after_crash="repeat", unlimited=True)
     async def ask(self, call: SkillCall, to: str, topic: str) -> Sentence | Silence:
         """Show a question on all channels, and wait for the first answer."""
+        self.questions += 1
         await self.say(call, to, topic)
         return await self._first_sentence(call, to, topic)
 

@@ -46,7 +46,7 @@ class Base(Component):
     (define (domain base)
       (:types floor agent)
       (:constants robot - agent)
-      (:predicates (inside) (arrived ?f - floor) (door-open) (at-floor ?who - agent ?f - floor))
+      (:predicates (inside) (arrived ?f - floor) (door-open) (floor-known) (at-floor ?who - agent ?f - floor))
       (:functions (position ?f - floor) - geometry) ; the place next to the lift
       (:action enter-elevator
         :parameters ()
@@ -84,7 +84,8 @@ class Base(Component):
         to = None if stop is None or refusal else stop.floor
         if (reason := self._ride.move(call.action_id, to, refusal)) is not None:
             return NotMoved(reason=reason)
-        return Outside(observed=Delta(added=(fact("arrived", self._ride.place),), removed=(fact("inside"),)))
+        outdated = (fact("inside"), fact("floor-known"), *(fact("at-floor", "robot", floor) for floor in NAMES))
+        return Outside(observed=Delta(added=(fact("arrived", self._ride.place),), removed=outdated))
 
     async def _wait(self, call: SkillCall) -> Outcome:
         await call.clock.sleep(2.0)

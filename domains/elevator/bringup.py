@@ -51,6 +51,7 @@ class ElevatorRide(Simulation):
         self.ride = Ride(Lift(self.seed, self.scenario.persons), self.scenario.start, self.fault)
         self.riders = Riders(self.ride)
         self._mission = Mission()
+        self._dialogue = Dialogue(Console() if self.scenario.answers == "console" else self.riders)
         if setup.resumes and setup.store is not None:
             self.ride.resume(_file(setup.store))
 
@@ -61,9 +62,8 @@ class ElevatorRide(Simulation):
 
     def components(self) -> Iterable[Component]:
         """Return the components of the robot."""
-        channel = Console() if self.scenario.answers == "console" else self.riders
-        senses = [Door(self.ride), People(self.ride), Attention(Head(self.ride)), Dialogue(channel)]
-        return [*senses, Base(self.ride), self._mission]
+        senses = [Door(self.ride), People(self.ride), Attention(Head(self.ride))]
+        return [*senses, self._dialogue, Base(self.ride), self._mission]
 
     def knowledge(self) -> Delta:
         """Return the persons, the floors with their places, the floor of the robot, and its destination."""
@@ -89,7 +89,7 @@ class ElevatorRide(Simulation):
         """Return the destination, the place of the robot, and the number of its questions."""
         del knowledge, end
         destination = self.scenario.destination
-        return {"destination": destination, "place": self.ride.place, "questions": len(self.riders.said)}
+        return {"destination": destination, "place": self.ride.place, "questions": self._dialogue.questions}
 
     def headline(self, own: Mapping[str, Any], *, reached: bool) -> str:
         """Return where the robot is."""

@@ -257,6 +257,7 @@ class Condition:
         with self._guard:
             self._closed = True
             self._waiters.answer(self._cancelled_error())
+        self._listening = {}  # a cancelled condition stays for inspection, and its listeners do not
 
     def _cancelled_error(self) -> ConditionCancelledError:
         return ConditionCancelledError(f"{self.text} is cancelled and will not fire again")

@@ -424,7 +424,8 @@ def robot_knowledge(source: Path) -> KnowledgeBase | None:
             return None
         if len(errors) == 1:
             raise errors[0]
-        reasons = "; ".join(f"{one.name}: {error}" for one, error in zip(able, errors, strict=True))
+        briefly = (str(error).replace(str(source), source.name) for error in errors)
+        reasons = "; ".join(f"{one.name}: {error}" for one, error in zip(able, briefly, strict=True))
         raise InputError(f"the scenario fits no installed robot; name one as ROBOT@{source.name} ({reasons})")
     if source.is_file() and source.suffix != ".py":
         return None
