@@ -161,6 +161,18 @@ describe("an odd record", () => {
     expect([made.damages, made.at(1).values.get("(weight cup)")]).toEqual([[], ["weight", "cup", Infinity]]);
   });
 
+  it("with a geometry as the value of a function is whole", () => {
+    const values = '"values": [["position", "hall", [3.5, 1]], ["position", "door", []], ["label", "hall", "hall"]]';
+    const made = read([
+      head(1, "world", `, "version": 1, "nodes": {"hall": "place", "door": "place"}, "facts": [], ${values}`),
+      head(2, "knowledge", ', "version": 2, "author": "x", "values": [["position", "hall", [1, 2]]]'),
+      head(3, "knowledge", ', "version": 3, "author": "x", "values": [["position", [1, 2], 3]]'),
+      head(4, "knowledge", ', "version": 4, "author": "x", "values": [["position", "hall", ["a"]]]'),
+    ]);
+    expect(made.at(2).values.get("(position hall)")).toEqual(["position", "hall", [1, 2]]);
+    expect(made.damages.map((rec) => rec.seq)).toEqual([3, 4]);
+  });
+
   it("with times that go back, equal times and long texts is kept", () => {
     const made = read([3, 1, 1, 0].map((t, i) => head(i + 1, "log", `, "text": "${"x".repeat(100_000)}<script>\u202e"`, String(t))));
     expect([made.last, made.damages]).toEqual([4, []]);

@@ -37,6 +37,10 @@ const fields = (shape: Readonly<Record<string, Is>>): Is => {
 const texts = list(text);
 const fact: Is = (value, depth) => list(scalar)(value, depth) && (value as readonly unknown[]).length > 0;
 const facts = list(fact);
+/** Arguments, then a scalar or a geometry. */
+const content: Is = (value, depth) =>
+  Array.isArray(value) && value.length > 0 && fact(value.slice(0, -1).concat(0), depth) && (scalar(value.at(-1), depth) || list(number)(value.at(-1), depth + 1));
+const contents = list(content);
 
 const way = fields({ to: optional(text), when: optional(text), rule: optional(text), seconds: optional(scalar) });
 const ways = optional(list(way));
@@ -71,9 +75,9 @@ const SHAPES = new Map<string, readonly (readonly [string, Is])[]>([
   ["plot", [["hash", text], ["plot", plot], ["words", optional(words)]]],
   ["step", [["microsteps", list(micro)], ["variables", optional(dict(dict(any)))]]],
   ["decision", [["state", text], ["chosen", optional(text)], ["by", optional(text)], ["arguments", optional(dict(any))], ["version", optional(number)], ["candidates", optional(list(candidate))]]],
-  ["world", [["version", number], ["nodes", dict(text)], ["facts", facts], ["values", facts]]],
+  ["world", [["version", number], ["nodes", dict(text)], ["facts", facts], ["values", contents]]],
   ["knowledge", [["version", number], ["author", text], ["nodes", optional(dict(text))], ["removed_nodes", optional(texts)],
-    ["added", optional(facts)], ["removed", optional(facts)], ["values", optional(facts)]]],
+    ["added", optional(facts)], ["removed", optional(facts)], ["values", optional(contents)]]],
   ["action", [["action", text], ["skill", optional(text)], ["port", optional(text)], ["component", optional(text)],
     ["mode", optional(text)], ["arguments", optional(dict(any))]]],
   ["component", [["component", text], ["wires", optional(dict(optional(text)))], ["waits", optional(text)]]],

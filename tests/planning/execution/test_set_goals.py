@@ -147,6 +147,26 @@ def test_a_mission_that_ends_withdraws_its_goal():
     assert run_simulated(main()) == ["withdrawn"]
 
 
+def test_the_goals_of_a_tree_of_py_trees():
+    py_trees = pytest.importorskip("dsc.components.behaviour_trees")
+
+    class WithPyTrees(Mission):
+        @py_trees.tree_skill(success=CarriedOut, failure=NotCarriedOut, after_crash="repeat")
+        def carry_out(self, call: SkillCall):
+            def reach(goal):
+                return py_trees.action(goal, lambda: self.pursue(goal), ends={"reached"})
+
+            return py_trees.sequence(
+                reach("(lit desk)"), py_trees.fallback(reach("(broken desk)"), reach("(lit hall)"))
+            )
+
+    lamps, mission = Lamps(), WithPyTrees()
+    with lamps_robot(lamps, mission, clock="simulated") as robot:
+        assert [event.name for event in robot.run("evening").emitted] == []
+    assert lamps.lit == ["desk", "hall"]
+    assert [reason == "reached" for reason in mission.reasons] == [True, False, True]
+
+
 def test_a_goal_that_is_no_condition():
     class Wrong(Mission):
         async def pursue(self, goal: str) -> Outcome:
