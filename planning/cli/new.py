@@ -30,7 +30,7 @@ def new_command(
     ] = None,
 ) -> None:
     """Make a running robot project: domain, plots, skills, simulation, test, and settings of an editor."""
-    package = _package(name)
+    package = _package(Path.cwd().name if name == "." else name)
     if plots:
         _new_from(plots, Path(name), package)
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -117,3 +118,13 @@ def test_a_file_without_the_mark_is_kept(project):
     said = run(DSC, "new", "--from", "tidy_bot/tidy_bot/plots", "tidy_bot", cwd=project.parent, status=2)
     assert "it may be yours" in said
     assert module.read_text() == "# Mine.\n"
+
+
+def test_other_plots_than_those_of_the_project_are_named(project):
+    plots = project.parent / "others"
+    shutil.copytree(project / "tidy_bot" / "plots", plots)
+    assert "differs" not in run(DSC, "new", "--from", "tidy_bot/plots", ".", cwd=project)
+    changed = min(plots.glob("*.yaml"))
+    changed.write_text(changed.read_text() + "# another one\n")
+    said = run(DSC, "new", "--from", "../others", ".", cwd=project)
+    assert f"tidy_bot/plots/{changed.name} differs from the given plot and stays" in said
