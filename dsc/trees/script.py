@@ -12,6 +12,10 @@ from dataclasses import dataclass
 
 from knowledge_base.errors import ParseError, printable
 
+MAX_INTEGER = 2**63 - 1
+"""The largest integer in a script, as in BehaviorTree.CPP."""
+MAX_DIGITS = 30
+"""Number of digits, zeros included, of the longest integer."""
 MAX_NESTED = 50
 """Upper bound of nested expressions."""
 
@@ -206,7 +210,10 @@ class _Parser:
         self.advance()
         if token.kind == "name":
             return Literal(float(token.text == "true")) if token.text in {"true", "false"} else Name(token.text)
-        return Literal(_value(token))
+        value = _value(token)
+        if isinstance(value, int) and value > MAX_INTEGER:
+            raise self.mistake(f"the integer '{token.text[:20]}' has more than 64 bits")
+        return Literal(value)
 
     def _parenthesis_or_unary(self, token: _Token) -> Expression:
         if token.text in {"-", "!"}:
@@ -230,4 +237,6 @@ def _value(token: _Token) -> float | int | str:
         return token.text
     if token.kind == "real":
         return float(token.text)
+    if len(token.text) > MAX_DIGITS:
+        return MAX_INTEGER + 1
     return int(token.text, 16 if token.kind == "hex" else 10)

@@ -19,6 +19,7 @@ from domains.clean_up_table.bringup import bundle, deploy
 from domains.clean_up_table.scenario import Scenario
 from dsc.calls import SkillCall
 from dsc.components.component import Component
+from dsc.controllers import build_controller
 from dsc.deployment.checks import check_deployment
 from dsc.deployment.cores import cores_of
 from dsc.deployment.diagram import draw_deployment
@@ -27,6 +28,7 @@ from dsc.deployment.timeline import draw_worst_cases
 from dsc.drawing import draw
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
+from dsc.editing.surgery import Add, Edit, Move, Remove, RenameState, apply, differences, patch
 from dsc.engine.machine import Machine
 from dsc.engine.machine_state import MachineState
 from dsc.errors import NotExpressibleError, RunawayError
@@ -46,6 +48,7 @@ from dsc.text.profiles import load_profile, parse_profile, profile_to_yaml
 from dsc.text.text_diagrams import to_mermaid, to_plantuml
 from dsc.text.yaml import read_file
 from dsc.trace import Trace, header
+from dsc.trees import load_trees, parse_trees, trees_to_xml
 from dsc.validation import review_plot, validate_plot
 from dsc.viewer.access import PageAddress
 from dsc.viewer.control import Control
@@ -168,6 +171,44 @@ def _run(plot: ActionPlot, plots: Library) -> None:
     form = json.loads(json.dumps(machine.state.to_json()))
     if MachineState.from_json(form, plots) != machine.state:
         raise AssertionError("the machine's state is another one after JSON")
+
+
+def read_tree(data: bytes, folder: Path) -> None:
+    """A file of behaviour trees: read, written, read again."""
+    trees = load_trees(_written(data, folder, "tree.xml"))
+    if parse_trees(trees_to_xml(trees)) != trees:
+        raise AssertionError("read again, it is another file of trees")
+
+
+def read_controller(data: bytes, folder: Path) -> None:
+    """A plot whose controllers are built; the Python one is executed for a few events."""
+    plot = load_plot(_written(data, folder, "plot.yaml"))
+    if validate_plot(plot, Library([plot])) or any(one.required for one in plot.parameters.values()):
+        return
+    texts = {target: build_controller(plot, target) for target in ("c99", "python")}
+    names: dict[str, Any] = {}
+    exec(compile(texts["python"], "controller.py", "exec"), names)  # noqa: S102  the text is what is tested
+    controller = names["Controller"]()
+    controller.init(names["Host"](), now_ns=0)
+    for number, event in enumerate([*names["Events"]][:6]):
+        controller.post(event)
+        controller.step(now_ns=(number + 1) * 10**9)
+
+
+def read_edited(data: bytes, folder: Path) -> None:
+    """A plot's text after edits, each of which is undone."""
+    text = _text(data).replace("\r", "")
+    plot = parse_plot(text)
+    for _, _, path in [*plot.walk()][:4]:
+        edits = RenameState(path, "other"), Remove(path), Add((*path, "about"), "a note"), Move(path, (*path[:-1], "z"))
+        for edit in edits:
+            _unless(InputError, partial(_undo, text, edit))
+
+
+def _undo(text: str, edit: Edit) -> None:
+    after = apply(text, edit)
+    if patch(after, differences(after, text)) != text:
+        raise AssertionError(f"{edit} is not undone")
 
 
 def read_deployment(data: bytes, folder: Path) -> None:
@@ -580,6 +621,9 @@ READERS = (
         share=6,
     ),
     Target("chart", read_chart, ("tests/support/broken/scxml/*.scxml",), share=6),
+    Target("tree", read_tree, ("domains/*/trees/*.xml", "tests/dsc/trees/*.xml"), share=4),
+    Target("controller", read_controller, ("examples/controllers/*.yaml",), share=4),
+    Target("edited", read_edited, ("domains/*/plots/*.yaml",), share=4),
     Target("profile", read_profile, ("domains/*/profiles/*.yaml",), share=3),
     Target("deployment", read_deployment, ("examples/strangers/lab.yaml",), share=3),
     Target("monitoring", read_monitoring, ("examples/strangers/monitor.yaml",), share=1),

@@ -90,6 +90,8 @@ BAD = [
     ("<TREE4><Script code=' '/></TREE4>", "the script is empty"),
     ("<TREE4><Script code='x y'/></TREE4>", "';' or the end was expected; found 'y'"),
     (f"<TREE4><Script code='{'(' * 60}'/></TREE4>", "nested deeper than 50 levels"),
+    ("<TREE4><Script code='a := 9223372036854775808'/></TREE4>", "the integer '9223372036854775808' has more than 64 bits"),
+    (f"<TREE4><Script code='a := {'9' * 5000}'/></TREE4>", "has more than 64 bits"),
     (f"<TREE4>{'<Inverter>' * 120}<B/>{'</Inverter>' * 120}</TREE4>", "nested deeper than 100 levels"),
 ]  # fmt: skip
 
