@@ -93,9 +93,7 @@ class Skeleton:
         """Return the first text of the person's module of a component, with simulated skills."""
         use = self.components[component]
         methods = [self._simulate(name, skill) for name, skill in use.skills.items()]
-        methods += [
-            _method("takes", name, given, "None", self.records, body=["pass"]) for name, given in use.messages.items()
-        ]
+        methods += [_method("takes", name, given, "None", body=["pass"]) for name, given in use.messages.items()]
         name, base = type_class(component), _base_class(component)
         begin = [f"class {name}({base}):", f'    """The component `{component}`."""', ""]
         begin += [
@@ -138,7 +136,7 @@ class Skeleton:
     def _outcome(self, event: str, types: Types) -> str:
         name = self.outcome_class(event)
         head = f"class {name}(Outcome):" if lower_name(name) == event else f'class {name}(Outcome, event="{event}"):'
-        lines = [f"    {one}: {annotation(kind, self.records)}" for one, kind in types.items()]
+        lines = [f"    {one}: {annotation(kind)}" for one, kind in types.items()]
         about = [f'    """The outcome `{event}`."""', *([""] if lines else [])]
         return "\n".join([head, *about, *lines])
 
@@ -150,12 +148,10 @@ class Skeleton:
         ]
         lines.append(f'    name = "{name}"')
         methods = [
-            _method("skill", one, skill.parameters, self._result(skill), self.records, abstract=True)
+            _method("skill", one, skill.parameters, self._result(skill), abstract=True)
             for one, skill in use.skills.items()
         ]
-        methods += [
-            _method("takes", one, given, "None", self.records, abstract=True) for one, given in use.messages.items()
-        ]
+        methods += [_method("takes", one, given, "None", abstract=True) for one, given in use.messages.items()]
         return "\n\n".join(["\n".join(lines), *methods])
 
     def _simulate(self, name: str, skill: SkillUse) -> str:
@@ -167,7 +163,7 @@ class Skeleton:
             for event in others:
                 body += [f'    case "{event}":', f"        return {self._make(event, skill)}"]
         body.append(f"return {self._make(first, skill)}")
-        return _method("skill", name, skill.parameters, self._result(skill), self.records, body=body)
+        return _method("skill", name, skill.parameters, self._result(skill), body=body)
 
     def _make(self, event: str, skill: SkillUse) -> str:
         """Return the expression of an outcome: an attribute repeats a parameter of its type, or has a sample."""
@@ -199,11 +195,11 @@ def _callables(use: ComponentUse) -> Iterator[tuple[str, Types]]:
 
 
 def _method(
-    decorator: str, name: str, given: Types, returned: str, records: Iterable[str], *,
+    decorator: str, name: str, given: Types, returned: str, *,
     abstract: bool = False, body: Iterable[str] = ("...",),
 ) -> str:  # fmt: skip
     taken = ["self", *(["call: SkillCall"] if decorator == "skill" else [])]
-    taken += [f"{one}: {annotation(kind, records)}" for one, kind in given.items()]
+    taken += [f"{one}: {annotation(kind)}" for one, kind in given.items()]
     head = f"    async def {name}({', '.join(taken)}) -> {returned}:"
     if len(head) > _WIDTH:
         head = "\n".join([f"    async def {name}(", f"        {', '.join(taken)},", f"    ) -> {returned}:"])

@@ -7,7 +7,7 @@ from typing import Any
 
 from dsc.annotations import type_class
 from dsc.data_types import ANY, WORDS, DataType, data_type, names_in
-from dsc.text.typed_plots import with_supertypes
+from dsc.text.typed_plots import annotation_of, with_supertypes
 from knowledge_base.facts import GEOMETRY
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
 from knowledge_base.world.schema import Schema
@@ -20,29 +20,14 @@ NOT_OBJECTS = frozenset((*WORDS, GEOMETRY, ROOT_TYPE, ANY))
 """Names of types whose values are not objects of the domain."""
 
 
-def annotation(text: str | None, records: Iterable[str] = ()) -> str:
+def annotation(text: str | None) -> str:
     """Return the annotation of Python for a type of plots; `None` is any value."""
-    return "Any" if text is None else _annotation(data_type(text), frozenset(records))
+    return "Any" if text is None else annotation_of(data_type(text), _annotation_of_name)
 
 
-def _annotation(kind: DataType, records: frozenset[str]) -> str:
-    inner = "Any" if kind.inner is None else _annotation(kind.inner, records)
-    match kind.kind:
-        case "list":
-            return f"list[{inner}]"
-        case "map":
-            return f"dict[str, {inner}]"
-        case "optional":
-            return f"{inner} | None"
-        case "choice":
-            return f"Literal[{', '.join(map(repr, kind.values))}]".replace("'", '"')
-        case "name" if kind.name not in NOT_OBJECTS:
-            return type_class(kind.name)
-        case _:
-            return _annotation_of_scalar(kind)
-
-
-def _annotation_of_scalar(kind: DataType) -> str:
+def _annotation_of_name(kind: DataType) -> str:
+    if kind.kind == "name" and kind.name not in NOT_OBJECTS:
+        return type_class(kind.name)
     if str(kind) in _PLAIN:
         return _PLAIN[str(kind)]
     plain = {"geometry": "list[float]", "plot": "dict[str, Any]"}.get(kind.name or kind.kind, "str")
@@ -91,5 +76,5 @@ def with_types_above(types: Iterable[str], schema: Schema | None) -> list[str]:
 
 def record_class(name: str, fields: Mapping[str, str]) -> str:
     """Return the dataclass of a record."""
-    lines = [f"    {field}: {annotation(text, [name])}" for field, text in fields.items()]
+    lines = [f"    {field}: {annotation(text)}" for field, text in fields.items()]
     return "\n".join(["@dataclass", f"class {type_class(name)}:", f'    """The record `{name}`."""', "", *lines])

@@ -6,7 +6,7 @@ become `NewType`s, a subtype after its supertype.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from keyword import iskeyword
 
 from dsc.annotations import domain_type, type_class
@@ -64,12 +64,9 @@ def type_definition(name: str, schema: Schema | None) -> str:
     return f'{made} = Annotated[{above}, "{name}"]'
 
 
-def _annotation(text: str) -> str:
-    return _annotation_of(data_type(text))
-
-
-def _annotation_of(kind: DataType) -> str:
-    inner = "Any" if kind.inner is None else _annotation_of(kind.inner)
+def annotation_of(kind: DataType, name: Callable[[DataType], str]) -> str:
+    """Return a type of plots as a Python annotation; `name` returns that of a type without parts."""
+    inner = "Any" if kind.inner is None else annotation_of(kind.inner, name)
     match kind.kind:
         case "list":
             return f"list[{inner}]"
@@ -80,7 +77,15 @@ def _annotation_of(kind: DataType) -> str:
         case "choice":
             return f"Literal[{', '.join(map(repr, kind.values))}]".replace("'", '"')
         case _:
-            return _VALUES.get(kind.name or kind.kind) or type_class(kind.name)
+            return name(kind)
+
+
+def _annotation(text: str) -> str:
+    return annotation_of(data_type(text), _annotation_of_name)
+
+
+def _annotation_of_name(kind: DataType) -> str:
+    return _VALUES.get(kind.name or kind.kind) or type_class(kind.name)
 
 
 def _fields(record: Mapping[str, str]) -> dict[str, str]:
