@@ -398,7 +398,6 @@ def test_the_sweep_has_every_command_that_takes_a_file():
         ("doctor",),
         ("bundles",),
         ("lsp",),
-        ("new",),
         ("plot", "schema"),
     }
 

@@ -7,7 +7,7 @@ condition (S0.4).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -29,7 +29,7 @@ from dsc.model.data_forms import (
 from dsc.model.plot import ActionPlot
 from dsc.model.states import Choice, DynamicState
 from knowledge_base.facts import Content, Delta
-from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds, query
+from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds, rows
 from knowledge_base.language.evaluation.explanation import explain
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import Effect
@@ -74,11 +74,11 @@ class KnowledgeSituation:
             expression = plain_condition(expression, Values(bindings))
         return holds(expression, self._world, bindings)
 
-    def answers(self, expression: Expression, bindings: Bindings) -> list[dict[str, Any]]:
+    def answers(self, expression: Expression, bindings: Bindings) -> Iterator[dict[str, Any]]:
         """See `Situation`."""
         if reads_data(expression):
             expression = plain_condition(expression, Values(bindings))
-        return query(expression, self._world, scalars(bindings))
+        return rows(expression, self._world, scalars(bindings))
 
     def value(self, term: Term, bindings: Bindings) -> Any:
         """See `Situation`."""

@@ -20,14 +20,15 @@ def find_values(bind: Bind, situation: Situation, bindings: Bindings) -> Mapping
     """
     known = {name: value for name, value in bindings.items() if name not in bind.names}
     found = situation.answers(bind.condition, known)
-    if bind.order_by and len(found) > 1:
-        found = sorted(
-            found, key=lambda one: tuple(_number(term, situation, {**known, **one}) for term in bind.order_by)
+    if bind.order_by:
+        found = iter(
+            sorted(found, key=lambda one: tuple(_number(term, situation, {**known, **one}) for term in bind.order_by))
         )
     if bind.every:
         (name,) = bind.names
         return {name: [one[name] for one in found]}
-    return {name: found[0][name] for name in bind.names} if found else None
+    first = next(found, None)
+    return None if first is None else {name: first[name] for name in bind.names}
 
 
 def _number(term: Term, situation: Situation, bindings: Bindings) -> float:

@@ -6,7 +6,7 @@ SCXML (5.9.1), and exists only in dialect `scxml`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -102,8 +102,8 @@ class Situation(Protocol):
         """Return whether the condition is true."""
         ...
 
-    def answers(self, expression: Expression, bindings: Bindings) -> list[dict[str, Any]]:
-        """Return the values of the other free variables that make the condition true, in the order of a query."""
+    def answers(self, expression: Expression, bindings: Bindings) -> Iterator[dict[str, Any]]:
+        """Yield the values of the other free variables that make the condition true, in the order of a query."""
         ...
 
     def value(self, term: Term, bindings: Bindings) -> Any:

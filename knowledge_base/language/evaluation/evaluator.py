@@ -7,7 +7,7 @@ only its look-ups. No text is executed.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -17,6 +17,7 @@ from knowledge_base.language.checking.binding import check_answers, check_bound
 from knowledge_base.language.checking.check import check_arity
 from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.compiler import Answers, compile_answers, compile_query, compile_test
+from knowledge_base.language.evaluation.lookups import Search
 from knowledge_base.language.evaluation.terms import Bindings, Getter, Test, as_number, compile_term
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import (
@@ -82,6 +83,10 @@ _terms: IdentityCache[Term, tuple[frozenset[str], Getter]] = IdentityCache()
 _conditions: IdentityCache[Expression, Asked] = IdentityCache()
 _queries: IdentityCache[Expression, tuple[frozenset[str], dict[frozenset[str], Queried]]] = IdentityCache()
 """The free variables of a query, and its compiled searches by their bound variables."""
+_searches: IdentityCache[Expression, tuple[frozenset[str], dict[frozenset[str], tuple[Sequence[str], Search]]]] = (
+    IdentityCache()
+)
+"""As `_queries`, with the names of the answers and the searches that yield them one by one."""
 
 
 def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> bool:
@@ -122,12 +127,18 @@ def rows(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDING
 
     An error about candidates without a computable value is raised after all answers; other errors as for `query`.
     """
-    check_depth(e)
-    bound = free_variables(e).intersection(bindings)
-    check_answers(world.schema.expanded(e), bound, world.schema)
-    names = asked_for(e, bound)
-    found = compile_query(world.schema.expanded(e), world.schema, bound)(world, bindings)
-    return ({name: each[name] for name in names} for each in found)
+    searches = _searches.find(e, world.schema)
+    if searches is None:
+        check_depth(e)
+        searches = _searches.keep(e, world.schema, (free_variables(e), {}))
+    free, by_bound = searches
+    bound = free.intersection(bindings)
+    if bound not in by_bound:
+        expanded = world.schema.expanded(e)
+        check_answers(expanded, bound, world.schema)
+        by_bound[bound] = asked_for(e, bound), compile_query(expanded, world.schema, bound)
+    names, search = by_bound[bound]
+    return ({name: each[name] for name in names} for each in search(world, bindings))
 
 
 def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried:
