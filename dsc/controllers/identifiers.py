@@ -11,6 +11,8 @@ _C_WORDS = frozenset({
     "false", "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed",
     "sizeof", "static", "struct", "switch", "true", "typedef", "union", "unsigned", "void", "volatile", "while",
 })  # fmt: skip
+_TAKEN = frozenset({"self", "host", "now_ns"})
+"""Names of other parameters of a controller's functions."""
 
 
 def identifier(name: str) -> str:
@@ -18,7 +20,8 @@ def identifier(name: str) -> str:
     text = re.sub(r"\W", "_", name, flags=re.ASCII) or "_"
     if text[0].isdigit():
         text = f"_{text}"
-    return f"{text}_" if text in _C_WORDS or keyword.iskeyword(text) or keyword.issoftkeyword(text) else text
+    is_word = text in _C_WORDS or text in _TAKEN or keyword.iskeyword(text) or keyword.issoftkeyword(text)
+    return f"{text}_" if is_word else text
 
 
 def identifiers(names: Iterable[str], *, upper: bool = False) -> list[str]:

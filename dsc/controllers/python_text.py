@@ -149,6 +149,7 @@ class _Writer:
         yield "        self.data = Data()"
         for name, parameter in one.parameters.items():
             own, kind = self.data[name], _TYPES[parameter.kind]
+            yield from (f"        if not fits({own}, {kind}):", "            return ERROR")
             yield f"        self.data.{own} = {kind}({own})"
             if parameter.kind == "number":
                 yield f"        if not math.isfinite({own}):"

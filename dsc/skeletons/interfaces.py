@@ -53,12 +53,15 @@ def find_components(plots: Iterable[ActionPlot]) -> dict[str, ComponentUse]:
                 component, _, name = action.send.partition(".")
                 messages = found.setdefault(component, ComponentUse()).messages
                 _merge(messages.setdefault(name, {}), _argument_types(plot, action.arguments))
+        renamed = {chart for trigger, _ in _triggers(plot) for chart in trigger.names.values()}
         for trigger, around in _triggers(plot):
             component, _, name = trigger.trigger.partition(".")
             skill = found.setdefault(component, ComponentUse()).skills.setdefault(name, SkillUse())
             _merge(skill.parameters, _argument_types(plot, trigger.arguments))
             names = {chart: own for own, chart in trigger.names.items()}
             for event, types in _outcomes(plot, around, by_name).items():
+                if event in renamed and event not in names:
+                    continue  # the outcome of another skill, by its `as`
                 _merge(skill.outcomes.setdefault(names.get(event, event), {}), types)
     return found
 

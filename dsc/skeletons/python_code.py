@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from dsc.annotations import lower_name, type_class
+from dsc.components.component import Component
 from dsc.model.plot import ActionPlot
 from dsc.skeletons.interfaces import ComponentUse, SkillUse, Types, find_components
 from dsc.skeletons.python_types import annotation, object_types, record_class, sample, with_types_above
@@ -18,6 +19,7 @@ MARK = "Made by `dsc new --from`"
 """The beginning of each generated file; the command writes only these files again."""
 _TYPING = ("Annotated", "Any", "Literal", "NewType")
 _TAKEN = frozenset((*_TYPING, "ABC", "Component", "Outcome", "Simulation", "SkillCall"))
+_SIGNATURE = frozenset({"self", "call"})
 _WIDTH = 100
 
 
@@ -50,6 +52,13 @@ class Skeleton:
                     if not is_python_name(one):
                         message = f"'{component}.{name}' becomes Python code, in which '{one}' is not a name; rename it"
                         raise InputError(message, found=one)
+                if hasattr(Component, name):
+                    raise InputError(
+                        f"'{name}' of '{component}' is an attribute of every component; rename it", found=name
+                    )
+                if used_up := _SIGNATURE.intersection(parameters):
+                    message = f"'{component}.{name}' cannot have the parameter '{min(used_up)}', as its method has it"
+                    raise InputError(message, found=min(used_up))
         records = {name: dict(fields) for plot in plots for name, fields in plot.types.items()}
         return cls(used, records, schema)
 
@@ -128,7 +137,7 @@ class Skeleton:
             *_TAKEN,
             *(make(one) for one in self.components for make in (type_class, _base_class)),
         }
-        return f"{name}Outcome" if name in taken else name
+        return f"{name}Outcome" if name in taken or not is_python_name(name) else name
 
     def _result(self, skill: SkillUse) -> str:
         return " | ".join(map(self.outcome_class, skill.outcomes)) or "Outcome"

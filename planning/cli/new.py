@@ -54,6 +54,8 @@ def _new_from(plots: list[Path], folder: Path, package: str) -> None:
     texts[Path("tests") / f"test_{package}.py"] = project.test()
     common = {Path("pyproject.toml"), Path(".gitignore"), Path(".vscode/settings.json")}
     template = {path: text.replace(PACKAGE, package) for path, text in _template(package) if path in common}
+    own = template[Path("pyproject.toml")].replace('readme = "README.md"\n', "")
+    template[Path("pyproject.toml")] = own.replace("A delivery robot", "A robot, made from its plots")
     _write_new(folder, {**texts, **template, **_schemas()})
 
 

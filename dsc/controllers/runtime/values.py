@@ -18,6 +18,15 @@ Number = float | Failure
 Truth = bool | Failure
 
 
+def fits(value: object, kind: type) -> bool:
+    """Return whether a value is of a kind of data: `bool`, `int` of 64 bits, or `float`."""
+    if kind is bool or isinstance(value, bool):
+        return kind is bool and isinstance(value, bool)
+    if kind is int:
+        return isinstance(value, int) and INT64_MIN <= value <= INT64_MAX
+    return isinstance(value, int | float)
+
+
 def widen(value: int | Failure) -> Number:
     """Return an integer as a double."""
     if isinstance(value, Failure):

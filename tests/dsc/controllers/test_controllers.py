@@ -17,7 +17,7 @@ from dsc_charts import plot
 
 from dsc.controllers import build_controller
 from dsc.errors import PlotError
-from dsc.text.plot_files import load_plot
+from dsc.text.plot_files import load_plot, parse_plot
 from dsc.text.yaml import read_file
 from knowledge_base.errors import UnknownNameError
 
@@ -227,3 +227,27 @@ def test_histories_and_clear(kind, tmp_path):
     }[kind]
     if CC is not None:
         compare(python, CPlayers(tmp_path, [chart], CC).play([(0, player.calls)])[0], "Python and C")
+
+
+def test_parameters_with_the_names_of_other_parameters():
+    plot = parse_plot(
+        "plot: p\nparameters: {self: {type: integer, default: 1}, host: {type: integer, default: 1}, now_ns: {type: number, default: 1}}\n"
+        "states: {a: {after: {seconds: 1, to: b}}, b: {final: true}}\n"
+    )
+    names: dict[str, Any] = {}
+    exec(build_controller(plot, "python"), names)  # noqa: S102  the text is what is tested
+    controller = names["Controller"]()
+    controller.init(names["Host"](), now_ns=0, self_=2, host_=3, now_ns_=4.5)
+    assert (controller.data.self_, controller.data.host_, controller.data.now_ns_) == (2, 3, 4.5)
+
+
+@pytest.mark.parametrize("value", [2.5, "7", True, 10**30, None])
+def test_a_parameter_of_another_kind_fails_the_start(value):
+    names: dict[str, Any] = {}
+    plot = parse_plot(
+        "plot: p\nparameters: {count: {type: integer, default: 1}}\nstates: {a: {after: {seconds: 1, to: b}}, b: {final: true}}\n"
+    )
+    exec(build_controller(plot, "python"), names)  # noqa: S102  the text is what is tested
+    controller = names["Controller"]()
+    assert controller.init(names["Host"](), 0, count=value) & names["Status"].FAILED
+    assert controller.ended

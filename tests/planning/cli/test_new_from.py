@@ -128,3 +128,38 @@ def test_other_plots_than_those_of_the_project_are_named(project):
     changed.write_text(changed.read_text() + "# another one\n")
     said = run(DSC, "new", "--from", "../others", ".", cwd=project)
     assert f"tidy_bot/plots/{changed.name} differs from the given plot and stays" in said
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ("{trigger: base.stop}", "'stop' of 'base' is an attribute of every component; rename it"),
+        ("{trigger: base.go, with: {call: 1}}", "'base.go' cannot have the parameter 'call'"),
+        ("{trigger: base.go, with: {self: 1}}", "'base.go' cannot have the parameter 'self'"),
+        ("{trigger: base.class}", "'class' is not a name"),
+    ],
+)
+def test_names_that_python_code_cannot_have(tmp_path, wrong, said):
+    (tmp_path / "a.yaml").write_text(
+        f"plot: a\nstates: {{s: {{entry: {wrong}, on: {{gone: e}}}}, e: {{final: true}}}}\n"
+    )
+    assert said in run(DSC, "new", "--from", "a.yaml", "robot", cwd=tmp_path, status=2)
+    assert not (tmp_path / "robot").exists()
+
+
+def test_outcomes_with_names_of_python_and_renamed_ones(tmp_path):
+    (tmp_path / "a.yaml").write_text("""\
+plot: a
+states:
+  s:
+    entry: [{trigger: arm.pour}, {trigger: camera.track, as: {moved: hand_moved}}]
+    on: {none: e, hand_moved: e}
+  e: {final: true}
+""")
+    run(DSC, "new", "--from", "a.yaml", "robot", cwd=tmp_path)
+    text = (tmp_path / "robot" / "robot" / "generated" / "components.py").read_text()
+    assert 'class NoneOutcome(Outcome, event="none"):' in text
+    assert "async def pour(self, call: SkillCall) -> NoneOutcome:" in text
+    assert "-> NoneOutcome | Moved:" in text
+    assert "no mistakes found" in run(DSC, "check", cwd=tmp_path / "robot")
+    assert "readme" not in (tmp_path / "robot" / "pyproject.toml").read_text()
