@@ -113,8 +113,8 @@ def _only(text: str | Node, source: str | None, kind: str) -> Node:
 def _group(node: Node, what: str) -> Group:
     if isinstance(node, Group):
         return node
-    if node.text.startswith("?"):
-        raise ParseError(f"a variable is not {what}; compare it, as in (= {node.text} true)", place=node.place)
+    if what == "a condition" and node.text.startswith("?"):
+        raise ParseError(f"a variable is no condition; compare it, as in (= {node.text} true)", place=node.place)
     raise ParseError(f"{what} is written in parentheses: ({node.text})", place=node.place)
 
 
