@@ -110,6 +110,7 @@ EFFECTS = [
     ("(not (not (quiet)))", "only a predicate can be deleted"),
     ("(increase (weight cup1))", r"\(increase \(FUNCTION ...\) NUMBER\)"),
     ("(increase ?weight 1)", "in parentheses"),
+    ("(when ?quiet (heavy cup1))", r"compare it, as in \(= \?quiet true\)"),
     ("(when (quiet))", r"\(when CONDITION EFFECT\)"),
 ]
 
