@@ -114,7 +114,7 @@ def _group(node: Node, what: str) -> Group:
     if isinstance(node, Group):
         return node
     if what == "a condition" and node.text.startswith("?"):
-        raise ParseError(f"a variable is no condition; compare it, as in (= {node.text} true)", place=node.place)
+        raise ParseError(f"a variable is not a condition; compare it, as in (= {node.text} true)", place=node.place)
     raise ParseError(f"{what} is written in parentheses: ({node.text})", place=node.place)
 
 
