@@ -320,18 +320,18 @@ class KnowledgeBase(View):
         A condition that is true at its installation does not fire, but its hold time begins.
 
         Args:
-            text: a condition. The condition is true if some values of its free variables make it true; these values are
-                its witness.
+            text: a condition; the values of its free variables that make it true are its witness.
             params: variables of the condition with a fixed value.
-            fire: `edge` fires when the condition becomes true; `each` also fires at every change of the set of its
-                witnesses while the condition is true.
+            fire: `edge` fires when the condition becomes true; `each` also at each change of its true witnesses.
             hold_s: time in seconds for which the condition must stay true before it fires.
             once: whether the first firing cancels the condition.
             hysteresis: margin by which the comparisons must fail before the condition is false.
             clock: measures `hold_s`.
 
         Raises:
-            InputError: as for `query`; a wrong hold time, hysteresis or `fire`; `StoreError` if closed.
+            InputError: as for `query`; a hold time that is negative, not finite or without a clock; a hysteresis
+                without a comparison; a value of `fire` other than `edge` and `each`.
+            StoreError: the knowledge base is closed.
         """
         firing = terms(fire, hold_s=hold_s, once=once, clock=clock)
         with self._lock:

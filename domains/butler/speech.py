@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Iterable
 from typing import TextIO
 
-from domains.dialogue.channels import Console
+from domains.dialogue.channels import Console, Script
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.outcomes import Outcome
@@ -97,10 +97,5 @@ def from_prompt(stream: TextIO) -> Listen:
 
 def from_list(sentences: Iterable[str]) -> Listen:
     """Return a function that returns these sentences, one after the other."""
-    left = iter(sentences)
-
-    async def next_sentence(call: SkillCall) -> str | None:
-        await call.clock.sleep(2.0)
-        return next(left, None)
-
-    return next_sentence
+    script = Script.of_lines(sentences)
+    return lambda call: script.receive(call, "", "")

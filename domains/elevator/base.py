@@ -6,8 +6,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated
 
-from domains.elevator.lift import NAMES
-from domains.elevator.ride import LIFT, Ride
+from domains.elevator.lift import LIFT, NAMES
+from domains.elevator.perception import FLOOR_KNOWLEDGE
+from domains.elevator.ride import Ride
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.outcomes import Outcome
@@ -84,7 +85,7 @@ class Base(Component):
         to = None if stop is None or refusal else stop.floor
         if (reason := self._ride.move(call.action_id, to, refusal)) is not None:
             return NotMoved(reason=reason)
-        outdated = (fact("inside"), fact("floor-known"), *(fact("at-floor", "robot", floor) for floor in NAMES))
+        outdated = (fact("inside"), *FLOOR_KNOWLEDGE)
         return Outside(observed=Delta(added=(fact("arrived", self._ride.place),), removed=outdated))
 
     async def _wait(self, call: SkillCall) -> Outcome:

@@ -14,17 +14,16 @@ from domains.dialogue.channels import Console
 from domains.dialogue.speech import Dialogue
 from domains.elevator.base import Base
 from domains.elevator.floors import FLOORS
-from domains.elevator.lift import PERSONS, Lift, scene
+from domains.elevator.lift import LIFT, PERSONS, Lift, scene
 from domains.elevator.mission import Mission
 from domains.elevator.perception import Door, Head, People
-from domains.elevator.ride import LIFT, Ride
+from domains.elevator.ride import Ride
 from domains.elevator.scenario import Scenario
-from domains.elevator.talk import DOMAIN, Riders, floor_in
+from domains.elevator.talk import Riders, floor_in
 from dsc.components.component import Component
 from dsc.sequencer.run_end import RunEnd
 from knowledge_base.facts import Delta, fact
 from knowledge_base.store import KnowledgeBase
-from planning.model.domain import PlanningDomain
 from planning.robot.bundles import Bundle
 from planning.robot.simulation import Left, Setup, Simulation
 
@@ -110,7 +109,6 @@ def bundle() -> Bundle:
         about="take the elevator: a mission tree, goals for each phase, questions to persons",
         needs=(DIALOGUE, ATTENTION),
         main="take_elevator",
-        domain=PlanningDomain.parse(DOMAIN),
         simulation=ElevatorRide,
         failures=("did_not_arrive",),
         conversions=(floor_in,),

@@ -11,6 +11,8 @@ from dsc.chance import choose, uniform
 
 NAMES = tuple(FLOORS)
 """The names of the floors, from below."""
+LIFT = "lift"
+"""The place of the robot in the lift."""
 PERSONS = ("anna", "bert", "cleo", "dora", "emil")
 OPEN = 25.0
 """Seconds for which the door is open."""
@@ -108,5 +110,5 @@ def scene(lift: Lift, robot: str, second: float) -> list[dict[str, Any]]:
     )
     for number, name in enumerate(() if stop is None else stop.persons):
         things.append({"id": name, "shape": "operator", "x": 2.3 + 0.7 * number, "y": level + 0.25, "label": name})
-    x, y = (2.6, level - 0.35) if robot == "lift" else FLOORS[robot].place
+    x, y = (2.6, level - 0.35) if robot == LIFT else FLOORS[robot].place
     return [*things, {"id": "robot", "shape": "robot", "label": "robot", "x": x, "y": y}]

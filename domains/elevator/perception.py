@@ -10,6 +10,9 @@ from dsc.outcomes import Outcome
 from dsc.skills import skill
 from knowledge_base.facts import Delta, fact
 
+FLOOR_KNOWLEDGE = (fact("floor-known"), *(fact("at-floor", "robot", floor) for floor in NAMES))
+"""The facts that an answer about the floor may have made true."""
+
 
 class Over(Outcome):
     """The perception has ended."""
@@ -34,11 +37,11 @@ class Door(Component):
     @skill(after_crash="repeat", unlimited=True)
     async def perceive(self, call: SkillCall) -> Over:
         """Report each change of the door; a closed door outdates what the robot knows about its floor."""
-        unknown = (fact("door-open"), fact("floor-known"), *(fact("at-floor", "robot", floor) for floor in NAMES))
+        closed = Delta(removed=(fact("door-open"), *FLOOR_KNOWLEDGE))
         while True:
             now = call.clock.now()
             is_open = self._ride.visible_stop(now) is not None
-            call.observe(Delta(added=(fact("door-open"),)) if is_open else Delta(removed=unknown))
+            call.observe(Delta(added=(fact("door-open"),)) if is_open else closed)
             await call.clock.sleep(self._ride.lift.next_change(now) - now)
 
 

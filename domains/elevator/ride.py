@@ -1,4 +1,4 @@
-"""The state of a ride: the place of the robot, and the mishaps. A file keeps it next to the store of the run."""
+"""The state of a ride: the place of the robot and the executed actions, in a file next to the store of the run."""
 
 from __future__ import annotations
 
@@ -6,10 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from domains.elevator.lift import Lift, Stop
-
-LIFT = "lift"
-"""The place of the robot in the lift."""
+from domains.elevator.lift import LIFT, Lift, Stop
 
 
 class Ride:

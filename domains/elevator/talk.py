@@ -1,4 +1,4 @@
-"""The conversation in the lift: the part of the domain, simulated persons, and floors in their answers."""
+"""The conversation in the lift: simulated persons, and floors in their answers."""
 
 from __future__ import annotations
 
@@ -11,17 +11,6 @@ from domains.elevator.lift import NAMES
 from domains.elevator.ride import Ride
 from dsc.calls import SkillCall
 from dsc.conversions import conversion
-
-DOMAIN = """
-(define (domain conversation)
-  (:types person - agent agent floor)
-  (:constants robot - agent floor0 floor1 floor2 floor3 floor4 - floor)
-  (:predicates (inside) (in-lift ?p - person) (looks-at ?who ?what - object) (door-open) (floor-known)
-    (at-floor ?who - agent ?f - floor) (assigned ?who - agent ?f - floor))
-  (:action ask-for-floor ; the answer may be another floor
-    :parameters (?person - person ?floor - floor)
-    :precondition (and (inside) (door-open) (not (floor-known)) (in-lift ?person) (looks-at robot ?person))
-    :effect (and (at-floor robot ?floor) (floor-known))))"""
 
 
 @conversion

@@ -21,9 +21,10 @@ def find_values(bind: Bind, situation: Situation, bindings: Bindings) -> Mapping
     known = {name: value for name, value in bindings.items() if name not in bind.names}
     found = situation.answers(bind.condition, known)
     if bind.order_by:
-        found = iter(
-            sorted(found, key=lambda one: tuple(_number(term, situation, {**known, **one}) for term in bind.order_by))
-        )
+        several = [*found]
+        if len(several) > 1:
+            several.sort(key=lambda one: tuple(_number(term, situation, {**known, **one}) for term in bind.order_by))
+        found = iter(several)
     if bind.every:
         (name,) = bind.names
         return {name: [one[name] for one in found]}

@@ -210,10 +210,15 @@ class _Parser:
         self.advance()
         if token.kind == "name":
             return Literal(float(token.text == "true")) if token.text in {"true", "false"} else Name(token.text)
-        value = _value(token)
-        if isinstance(value, int) and value > MAX_INTEGER:
+        if token.kind in {"integer", "hex"}:
+            return Literal(self._integer(token))
+        return Literal(float(token.text) if token.kind == "real" else token.text)
+
+    def _integer(self, token: _Token) -> int:
+        value = int(token.text, 16 if token.kind == "hex" else 10) if len(token.text) <= MAX_DIGITS else None
+        if value is None or value > MAX_INTEGER:
             raise self.mistake(f"the integer '{token.text[:20]}' has more than 64 bits")
-        return Literal(value)
+        return value
 
     def _parenthesis_or_unary(self, token: _Token) -> Expression:
         if token.text in {"-", "!"}:
@@ -230,13 +235,3 @@ class _Parser:
         if self.token.kind != "operator" or self.token.text != text:
             raise self.mistake(f"'{text}' was expected; found '{self.token.text or 'the end'}'")
         self.advance()
-
-
-def _value(token: _Token) -> float | int | str:
-    if token.kind == "text":
-        return token.text
-    if token.kind == "real":
-        return float(token.text)
-    if len(token.text) > MAX_DIGITS:
-        return MAX_INTEGER + 1
-    return int(token.text, 16 if token.kind == "hex" else 10)

@@ -7,8 +7,9 @@ only its look-ups. No text is executed.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 
 from knowledge_base.errors import SchemaError
@@ -17,7 +18,6 @@ from knowledge_base.language.checking.binding import check_answers, check_bound
 from knowledge_base.language.checking.check import check_arity
 from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.compiler import Answers, compile_answers, compile_query, compile_test
-from knowledge_base.language.evaluation.lookups import Search
 from knowledge_base.language.evaluation.terms import Bindings, Getter, Test, as_number, compile_term
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.effect import (
@@ -65,17 +65,28 @@ class Asked:
         return self.test(world, bindings)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # without slots, for the cached property
 class Queried:
     """A query, compiled for a set of bound variables.
 
     Attributes:
         e: the query; the reference keeps it alive as long as its compiled form.
         answers: returns the values of the other variables, as `query` does.
+        schema: the declarations.
+        bound: the bound variables.
     """
 
     e: Expression
     answers: Answers
+    schema: Vocabulary
+    bound: frozenset[str]
+
+    @cached_property
+    def rows(self) -> Callable[[World, Bindings], Iterator[dict[str, Value]]]:
+        """Function that yields the answers one by one, as `rows` does."""
+        names = asked_for(self.e, self.bound)
+        search = compile_query(self.schema.expanded(self.e), self.schema, self.bound)
+        return lambda world, bindings: ({name: each[name] for name in names} for each in search(world, bindings))
 
 
 _terms: IdentityCache[Term, tuple[frozenset[str], Getter]] = IdentityCache()
@@ -83,10 +94,6 @@ _terms: IdentityCache[Term, tuple[frozenset[str], Getter]] = IdentityCache()
 _conditions: IdentityCache[Expression, Asked] = IdentityCache()
 _queries: IdentityCache[Expression, tuple[frozenset[str], dict[frozenset[str], Queried]]] = IdentityCache()
 """The free variables of a query, and its compiled searches by their bound variables."""
-_searches: IdentityCache[Expression, tuple[frozenset[str], dict[frozenset[str], tuple[Sequence[str], Search]]]] = (
-    IdentityCache()
-)
-"""As `_queries`, with the names of the answers and the searches that yield them one by one."""
 
 
 def holds(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDINGS) -> bool:
@@ -127,18 +134,7 @@ def rows(e: Expression, world: World, bindings: Mapping[str, Value] = NO_BINDING
 
     An error about candidates without a computable value is raised after all answers; other errors as for `query`.
     """
-    searches = _searches.find(e, world.schema)
-    if searches is None:
-        check_depth(e)
-        searches = _searches.keep(e, world.schema, (free_variables(e), {}))
-    free, by_bound = searches
-    bound = free.intersection(bindings)
-    if bound not in by_bound:
-        expanded = world.schema.expanded(e)
-        check_answers(expanded, bound, world.schema)
-        by_bound[bound] = asked_for(e, bound), compile_query(expanded, world.schema, bound)
-    names, search = by_bound[bound]
-    return ({name: each[name] for name in names} for each in search(world, bindings))
+    return queried(e, world.schema, bindings).rows(world, bindings)
 
 
 def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried:
@@ -153,7 +149,9 @@ def queried(e: Expression, schema: Vocabulary, params: Iterable[str]) -> Queried
     if found is None:
         expanded = schema.expanded(e)
         check_answers(expanded, bound, schema)
-        found = by_bound[bound] = Queried(e, compile_answers(expanded, schema, bound, asked_for(e, bound)))
+        found = by_bound[bound] = Queried(
+            e, compile_answers(expanded, schema, bound, asked_for(e, bound)), schema, bound
+        )
     return found
 
 
