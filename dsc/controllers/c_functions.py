@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from dsc.controllers.expression_text import SUFFIX, ExpressionText
-from dsc.controllers.identifiers import identifiers
+from dsc.controllers.identifiers import by_name
 from dsc.controllers.model import (
     Action,
     Arguments,
@@ -66,10 +66,10 @@ class CFunctions:
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
-        self._data = dict(zip(controller.data, identifiers(controller.data), strict=True))
-        self._attributes = dict(zip(controller.attributes, identifiers(controller.attributes), strict=True))
-        self._arguments = dict(zip(controller.arguments, identifiers(controller.arguments), strict=True))
-        self._parameters = dict(zip(controller.parameters, identifiers(controller.parameters), strict=True))
+        self._data = by_name(controller.data)
+        self._attributes = by_name(controller.attributes)
+        self._arguments = by_name(controller.arguments)
+        self._parameters = by_name(controller.parameters)
         self._text = _CExpressions(self._data, self._attributes)
 
     def lines(self) -> Iterator[str]:

@@ -24,6 +24,12 @@ def identifier(name: str) -> str:
     return f"{text}_" if is_word else text
 
 
+def by_name(names: Iterable[str]) -> dict[str, str]:
+    """Return the identifiers of names, by name."""
+    known = [*names]
+    return dict(zip(known, identifiers(known), strict=True))
+
+
 def identifiers(names: Iterable[str], *, upper: bool = False) -> list[str]:
     """Return an identifier for each name; later names that would have the same one get a number."""
     found: list[str] = []

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 
 from dsc.controllers.expression_text import ExpressionText
-from dsc.controllers.identifiers import identifiers
+from dsc.controllers.identifiers import by_name, identifiers
 from dsc.controllers.model import (
     Action,
     Arguments,
@@ -80,7 +80,7 @@ class _Expressions(ExpressionText):
 class _Writer:
     def __init__(self, controller: Controller, queue: int) -> None:
         self.controller, self.queue = controller, queue
-        self.data = dict(zip(controller.data, identifiers(controller.data), strict=True))
+        self.data = by_name(controller.data)
         self.text = _Expressions(self.data)
 
     def lines(self) -> Iterator[str]:
