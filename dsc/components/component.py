@@ -344,6 +344,9 @@ class Component(ComponentHooks, RestartHooks):
             UnknownNameError: the component has no such method.
             InputError: a part of the message is missing or unknown.
         """
+        if port == WATCH:
+            self.activations.replace_values(**message)
+            return
         taken = Interface(messages=self._taken()).message(self.name, port)
         assert taken is not None  # noqa: S101
         check_arguments(taken, message)

@@ -33,7 +33,7 @@ from collections import defaultdict
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from dsc.annotations import FoundRecords, names_around, parameter_annotations, type_of
 from dsc.calls import SkillCall
@@ -50,7 +50,10 @@ from dsc.skills import (
     returned_outcomes,
     signature_of,
 )
-from knowledge_base.errors import SchemaError
+from knowledge_base.errors import InputError, SchemaError
+
+if TYPE_CHECKING:
+    from dsc.components.value_conditions import ValueCondition
 
 ANSWERED = "answered"
 """The outcome of a query; its attributes are the answer."""
@@ -131,16 +134,27 @@ def messages(kind: type[object], name: str) -> Mapping[str, SkillSignature]:
 
 
 class EventActivations:
-    """Tests of a component's active events, and the last values of each event (S0.6)."""
+    """Tests of a component's active events, and the last values of each event (S0.6).
+
+    Attributes:
+        conditions: the watched conditions on values of push ports, by the keys of the actions that watch them.
+    """
 
     def __init__(self) -> None:
         self._values: dict[str, tuple[Any, ...]] = {}
         self._tests: defaultdict[str, list[Test]] = defaultdict(list)
         self._calls = LoopCalls()
+        self.conditions: dict[str, ValueCondition] = {}
 
     def __getstate__(self) -> dict[str, object]:
         """Return the state for pickling, without activations, which stay in this process."""
-        return {"_values": self._values, "_tests": defaultdict(list), "_calls": LoopCalls()}
+        return {"_values": self._values, "_tests": defaultdict(list), "_calls": LoopCalls(), "conditions": {}}
+
+    def replace_values(self, key: str, values: Mapping[str, Any]) -> None:
+        """Replace values of a watched condition's variables; raise `InputError` if it is not watched."""
+        if key not in self.conditions:
+            raise InputError(f"no condition is watched for {key}")
+        self.conditions[key].replace_values(values)
 
     def active(self, event: str) -> bool:
         """Return whether the event has an activation."""

@@ -25,6 +25,12 @@ from knowledge_base.language.syntax.text import parse_condition, to_text
 
 WATCH = "watch_values"
 """Name of the skill by which charts watch a condition on the values of a component with push ports."""
+WATCH_TYPES = {
+    "condition": "text", "values": "map of any", "hysteresis": "number from 0", "hold": "number from 0",
+}  # fmt: skip
+"""Types of the parameters of events that watch a condition."""
+WATCH_OUTCOMES = {"became_true": {"values": "map of any"}, "became_false": {"values": "map of any"}}
+"""Outcomes of events that watch a condition."""
 Flip = Callable[[bool, dict[str, Any]], None]
 """Function that receives the truth of a condition after each change, and the values that it reads."""
 Fail = Callable[[Exception], None]
@@ -35,10 +41,10 @@ class ValueCondition:
     """A condition on the values of push ports, which reports its changes in the running loop.
 
     Args:
-        text: the condition; a name with a dot is a value of a port, e.g. `scan.metres`.
+        condition: the condition; a name with a dot is a value of a port, e.g. `scan.metres`.
         ports: the push ports by name.
         checks: the functions that the condition may use, by name.
-        values: the values of the variables in the condition.
+        values: the values of the variables in the condition, until `replace_values`.
         hysteresis: as for `KnowledgeBase.install`; 0 means none.
         hold: seconds for which the condition must stay true before it counts as true.
         times, out_of: the condition counts as true if it is true for `times` of the last `out_of` values.
@@ -50,7 +56,7 @@ class ValueCondition:
 
     def __init__(
         self,
-        text: str,
+        condition: str | Expression,
         ports: Mapping[str, Push],
         checks: Mapping[str, Check],
         values: Mapping[str, Any],
@@ -61,7 +67,7 @@ class ValueCondition:
         out_of: int = 1,
     ) -> None:
         self._ports, self._checks = ports, checks
-        rise = parse_condition(text)
+        rise = parse_condition(condition) if isinstance(condition, str) else condition
         self._rise, self._stay = rise, relaxed(rise, hysteresis) if hysteresis else rise
         if not 1 <= times <= out_of:
             raise InputError(f"`times` is from 1 to `out_of`, not {times} of {out_of}")
@@ -71,16 +77,14 @@ class ValueCondition:
         self._series: dict[str, Series] = {}
         self._silences: dict[tuple[str, float], float] = {}  # loop times of the end of silence that counts
         for name in self._names(rise):
-            port, _, _ = name.partition(".")
-            self._require(name, port)
+            self._require(name, port_of(name))
             self._series[name] = Series(name)
         for port, seconds in self._silent(rise):
             self._require(port, port)
             self._silences[port, seconds] = 0.0
-        self._read = dict.fromkeys(
-            [*(name.partition(".")[0] for name in self._series), *(p for p, _ in self._silences)]
-        )
-        self._evaluation = ValueEvaluation(self._series, checks, values, self._is_silent)
+        self._read = dict.fromkeys([*map(port_of, self._series), *(p for p, _ in self._silences)])
+        self._values = dict(values)
+        self._evaluation = ValueEvaluation(self._series, checks, self._values, self._is_silent)
         self._truth: bool | None = None
         self._since: float | None = None  # loop time since which the condition is true
         self._timers: list[asyncio.TimerHandle] = []
@@ -101,6 +105,11 @@ class ValueCondition:
             port.listen(receive)
         if not self._series:
             self._evaluate()
+
+    def replace_values(self, values: Mapping[str, Any]) -> None:
+        """Replace values of variables, and evaluate the condition again; must be called in the loop of `listen`."""
+        self._values.update(values)
+        self._evaluate()
 
     def end(self) -> None:
         """Stop listening."""
@@ -187,11 +196,16 @@ class ValueCondition:
                     yield from self._silent(part)
 
     def _require(self, name: str, port: str) -> None:
-        if port not in self._ports or ("." in name and name.partition(".")[2] not in self._ports[port].values):
+        if port not in self._ports or (name != port and name.rpartition(".")[2] not in self._ports[port].values):
             valid = [f"{port}.{value}" for port, push in self._ports.items() for value in push.values]
-            if "." not in name:
+            if name == port:
                 valid = list(self._ports)
             raise UnknownNameError(f"the component pushes no '{name}'", found=name, valid=valid)
+
+
+def port_of(name: str) -> str:
+    """Return the port of a value's name: `scan` of `scan.metres`."""
+    return name.rpartition(".")[0]
 
 
 class BecameTrue(Outcome):
@@ -212,6 +226,7 @@ async def watch(component: Any, _: SkillBody, call: SkillCall[Any], arguments: M
     options = {name: value for name, value in arguments.items() if name not in {"condition", "values"}}
     checks = {**LIBRARY, **by_name(*(check for port in component.pushes.values() for check in port.checks))}
     condition = ValueCondition(arguments["condition"], component.pushes, checks, arguments.get("values", {}), **options)
+    component.activations.conditions[call.key] = condition
     condition.listen(
         lambda truth, values: call.report(BecameTrue(values=values) if truth else BecameFalse(values=values)),
         lambda error: None if failed.done() else failed.set_exception(error),
@@ -219,14 +234,11 @@ async def watch(component: Any, _: SkillBody, call: SkillCall[Any], arguments: M
     try:
         return await failed
     finally:
+        del component.activations.conditions[call.key]
         condition.end()
 
 
 def declare_watch(body: SkillBody) -> SkillBody:
     """Declare the method that stands for the conditions of a component as an event with two outcomes."""
-    types = {
-        "condition": "text", "values": "map of any", "hysteresis": "number from 0", "hold": "number from 0",
-        "times": "integer from 1", "out_of": "integer from 1",
-    }  # fmt: skip
-    outcomes = {"became_true": {"values": "map of any"}, "became_false": {"values": "map of any"}}
-    return Declared(types, outcomes, watch, own=1, pattern="event", after_crash="repeat")(body)
+    types = {**WATCH_TYPES, "times": "integer from 1", "out_of": "integer from 1"}
+    return Declared(types, WATCH_OUTCOMES, watch, own=1, pattern="event", after_crash="repeat")(body)

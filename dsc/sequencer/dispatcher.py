@@ -46,6 +46,7 @@ from dsc.supervision.activation import ComponentActivation
 from dsc.supervision.component_registry import ComponentRegistry
 from dsc.supervision.lives import ComponentLives
 from dsc.supervision.skill_dependencies import SkillDependencies
+from dsc.supervision.sources import Sources
 from knowledge_base.errors import InputError
 
 _LOG = run_logger(__package__)
@@ -73,6 +74,7 @@ class Dispatcher:
     Attributes:
         components: the deployed components by name.
         activation: keeps required components alive and active.
+        sources: the components whose values watched conditions read.
         lives: notices failures and restarts of components.
         outbox: one-way outputs to components.
         timers: timeouts, periods, delayed events and scheduled input from outside.
@@ -95,6 +97,7 @@ class Dispatcher:
         self._run_id = run_id
         self.components = {component.name: component for component in require_instances(components)}
         self.activation = ComponentActivation(ComponentRegistry(self.components), self._in_use)
+        self.sources = Sources(self.activation)
         self.outbox = Outbox(self._refused)
         self.lives = ComponentLives(self.components.values(), self._failed, self._recovered)
         self._undeployed = Undeployed(clock, post, self._refused, self.components.keys())
@@ -155,8 +158,8 @@ class Dispatcher:
         return frozenset(one.start.component for one in self._running.values())
 
     def _in_use(self) -> Iterable[str]:
-        """Return the components with running skills, and those with cancelled skills that clean up."""
-        return (*self.in_use, *self._cleanups.pending)
+        """Return the components with running skills, those with cancelled skills that clean up, and sources."""
+        return (*self.in_use, *self._cleanups.pending, *self.sources.names)
 
     @property
     def waiting(self) -> bool:

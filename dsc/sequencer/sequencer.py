@@ -20,6 +20,7 @@ from dsc.messages import FromOutside, KnowledgeMessage, LateMessage, Message, Pl
 from dsc.run_log import logged_run
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
+from dsc.sensing.condition_handler import ConditionHandler
 from dsc.sequencer import message_checks
 from dsc.sequencer.clock import LoopClock
 from dsc.sequencer.component_relations import ComponentRelations
@@ -101,6 +102,7 @@ class Sequencer(OutsideInput):
             self.trace.listen(store.receive)
         self._inbox = Inbox()
         self.dispatcher = Dispatcher(components, clock, self._inbox.put, self, part_of, run_id, self.library)
+        self.dispatcher.deploy(ConditionHandler(self.dispatcher.components, self.dispatcher.sources.work, knowledge))
         self._live = knowledge.live_rows
         self._relations = ComponentRelations(
             self.dispatcher, lambda: self.machine.state, self._live, self._reactor.renew

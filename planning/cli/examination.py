@@ -29,6 +29,7 @@ from planning.robot.bundles import Bundle, components_of, gathered
 from planning.robot.checking import check_project
 from planning.robot.project_files import objects_in
 from planning.robot.simulation import Setup, Simulation
+from planning.robot.soundness import run_skills
 from planning.robot.targets import bundle_at
 
 
@@ -51,7 +52,7 @@ def facts_of(bundle: Bundle, target: str) -> dict[str, Any]:
     own = () if simulation is None else simulation.components()
     components = [*components_of(bundles), *own]
     schema = bundle.planning_domain.schema
-    skills = [skill for one in components for skill in one.skills().values()]
+    skills = [*(skill for one in components for skill in one.skills().values()), *run_skills()]
     form = None if simulation is None else simulation.scenario_form
     return {
         "skills": None if bundle.remote else [asdict(one) for one in _plain(skills)],

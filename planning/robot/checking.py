@@ -18,7 +18,7 @@ from dsc.errors import Finding, ProgrammingError
 from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import DynamicState
 from dsc.profiles import configure
-from dsc.skills import SkillSignature, signatures
+from dsc.skills import SkillSignature
 from dsc.text.profiles import Profile, adapted, load_profile
 from dsc.validation import review_plot, validate_plot
 from dsc.validation.ignored import without_ignored
@@ -69,7 +69,7 @@ from planning.robot.project_files import (
 )
 from planning.robot.scenario_files import check_scenarios
 from planning.robot.simulation import Setup, Simulation
-from planning.robot.soundness import check_implementations, interfaces
+from planning.robot.soundness import check_implementations, interfaces, run_skills
 from planning.robot.targets import bundle_at
 from planning.robot.unused import never_true, quoted_names, unused_plots
 
@@ -273,7 +273,7 @@ class _Robot:
         if self._components is None or self._lacks_remote:  # the skills of other programs are unknown
             return None
         own = [skill for component in self._components for skill in component.skills().values()]
-        return [*own, *signatures(PlanningComponent, PlanningComponent.name).values()]
+        return [*own, *run_skills()]
 
     @property
     def _lacks_remote(self) -> bool:

@@ -27,7 +27,6 @@ from dsc.runs.store import RunStore
 from dsc.sequencer.clock import ClockKind, LoopClock
 from dsc.sequencer.dispatcher import Dispatcher
 from dsc.sequencer.sequencer import Sequencer
-from dsc.skills import signatures
 from dsc.supervision.room import Room
 from dsc.text.profiles import Profile, adapted
 from dsc.trace import Listener, Trace
@@ -59,7 +58,7 @@ from planning.robot.bundles import (
 from planning.robot.observations import require_observable
 from planning.robot.run import Run
 from planning.robot.simulation import Simulation
-from planning.robot.soundness import interfaces, require_parts, require_sound
+from planning.robot.soundness import RUN_COMPONENTS, interfaces, require_parts, require_sound, run_skills
 from planning.robot.task import Task
 
 
@@ -117,8 +116,9 @@ class RobotProgram:
         if self.room is not None:
             self.room.require(self.components)
         self.domain = PlanningDomain.from_fragments([domain, *shipped_by(self.components)])
-        if any(component.name == PlanningComponent.name for component in self.components):
-            raise SchemaError(f"two components are named '{PlanningComponent.name}'", found=PlanningComponent.name)
+        for kind in RUN_COMPONENTS:
+            if any(component.name == kind.name for component in self.components):
+                raise SchemaError(f"two components are named '{kind.name}'; each run has one", found=kind.name)
         if knowledge is not None and store is not None:
             raise InputError("a store provides the knowledge: give a store or knowledge, not both")
         if knowledge is not None:
@@ -190,7 +190,7 @@ class RobotProgram:
         """Raise `PlotError` if plots do not fit each other, the domain, or the components of the robot and its run."""
         components = [*self.components, *added]
         skills = [one for component in components for one in component.skills().values()]
-        skills += signatures(PlanningComponent, PlanningComponent.name).values()
+        skills += run_skills()
         require_sound(library, self.domain, self._schema, skills, interfaces(components))
 
     def _check_added_plots(self) -> None:

@@ -9,9 +9,11 @@ from pathlib import Path
 from dsc.components.component import Component
 from dsc.components.interface import Interface
 from dsc.components.ports import messages
+from dsc.components.value_conditions import WATCH
 from dsc.dynamic.library import Library
 from dsc.errors import Finding
-from dsc.skills import SkillSignature
+from dsc.sensing.condition_handler import ConditionHandler
+from dsc.skills import SkillSignature, signatures
 from dsc.validation import raise_findings, validate_library
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import require, shown
@@ -20,6 +22,8 @@ from knowledge_base.world.schema import Schema
 from planning.execution.planning_component import PlanningComponent
 from planning.model.domain import PlanningDomain
 
+RUN_COMPONENTS: tuple[type[Component], ...] = (PlanningComponent, ConditionHandler)
+"""The components that each run adds to those of its robot. (Classes are hashable, which mypy does not know.)"""
 IMPLEMENTED = "every-action-has-a-plot"
 """The rule of a finding about a planning action without a plot."""
 
@@ -79,9 +83,15 @@ _MOST_SOUND = 16
 
 
 def interfaces(components: Iterable[Component]) -> dict[str, Interface]:
-    """Return the interfaces by name of a robot's components and of its planning component."""
-    planning = Interface(messages=messages(PlanningComponent, PlanningComponent.name))
-    return {PlanningComponent.name: planning, **{one.name: one.interface() for one in components}}
+    """Return the interfaces by name of a robot's components, and of those that each run adds."""
+    own = {kind.name: Interface(messages=messages(kind, kind.name)) for kind in RUN_COMPONENTS}  # type: ignore[arg-type]
+    return {**own, **{one.name: one.interface() for one in components}}
+
+
+def run_skills() -> list[SkillSignature]:
+    """Return the skills of the components that each run adds to those of its robot."""
+    found = [skill for kind in RUN_COMPONENTS for skill in signatures(kind, kind.name).values()]  # type: ignore[arg-type]
+    return [skill for skill in found if skill.name != WATCH]  # none has push ports
 
 
 def require_sound(

@@ -72,3 +72,18 @@ def with_atoms(e: Expression, instead: Callable[[Atom], Expression]) -> Expressi
             return replace(e, premise=with_atoms(premise, instead), conclusion=with_atoms(conclusion, instead))
         case ex.Comparison():
             return e
+
+
+def with_terms(e: Expression, instead: Callable[[Term], Term]) -> Expression:
+    """Return the condition in which `instead` has replaced each argument of an atom and each side of a comparison."""
+    match e:
+        case Atom(_, args):
+            return replace(e, args=tuple(map(instead, args)))
+        case ex.Comparison(_, left, right):
+            return replace(e, left=instead(left), right=instead(right))
+        case ex.Not(body) | ex.Exists(_, body) | ex.Forall(_, body):
+            return replace(e, body=with_terms(body, instead))
+        case ex.And(parts) | ex.Or(parts):
+            return replace(e, parts=tuple(with_terms(part, instead) for part in parts))
+        case ex.Imply(premise, conclusion):
+            return replace(e, premise=with_terms(premise, instead), conclusion=with_terms(conclusion, instead))

@@ -1,0 +1,180 @@
+"""Conditions over several sources, split into parts that one source each can evaluate (S2.4, S2.18).
+
+`(or (< (distance hand.pose.position (pose cup1)) 0.01) (> (magnitude wrist.force.tool) 5))` has one part for `hand` and
+one for `wrist`. `hand.pose.position` is the value `position` of the port `pose` of the component `hand`. A form without
+such a value is a condition or a term of the knowledge base.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from dsc.components.checks import LIBRARY
+from knowledge_base.errors import InputError
+from knowledge_base.facts import Value
+from knowledge_base.language.syntax.expression import (
+    And,
+    Arithmetic,
+    Call,
+    Constant,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    Term,
+    Variable,
+    substitute,
+)
+from knowledge_base.language.syntax.rewriting import inside, with_terms
+from knowledge_base.language.syntax.text import to_text
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """A part of a condition.
+
+    Attributes:
+        condition: the part. Names of a single component's values lack the component, as in `pose.position`.
+        components: the components whose values the part reads; without any, the knowledge base evaluates the part.
+        live: the terms of the knowledge base in the part, by the variables that stand for their present values.
+    """
+
+    condition: Expression
+    components: tuple[str, ...] = ()
+    live: Mapping[str, Term] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Junction:
+    """Operands that one truth value decides: false decides a conjunction, true decides a disjunction."""
+
+    decisive: bool
+    operands: tuple[Structure, ...]
+
+
+Structure = Junction | Part
+"""A condition as parts without negations above them."""
+
+
+def split(condition: Expression, values: Mapping[str, Any], functions: Collection[str]) -> Structure:
+    """Return a condition as the largest parts that one source each can evaluate.
+
+    Args:
+        condition: the condition.
+        values: the values of its variables.
+        functions: the names of the functions of the knowledge base.
+
+    Raises:
+        InputError: a quantifier contains a value of a component.
+    """
+    known = {name: value for name, value in values.items() if isinstance(value, Value)}
+    return _Splitter(known, functions).split(_with_inner_negations(condition, negated=False))
+
+
+def parts_in(structure: Structure) -> Iterator[Part]:
+    """Yield the parts from left to right."""
+    if isinstance(structure, Part):
+        yield structure
+    else:
+        for operand in structure.operands:
+            yield from parts_in(operand)
+
+
+def truth_of(structure: Structure, truth: Callable[[Part], bool | None]) -> bool | None:
+    """Return the truth of a condition, some of whose parts may be unknown (Kleene's strong three-valued logic)."""
+    if isinstance(structure, Part):
+        return truth(structure)
+    truths = [truth_of(operand, truth) for operand in structure.operands]
+    if structure.decisive in truths:
+        return structure.decisive
+    return None if None in truths else not structure.decisive
+
+
+def components_in(form: Expression | Term) -> tuple[str, ...]:
+    """Return the names of the components whose values a form reads, in the order of the text."""
+    return tuple(dict.fromkeys(str(name.value).partition(".")[0] for name in value_names(form)))
+
+
+def value_names(form: Expression | Term) -> Iterator[Constant]:
+    """Yield the names of values in a form, e.g. `hand.pose.position`, and of ports, e.g. `hand.pose`."""
+    return (one for one in inside(form) if isinstance(one, Constant) and _is_value_name(one))
+
+
+def _is_value_name(term: Constant) -> bool:
+    return isinstance(term.value, str) and not term.quoted and "." in term.value
+
+
+def _with_inner_negations(e: Expression, *, negated: bool) -> Expression:
+    """Return the condition, or its negation, with `not` only before comparisons, predicates and quantifiers."""
+    match e:
+        case Not(body):
+            return _with_inner_negations(body, negated=not negated)
+        case Imply(premise, conclusion):
+            either = Or((Not(premise, place=premise.place), conclusion), place=e.place)
+            return _with_inner_negations(either, negated=negated)
+        case And(parts) | Or(parts):
+            kind = And if isinstance(e, And) is not negated else Or
+            made = (_with_inner_negations(part, negated=negated) for part in parts)
+            return kind(tuple(inner for one in made for inner in _operands(one, kind)), place=e.place)
+        case _:
+            return Not(e, place=e.place) if negated else e
+
+
+def _operands(e: Expression, kind: type[And | Or]) -> tuple[Expression, ...]:
+    return e.parts if isinstance(e, And | Or) and isinstance(e, kind) else (e,)
+
+
+class _Splitter:
+    """One split; see `split` for the arguments."""
+
+    def __init__(self, known: Mapping[str, Value], functions: Collection[str]) -> None:
+        self._known, self._functions = known, functions
+
+    def split(self, e: Expression) -> Structure:
+        """Return a condition with inner negations as parts."""
+        if not isinstance(e, And | Or) or _has_one_source(e):
+            return self._part(e)
+        alike: dict[tuple[str, ...], list[Expression]] = {}
+        for operand in e.parts:
+            if _has_one_source(operand):
+                alike.setdefault(components_in(operand), []).append(operand)
+        merged = [each[0] if len(each) == 1 else replace(e, parts=tuple(each)) for each in alike.values()]
+        others = [operand for operand in e.parts if not _has_one_source(operand)]
+        return Junction(isinstance(e, Or), (*map(self._part, merged), *map(self.split, others)))
+
+    def _part(self, e: Expression) -> Part:
+        components = components_in(e)
+        if not components:
+            return Part(substitute(e, self._known))
+        for one in inside(e):
+            if isinstance(one, Exists | Forall):
+                message = f"a condition on values of components has no quantifiers: {to_text(one)}"
+                raise InputError(message, place=one.place)
+        live: dict[str, Term] = {}
+        prefix = f"{components[0]}." if len(components) == 1 else ""
+        return Part(with_terms(e, lambda term: self._read(term, prefix, live)), components, live)
+
+    def _read(self, term: Term, prefix: str, live: dict[str, Term]) -> Term:
+        """Return a term without the component's name, and with variables for the terms that `live` receives."""
+        match term:
+            case Constant(str(name)) if _is_value_name(term):
+                return replace(term, value=name.removeprefix(prefix))
+            case Call(function) if function in self._functions and function not in LIBRARY and not components_in(term):
+                variable = Variable(f"live.{len(live)}", place=term.place)
+                live[variable.name] = substitute(term, self._known)
+                return variable
+            case Call(_, args) | Arithmetic(_, args):
+                return replace(term, args=tuple(self._read(arg, prefix, live) for arg in args))
+            case _:
+                return term
+
+
+def _has_one_source(e: Expression) -> bool:
+    """Return whether all comparisons, predicates and quantifiers of a condition read the same source."""
+    if isinstance(e, And | Or):
+        return len({components_in(part) for part in e.parts}) <= 1 and all(map(_has_one_source, e.parts))
+    return len(components_in(e)) <= 1
