@@ -35,6 +35,10 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 MOST_COMPLAINTS = 5
 """Maximum number of damaged records that are reported on the terminal; further ones are counted."""
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 picks a free one.")]
+DataOption = Annotated[
+    Path | None,
+    typer.Option("--data", metavar="FOLDER", help="The folder of pictures and scans that the records name."),
+]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
 P = TypeVar("P", "LivePage", "Viewer")
 
@@ -185,6 +189,7 @@ def view_command(
     file: Annotated[Path, typer.Argument(metavar="TRACE.jsonl|STORE", help="A trace or a store.")],
     port: Port = 0,
     no_open: NoOpen = False,
+    data: DataOption = None,
 ) -> None:
     """Show a recorded run, or a store while other programs change it, in the browser until Ctrl-C."""
     viewer_installed()
@@ -194,7 +199,7 @@ def view_command(
 
     with records_of(file) as log:
         _complain(file, log)
-        with page(Viewer(log, PageAddress.on(port)), opens=not no_open) as viewer:
+        with page(Viewer(log, PageAddress.on(port), data=data), opens=not no_open) as viewer:
             until_interrupt(viewer)
 
 

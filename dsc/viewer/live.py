@@ -18,6 +18,8 @@ from dsc.viewer.control import Control
 from knowledge_base.errors import InputError, described
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from dsc.trace import Record
     from dsc.viewer.access import PageAddress
 
@@ -38,6 +40,7 @@ class LivePage:
         first_line: the header of the run's trace.
         entrance: the page's address, whose socket this page then owns.
         control: whether the page may change the run.
+        data: the folder of the data that references in the records name.
 
     Attributes:
         control: the control to attach to the run; `None` for a read-only page.
@@ -47,7 +50,9 @@ class LivePage:
         token: the permanent key in the address for people.
     """
 
-    def __init__(self, first_line: str, entrance: PageAddress, *, control: bool = False) -> None:
+    def __init__(
+        self, first_line: str, entrance: PageAddress, *, control: bool = False, data: Path | None = None
+    ) -> None:
         self.control = Control(self._tell_paused) if control else None
         self.url, self.one_time_url = entrance.url, entrance.one_time_url
         self.port, self.token = entrance.port, entrance.token
@@ -59,7 +64,9 @@ class LivePage:
         socket = entrance.listening.fileno()
         # Keys pass through the pipe: every user of the machine can read command lines.
         keys = {"token": entrance.token, "code": entrance.code}
-        self._tell({"begin": first_line, "socket": socket, **keys, "control": control})
+        self._tell(
+            {"begin": first_line, "socket": socket, **keys, "control": control, "data": data and str(data.resolve())}
+        )
 
     def start(self) -> None:
         """Start answering; early connections wait for the process."""

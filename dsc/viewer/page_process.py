@@ -2,7 +2,8 @@
 
 Lines on standard input are records as in a trace, or messages:
 
-- `begin` is the first message, with the `socket` to serve, its keys `token` and `code`, and the truth value `control`.
+- `begin` is the first message, with the `socket` to serve, its keys `token` and `code`, the truth value
+  `control`, and the folder `data` or `null`.
 - Later messages are `paused`, an `answer` to a command, and `end`.
 
 Lines on standard output are the page's commands, each with a number. The end of the input ends the page.
@@ -17,6 +18,7 @@ from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from io import TextIOWrapper
 from itertools import count
+from pathlib import Path
 from socket import socket
 from typing import IO, Any
 
@@ -91,7 +93,8 @@ def main() -> None:
     log = RecordLog(begin["begin"], live=True)
     hands = FarHands(sys.stdout, log.wake)
     entrance = PageAddress(socket(fileno=begin["socket"]), begin["token"], begin["code"])
-    viewer = Viewer(log, entrance, hands if begin["control"] else None)
+    data = Path(begin["data"]) if begin["data"] else None
+    viewer = Viewer(log, entrance, hands if begin["control"] else None, data)
     viewer.start()
     take_in(lines, log, hands)
     viewer.close()

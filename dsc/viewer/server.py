@@ -23,6 +23,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from dsc.data_folder import SCHEME, name_in
 from dsc.viewer.access import COOKIE, Access, Keys, PageAddress
 from dsc.viewer.broadcast import Broadcast, BrowserStream
 from dsc.viewer.control import Hands
@@ -49,6 +50,7 @@ class Viewer:
         log: the records.
         entrance: the page's address, whose socket the viewer then owns.
         control: the run's control; `None` if the page may not change the run.
+        data: the folder of the data that references in the records name.
 
     Attributes:
         url: the address for people.
@@ -57,8 +59,10 @@ class Viewer:
         token: the permanent key in the address for people.
     """
 
-    def __init__(self, log: RecordLog, entrance: PageAddress, control: Hands | None = None) -> None:
-        self._log, self._control, self._socket = log, control, entrance.listening
+    def __init__(
+        self, log: RecordLog, entrance: PageAddress, control: Hands | None = None, data: Path | None = None
+    ) -> None:
+        self._log, self._control, self._socket, self._data = log, control, entrance.listening, data
         self.url, self.one_time_url = entrance.url, entrance.one_time_url
         self.port, self.token = entrance.port, entrance.token
         self._keys = Keys(entrance.token, entrance.code)
@@ -89,6 +93,7 @@ class Viewer:
         routes = [
             Route("/", self._page),
             Route("/record/{seq:str}", self._record),
+            Route("/data/{name:str}", self._datum),
             Route("/query", self._asked(self._answers.query, QUERY), methods=["POST"]),
             Route("/facts", self._asked(self._answers.facts, FACTS), methods=["POST"]),
             Route("/control", controlled, methods=["POST"]),
@@ -138,6 +143,12 @@ class Viewer:
             return Response(self._log.line(int(number)), media_type="application/json")
         except InputError as error:
             return _wrong(error)
+
+    async def _datum(self, request: Request) -> Response:
+        name = name_in(SCHEME + request.path_params["name"])
+        if self._data is None or name is None or not (self._data / name).is_file():
+            return PlainTextResponse("no such data; --data FOLDER names their folder", status_code=404)
+        return FileResponse(self._data / name)
 
     def _asked(self, answer: Callable[[Mapping[str, Any], Left], Any], form: Fields) -> Callable[[Request], Any]:
         async def answering(request: Request) -> Response:

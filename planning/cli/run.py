@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dsc.cli.logs import PROGRAMMING_ERROR, Quiet, Verbose, show_logs
-from dsc.cli.runs import NoOpen, Port
+from dsc.cli.runs import DataOption, NoOpen, Port
 from dsc.cli.wire import REALM, Connect, Realm, ZenohFile, texts_by_name
 
 if TYPE_CHECKING:
@@ -113,6 +113,7 @@ def run_command(
     view: Annotated[bool, typer.Option("--view", help="Show it in the browser while it runs.")] = False,
     port: Port = 0,
     no_open: NoOpen = False,
+    data: DataOption = None,
     allow_control: Annotated[
         bool,
         typer.Option("--allow-control", help="With --view: the page may pause the run, and post events and facts."),
@@ -172,7 +173,7 @@ def run_command(
             _print(report, as_json=json)
         else:
             report = _viewed(
-                robot, follow, port, opens=not no_open, control=allow_control, wait=not no_wait, as_json=json
+                robot, follow, port, opens=not no_open, control=allow_control, data=data, wait=not no_wait, as_json=json
             )
     if report.programming_error is not None:
         raise typer.Exit(PROGRAMMING_ERROR)
@@ -301,6 +302,7 @@ def _viewed(
     *,
     opens: bool,
     control: bool,
+    data: Path | None,
     wait: bool,
     as_json: bool,
 ) -> Report:
@@ -312,7 +314,7 @@ def _viewed(
     from dsc.viewer.access import PageAddress
     from dsc.viewer.live import LivePage
 
-    live = LivePage(header(**robot.header()), PageAddress.on(port), control=control)
+    live = LivePage(header(**robot.header()), PageAddress.on(port), control=control, data=data)
     robot.listen(live.receive)
     with page(live, opens=opens) as viewer:
         report = follow(prepare=live.control.attach if live.control else None)

@@ -1,15 +1,29 @@
 /** A record in full: a decision with its candidates, a broken plan with who broke it, others as they are. */
 
+import { useMemo } from "react";
 import { deciding } from "../core/explanations";
 import { splitPath } from "../core/plots";
 import type { Candidate, DecisionRec, KnowledgeRec, PlanBrokenRec, PlanFoundRec, Rec, RuleRec, StepRec, Value } from "../core/records";
 import type { Damaged } from "../core/sound";
+import { referencesIn } from "../core/references";
 import { breaker } from "../core/why";
 import { eventWords } from "../core/words";
 import { session } from "../session";
+import { Datum } from "./Datum";
 import { CELL, changed, Facts, inPath, inShort, jsonOf, RecordLink, Tree, Values } from "./parts";
 
 export function WhyRecord({ rec }: { rec: Rec }) {
+  const references = useMemo(() => referencesIn(rec), [rec]);
+  return (
+    <>
+      <Body rec={rec} />
+      {references.length > 0 && <h3>Data</h3>}
+      {references.map((one) => <div key={one}><Datum reference={one} /></div>)}
+    </>
+  );
+}
+
+function Body({ rec }: { rec: Rec }) {
   switch (rec.type) {
     case "decision": return <Decision rec={rec as DecisionRec} />;
     case "plan.broken": return <Broken rec={rec as PlanBrokenRec} />;

@@ -5,8 +5,10 @@ import { endWords } from "../core/ends";
 import { written, type ActionRec, type ComponentRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named, type ObservationRec, type PlotsRec,
   type PlanBrokenRec, type PlanAskedRec, type PlanFoundRec, type PlanNoneRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
 import type { Damaged } from "../core/sound";
+import { isReference } from "../core/references";
 import { wordsIn } from "../core/words";
 import { session } from "../session";
+import { Datum } from "./Datum";
 import { seconds } from "./Timeline";
 
 /** In a line; what is longer is cut: a pane would stand still over it. */
@@ -154,11 +156,16 @@ export function Values({ values, words }: { values: Named; words?: Readonly<Reco
     <table className="values">
       <tbody>
         {names.map((name) => (
-          <tr key={name}><th scope="row">{wordsIn(words, name) ?? `?${name}`}</th><td>{shortly(values[name])}</td></tr>
+          <tr key={name}><th scope="row">{wordsIn(words, name) ?? `?${name}`}</th><td><Value value={values[name]} /></td></tr>
         ))}
       </tbody>
     </table>
   );
+}
+
+/** A value in words; data that a reference names as a picture or a plot. */
+function Value({ value }: { value: unknown }) {
+  return isReference(value) ? <Datum reference={value} /> : <>{shortly(value)}</>;
 }
 
 function shortly(value: unknown): string {

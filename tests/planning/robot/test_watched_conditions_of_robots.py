@@ -86,5 +86,5 @@ def test_the_name_of_the_handler_is_taken():
 
 
 def test_a_misspelt_skill_of_the_handler_is_a_finding():
-    with pytest.raises(PlotError, match="did you mean 'conditions.watch_truth'"):
+    with pytest.raises(PlotError, match=r"did you mean 'conditions\.watch_truth'"):
         Robot(DOMAIN, [parse_plot(PLOT.replace("watch_truth", "watch_thruth"))], [Hand(), Wrist()])
