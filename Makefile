@@ -209,6 +209,7 @@ pictures: $(VENV)/.run   ## draw the pictures that README and docs show
 	$(BIN)/dsc deployment draw examples/strangers/lab.yaml --svg docs/pictures/deployment.svg
 	$(BIN)/dsc deployment draw examples/strangers/lab.yaml --timeline --svg docs/pictures/worst_cases.svg
 	$(BIN)/dsc kb draw examples/kitchen/problem.pddl --to docs/pictures/kitchen.svg
+	$(BIN)/python examples/working_memory.py docs/pictures/working_memory.svg
 
 NODE_MODULES := frontend/node_modules/.made
 

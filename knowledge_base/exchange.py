@@ -11,6 +11,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -92,7 +93,14 @@ def schema_form(schema: Schema) -> Form:
         "functions": {name: [f.result, *_typed(f.parameters)] for name, f in schema.functions.items()},
         "functional": sorted(schema.functional),
         **({"axioms": axioms} if axioms else {}),
+        **_kinds(schema),
     }
+
+
+def _kinds(schema: Schema) -> Form:
+    """Return the kinds of arcs, unless all are of one kind."""
+    kinds = {one.name: one.kind for one in (*schema.predicates.values(), *schema.functions.values()) if one.kind}
+    return {"kinds": kinds} if len(set(kinds.values())) > 1 else {}
 
 
 def schema_of(form: Form) -> Schema:
@@ -101,11 +109,14 @@ def schema_of(form: Form) -> Schema:
     Raises:
         SchemaError: the declarations contradict each other.
     """
+    kinds = form.get("kinds", {})
+    predicates = [_signature(name, parameters) for name, parameters in form["predicates"].items()]
+    functions = [_signature(name, rest, result) for name, (result, *rest) in form["functions"].items()]
     return Schema(
         types=form["types"],
         constants=form["constants"],
-        predicates={name: _signature(name, parameters) for name, parameters in form["predicates"].items()},
-        functions={name: _signature(name, rest, result) for name, (result, *rest) in form["functions"].items()},
+        predicates={one.name: replace(one, kind=kinds.get(one.name, "")) for one in predicates},
+        functions={one.name: replace(one, kind=kinds.get(one.name, "")) for one in functions},
         functional=frozenset(form["functional"]),
         axioms=tuple(
             Axiom(name, _signature(name, parameters).parameters, parse_condition(condition))
@@ -115,8 +126,9 @@ def schema_of(form: Form) -> Schema:
 
 
 def schema_hash(schema: Schema) -> str:
-    """Return the SHA-256 hash of the declarations as hexadecimal text; their order has no influence."""
-    text = json.dumps(schema_form(schema), sort_keys=True, separators=(",", ":"))
+    """Return the SHA-256 hash of the declarations as hexadecimal text; order and kinds have no influence."""
+    form = {key: value for key, value in schema_form(schema).items() if key != "kinds"}
+    text = json.dumps(form, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from knowledge_base.errors import UnknownNameError
@@ -16,6 +16,14 @@ MOST_LINES = 12
 
 
 @dataclass(frozen=True, slots=True)
+class Label:
+    """The text of a fact or fluent without its objects, and the kind of its arc."""
+
+    text: str
+    kind: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Card:
     """An object, or a fact about several objects.
 
@@ -25,22 +33,24 @@ class Card:
         kind: the object's type; empty for a fact.
         lines: facts and values about this object alone.
         middle: whether the card is the centre of the picture.
+        of: the kind of a fact's arcs; empty for an object.
     """
 
     key: str
     title: str
     kind: str
-    lines: tuple[str, ...] = ()
+    lines: tuple[Label, ...] = ()
     middle: bool = False
+    of: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """An arrow between two cards, with its label."""
+    """An arrow between two cards, with the labels of its facts."""
 
     source: str
     target: str
-    label: str
+    labels: tuple[Label, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +64,10 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class _Said:
-    """A fact or fluent: its objects in order, and its text without these objects."""
+    """A fact or fluent: its objects in order, and its label."""
 
     things: tuple[str, ...]
-    predicate: str
-    rest: str
+    label: Label
 
 
 def picture_of(world: View, thing: str | None, hops: int, most: int) -> Picture:
@@ -70,8 +79,9 @@ def picture_of(world: View, thing: str | None, hops: int, most: int) -> Picture:
         UnknownNameError: the object is unknown.
     """
     types = world.nodes()
-    said = [_said(fact, types) for fact in world.facts()]
-    said += [_said(fluent, types, f"= {_content(content)}") for fluent, content in world.values().items()]
+    kinds = {one.name: one.kind for one in (*world.schema.predicates.values(), *world.schema.functions.values())}
+    said = [_said(fact, types, kinds) for fact in world.facts()]
+    said += [_said(fluent, types, kinds, f"= {_content(content)}") for fluent, content in world.values().items()]
     if thing is None:
         wanted = list(types)
     elif thing in types:
@@ -86,10 +96,11 @@ def picture_of(world: View, thing: str | None, hops: int, most: int) -> Picture:
     return Picture((*cards, *relations), links, len(wanted) - len(shown))
 
 
-def _said(fact: Fact, types: dict[str, str], value: str = "") -> _Said:
+def _said(fact: Fact, types: Mapping[str, str], kinds: Mapping[str, str], value: str = "") -> _Said:
     things = tuple(arg for arg in fact.args if isinstance(arg, str) and arg in types)
     rest = [value_text(arg) for arg in fact.args if not (isinstance(arg, str) and arg in types)]
-    return _Said(things, fact.predicate, " ".join((*rest, value)).strip())
+    text = " ".join(filter(None, (fact.predicate, *rest, value)))
+    return _Said(things, Label(text, kinds.get(fact.predicate, "")))
 
 
 def _content(content: Content) -> str:
@@ -112,24 +123,24 @@ def _around(thing: str, said: Iterable[_Said], hops: int) -> Iterator[str]:
             waiting.extend(fresh)
 
 
-def _lines(said: list[_Said]) -> Iterator[str]:
+def _lines(said: list[_Said]) -> Iterator[Label]:
     for one in said[:MOST_LINES]:
-        yield f"{one.predicate} {one.rest}".strip()
+        yield one.label
     if len(said) > MOST_LINES:
-        yield f"and {len(said) - MOST_LINES} more"
+        yield Label(f"and {len(said) - MOST_LINES} more")
 
 
 def _links(said: Iterable[_Said]) -> tuple[tuple[Arrow, ...], list[Card]]:
     """Return facts about two objects as arrows, one for each ordered pair, and all other facts as cards."""
-    labels: dict[tuple[str, str], list[str]] = {}
+    labels: dict[tuple[str, str], list[Label]] = {}
     links: list[Arrow] = []
     relations: list[Card] = []
     for one in said:
         if len(one.things) == 2:
-            labels.setdefault((one.things[0], one.things[1]), []).append(f"{one.predicate} {one.rest}".strip())
+            labels.setdefault((one.things[0], one.things[1]), []).append(one.label)
             continue
         key = f"fact {len(relations)}"  # with a blank, which no object's name contains
-        relations.append(Card(key, f"{one.predicate} {one.rest}".strip(), ""))
-        links += [Arrow(key, name, str(number)) for number, name in enumerate(one.things, 1)]
-    joined = [Arrow(source, target, ", ".join(label)) for (source, target), label in labels.items()]
+        relations.append(Card(key, one.label.text, "", of=one.label.kind))
+        links += [Arrow(key, name, (Label(str(number)),)) for number, name in enumerate(one.things, 1)]
+    joined = [Arrow(source, target, tuple(label)) for (source, target), label in labels.items()]
     return (*joined, *links), relations

@@ -12,7 +12,7 @@ from math import dist, hypot
 import networkx as nx
 
 from knowledge_base import svg
-from knowledge_base.drawing.picture import Arrow, Card, Picture
+from knowledge_base.drawing.picture import Arrow, Card, Label, Picture
 
 LINE = 16.0
 """Distance between two lines of text in pixels; all lengths are in pixels."""
@@ -90,7 +90,7 @@ def _positions(graph: nx.Graph[str]) -> Mapping[str, Sequence[float]]:
 
 
 def _placed(card: Card, at: Sequence[float], scale: float) -> Placed:
-    texts = (card.title, card.kind, *card.lines)
+    texts = (card.title, card.kind, *(line.text for line in card.lines))
     width = max(map(len, texts)) * CHARACTER + 2 * PADDING
     lines = 1 + bool(card.kind) + len(card.lines)
     return Placed(card, at[0] * scale, at[1] * scale, width, lines * LINE + 2 * PADDING - 4)
@@ -146,21 +146,26 @@ _STYLE = (
     f".name{{font-weight:bold;fill:{svg.INK}}}.kind{{fill:{svg.SOFT};font-style:italic}}.line{{fill:{svg.DETAIL}}}"
     f"{svg.EDGES}.head{{fill:{svg.SOFT}}}"
     f".label{{fill:{svg.DETAIL};text-anchor:middle;paint-order:stroke;stroke:#ffffff;stroke-width:4px;font-size:11px}}"
-    ".mid{text-anchor:middle}"
+    ".mid{text-anchor:middle}.arcs{font-size:11px}"
 )
 
 
 def to_svg(picture: Arranged) -> str:
     """Return the picture as one SVG document with an opaque background."""
     note = f"{picture.omitted} more things are not drawn" if picture.omitted else ""
-    width, height = picture.width + 2 * MARGIN, picture.height + 2 * MARGIN + LINE * bool(note)
-    width = max(width, len(note) * 7 + 2 * MARGIN)
+    inks = _inks(picture)
+    width, height = picture.width + 2 * MARGIN, picture.height + 2 * MARGIN + LINE * (bool(note) + bool(inks))
+    width = max(width, len(note) * 7 + 2 * MARGIN, sum(map(len, inks)) * 7 + 16 * len(inks) + 2 * MARGIN)
     colours = _colours(picture)
     body = [
-        *(line for link in picture.links for line in _arrow(link, picture)),
-        *(line for one in picture.cards.values() for line in _card(one, colours)),
-        *(line for link in picture.links for line in _label(link, picture)),
+        *(line for link in picture.links for line in _arrow(link, picture, inks)),
+        *(line for one in picture.cards.values() for line in _card(one, colours, inks)),
+        *(line for link in picture.links for line in _label(link, picture, inks)),
     ]
+    if inks:
+        kinds = "   ".join(_label_text(Label(kind, kind), inks) for kind in inks)
+        at = f'x="{svg.number(MARGIN)}" y="{svg.number(height - MARGIN / 2 - LINE * bool(note))}"'
+        body.append(f'<text class="arcs" xml:space="preserve" {at}>{kinds}</text>')
     if note:
         body.append(f'<text class="kind" x="{svg.number(MARGIN)}" y="{svg.number(height - MARGIN / 2)}">{note}</text>')
     return svg.document("world graph", width, height, _STYLE, body)
@@ -171,33 +176,59 @@ def _colours(picture: Arranged) -> dict[str, tuple[str, str]]:
     return {kind: _COLOURS[min(index, len(_COLOURS) - 1)] for index, kind in enumerate(kinds)}
 
 
-def _card(one: Placed, colours: dict[str, tuple[str, str]]) -> Iterator[str]:
-    fill, stroke = colours.get(one.card.kind, _RELATION)
+def _inks(picture: Arranged) -> dict[str, str]:
+    """Return the colour of each kind of arc; empty unless there are several kinds (S4.17)."""
+    labels = [label for link in picture.links for label in link.labels]
+    labels += [line for one in picture.cards.values() for line in one.card.lines]
+    kinds = dict.fromkeys(
+        kind for kind in (*(one.kind for one in labels), *(c.card.of for c in picture.cards.values())) if kind
+    )
+    if len(kinds) < 2:
+        return {}
+    return {kind: _COLOURS[min(index, len(_COLOURS) - 1)][1] for index, kind in enumerate(kinds)}
+
+
+def _label_text(label: Label, inks: dict[str, str]) -> str:
+    """Return a label as the content of a text in the colour of its kind."""
+    text = svg.escaped(label.text)
+    return f'<tspan fill="{inks[label.kind]}">{text}</tspan>' if label.kind in inks else text
+
+
+def _card(one: Placed, colours: dict[str, tuple[str, str]], inks: dict[str, str]) -> Iterator[str]:
+    fill, stroke = colours.get(one.card.kind, (_RELATION[0], inks.get(one.card.of, _RELATION[1])))
     x, y = one.x - one.width / 2 + MARGIN, one.y - one.height / 2 + MARGIN
     thick = 3 if one.card.middle else 1.4
     dashes = "" if one.card.kind else ' stroke-dasharray="4 3"'
     area = svg.area(x, y, one.width, one.height)
     yield f'<rect {area} rx="7" fill="{fill}" stroke="{stroke}" stroke-width="{thick}"{dashes}/>'
-    texts = [("name", one.card.title), ("kind", one.card.kind), *(("line", line) for line in one.card.lines)]
+    texts = [
+        ("name", Label(one.card.title)),
+        ("kind", Label(one.card.kind)),
+        *(("line", line) for line in one.card.lines),
+    ]
     middle = svg.number(one.x + MARGIN)
-    for line, (style, text) in enumerate(t for t in texts if t[1]):
+    for line, (style, label) in enumerate(t for t in texts if t[1].text):
         height = svg.number(y + PADDING + 8 + line * LINE)
-        yield f'<text class="{style} mid" x="{middle}" y="{height}">{svg.escaped(text)}</text>'
+        yield f'<text class="{style} mid" x="{middle}" y="{height}">{_label_text(label, inks)}</text>'
 
 
-def _arrow(link: Arrow, picture: Arranged) -> Iterator[str]:
+def _arrow(link: Arrow, picture: Arranged, inks: dict[str, str]) -> Iterator[str]:
     start, end = _ends(link, picture)
     if dist(start, end) >= 1:
         base, head = svg.arrowhead(start, end)
-        yield f'<path class="edge" d="M{svg.point(start)}L{svg.point(base)}"/>'
-        yield f'<path class="head" d="{head}"/>'
+        kinds = {label.kind for label in link.labels}
+        ink = inks.get(kinds.pop()) if len(kinds) == 1 else None
+        line, point = (f' style="stroke:{ink}"', f' style="fill:{ink}"') if ink else ("", "")
+        yield f'<path class="edge"{line} d="M{svg.point(start)}L{svg.point(base)}"/>'
+        yield f'<path class="head"{point} d="{head}"/>'
 
 
-def _label(link: Arrow, picture: Arranged) -> Iterator[str]:
+def _label(link: Arrow, picture: Arranged, inks: dict[str, str]) -> Iterator[str]:
     (x1, y1), (x2, y2) = _ends(link, picture)
+    text = ", ".join(_label_text(label, inks) for label in link.labels)
     along = 0.3 if _is_both_ways(link, picture) else 0.5  # the labels of two opposite arrows must not overlap
     x, y = x1 + (x2 - x1) * along, y1 + (y2 - y1) * along
-    yield f'<text class="label" x="{svg.number(x)}" y="{svg.number(y + 4)}">{svg.escaped(link.label)}</text>'
+    yield f'<text class="label" x="{svg.number(x)}" y="{svg.number(y + 4)}">{text}</text>'
 
 
 def _ends(link: Arrow, picture: Arranged) -> tuple[svg.Point, svg.Point]:

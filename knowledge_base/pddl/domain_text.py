@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -33,12 +33,18 @@ MOST_IMPLIED = 50
 
 @dataclass(frozen=True, slots=True)
 class DeclarationText:
-    """A predicate or function as declared: `(on ?a ?b - item)`; `result` is the type of a function's value."""
+    """A predicate or function as declared: `(on ?a ?b - item)`.
+
+    Attributes:
+        result: the type of a function's value.
+        domain: the name of the domain, or of the fragment of a domain, that contains the declaration.
+    """
 
     name: str
     parameters: tuple[TypedVariable, ...]
     place: Place | None = field(compare=False)
     result: str | None = None
+    domain: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,8 +133,8 @@ def parse_domain(text: str, source: str | None = None) -> DomainText:
         requirements=definition.requirements(),
         types=tuple(parse_names(definition.nodes(":types"))),
         constants=tuple(parse_names(definition.nodes(":constants"))),
-        predicates=tuple(_declarations(definition.nodes(":predicates"))),
-        functions=tuple(_functions(definition.nodes(":functions"))),
+        predicates=_with_domain(definition.name, _declarations(definition.nodes(":predicates"))),
+        functions=_with_domain(definition.name, _functions(definition.nodes(":functions"))),
         actions=read_actions(definition.sections),
         axioms=tuple(_axiom(group) for keyword, group in definition.sections if keyword == ":derived"),
         notes=tuple(definition.notes()),
@@ -178,6 +184,10 @@ def _functions(nodes: Sequence[Node]) -> list[DeclarationText]:
             untyped.append(_declaration(node, distinct=False))
             position += 1
     return found + [replace(function, result="number") for function in untyped]
+
+
+def _with_domain(domain: str, declarations: Iterable[DeclarationText]) -> tuple[DeclarationText, ...]:
+    return tuple(replace(one, domain=domain) for one in declarations)
 
 
 def _declaration(node: Node, *, distinct: bool = True) -> DeclarationText:

@@ -5,7 +5,7 @@ predicate as key. A fact about one object is an arc from the object to itself (S
 also such an arc, with its content as `value` (S4.3: symbolic or geometric content). Each other fact or fluent is a
 node: the `Fact` itself, with its name as `relation`, and for a fluent its `value`. An arc leads from this node to each
 object in the fact, with the argument position as key. A fluent with a bound source has the reference of the source as
-`source` (S4.9).
+`source` (S4.9). Arcs and nodes of facts have the `kind` of their predicate or function, if it has one (S4.17).
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ class WorldGraph:
     def __init__(self, state: WorldState) -> None:
         declared = {**state.schema.predicates, **state.schema.functions}
         self._arcs = frozenset(name for name, signature in declared.items() if _is_arc(signature))
+        self._kinds = {name: {"kind": one.kind} if one.kind else {} for name, one in declared.items()}
         self._things = {name: _thing_positions(signature) for name, signature in declared.items()}
         self._graph: Graph = nx.MultiDiGraph()
         self.view: Graph = self._graph.copy(as_view=True)
@@ -60,6 +61,7 @@ class WorldGraph:
             self._put(fluent, {"value": kept})
 
     def _put(self, fact: Fact, content: Mapping[str, Content]) -> None:
+        content = {**content, **self._kinds[fact.predicate]}
         if fact.predicate in self._arcs:
             self._graph.add_edge(fact.args[0], fact.args[-1], key=fact.predicate, **content)
             return

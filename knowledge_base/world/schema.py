@@ -437,7 +437,7 @@ def agreed_names(files: Iterable[Iterable[TypedName]], kind: str) -> tuple[Typed
 
 
 def _signatures(declarations: Iterable[DeclarationText], kind: str) -> dict[str, Signature]:
-    return _united((Signature(d.name, d.parameters, d.result, d.place) for d in declarations), kind)
+    return _united((Signature(d.name, d.parameters, d.result, d.place, kind=d.domain) for d in declarations), kind)
 
 
 def _united(signatures: Iterable[Signature], kind: str) -> dict[str, Signature]:

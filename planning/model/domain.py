@@ -299,7 +299,7 @@ def _text(fragment: PlanningDomain | DomainText | Path | str) -> DomainText:
 
 
 def _declarations(signatures: Iterable[Signature]) -> tuple[DeclarationText, ...]:
-    return tuple(DeclarationText(s.name, s.parameters, s.place, s.result) for s in signatures)
+    return tuple(DeclarationText(s.name, s.parameters, s.place, s.result, s.kind) for s in signatures)
 
 
 def _typed(schema: Schema, name: str, kind: str) -> TypedName:

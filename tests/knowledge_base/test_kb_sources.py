@@ -152,20 +152,20 @@ def test_a_hold_that_was_broken_within_a_version_does_not_count(kb):
 def test_a_graph_that_is_first_looked_at_later_has_what_sources_feed(kb, source):
     source.update((1,))
     kb.bind_source("light", reference="sensor")
-    assert kb.graph.edges["cup1", "map", "pose"] == {"value": (1,), "source": "tf:map/cup1"}
-    assert kb.graph.nodes[fact("light")] == {"relation": "light", "value": 0, "source": "sensor"}
+    assert kb.graph.edges["cup1", "map", "pose"] == {"value": (1,), "source": "tf:map/cup1", "kind": "d"}
+    assert kb.graph.nodes[fact("light")] == {"relation": "light", "value": 0, "source": "sensor", "kind": "d"}
     source.close()
     assert not kb.graph.has_edge("cup1", "map", "pose")
 
 
 def test_the_graph_has_the_reference_and_the_latest_value(kb, source):
     arc = kb.graph.edges["cup1", "map", "pose"]
-    assert arc == {"value": (), "source": "tf:map/cup1"}
+    assert arc == {"value": (), "source": "tf:map/cup1", "kind": "d"}
     source.update((1,))
-    assert kb.graph.edges["cup1", "map", "pose"] == {"value": (1,), "source": "tf:map/cup1"}
+    assert kb.graph.edges["cup1", "map", "pose"] == {"value": (1,), "source": "tf:map/cup1", "kind": "d"}
     light = kb.bind_source("light", reference="sensor")
     light.update(3)
-    assert kb.graph.nodes[fact("light")] == {"relation": "light", "value": 3, "source": "sensor"}
+    assert kb.graph.nodes[fact("light")] == {"relation": "light", "value": 3, "source": "sensor", "kind": "d"}
     light.close()
     source.close()
     assert fact("light") not in kb.graph
@@ -181,7 +181,7 @@ def test_closing_gives_back_what_was_set(kb):
         assert (kb.value("weight", ("cup1",)), kb.values()) == (7, {fact("weight", "cup1"): 3})
         assert kb.sources() == [scale]
     assert (scale.closed, kb.sources(), kb.value("weight", ("cup1",))) == (True, [], 3)
-    assert kb.graph.edges["cup1", "cup1", "weight"] == {"value": 3}
+    assert kb.graph.edges["cup1", "cup1", "weight"] == {"value": 3, "kind": "d"}
     assert told == [(1, False), (1, True)]
     scale.close()
     with pytest.raises(ConflictError, match=r"the source 'scale' of \(weight cup1\) is closed"):
@@ -218,7 +218,7 @@ def test_a_thing_that_begins_anew_has_no_source(kb, source):
     source.update((1,))
     kb.apply(Delta(removed_nodes=("cup1",), nodes={"cup1": "cup"}, values={POSE: (5,)}), author="test")
     assert (source.closed, kb.value("pose", ("cup1", "map"))) == (True, (5,))
-    assert kb.graph.edges["cup1", "map", "pose"] == {"value": (5,)}
+    assert kb.graph.edges["cup1", "map", "pose"] == {"value": (5,), "kind": "d"}
 
 
 def test_a_failed_removal_closes_nothing(kb, source):

@@ -32,6 +32,7 @@ class Signature:
         result: the type of a function's value, one of `UNSET`; `None` for a predicate.
         place: place of the declaration.
         live: whether a running program provides the facts; a name without quotes is then also a text.
+        kind: the kind of its arcs: the name of the domain, or of the fragment of a domain, that declares it (S4.17).
     """
 
     name: str
@@ -39,6 +40,7 @@ class Signature:
     result: str | None = None
     place: Place | None = field(default=None, compare=False, repr=False)
     live: bool = False
+    kind: str = field(default="", compare=False)
 
     @property
     def arity(self) -> int:

@@ -43,7 +43,7 @@ def test_what_is_said_of_one_thing_stands_on_its_card_and_of_two_on_an_arrow() -
 def test_a_fact_about_three_things_is_a_card_that_leads_to_each() -> None:
     picture = picture_of(world(fact("gives", "c0", "c1", "table")), "c1", 1, 10)
     assert [card.title for card in picture.cards] == ["c1", "c0", "table", "gives"]
-    assert [(link.target, link.label) for link in picture.links] == [("c0", "1"), ("c1", "2"), ("table", "3")]
+    assert [(link.target, link.labels[0].text) for link in picture.links] == [("c0", "1"), ("c1", "2"), ("table", "3")]
 
 
 def test_hops_say_how_far_the_neighbourhood_goes() -> None:
@@ -85,3 +85,31 @@ def test_no_card_covers_another_and_all_are_inside(pairs) -> None:
     bottom = max(one.y + one.height / 2 for one in picture.cards.values())
     assert min(left, top, picture.width - right, picture.height - bottom) >= -0.1
     assert draw(kb) == draw(kb)
+
+
+KINDS = [
+    "(define (domain perception) (:predicates (sees ?a ?b - object)))",
+    "(define (domain dialogue) (:predicates (ask ?a ?b - object) (busy ?a - object) (tells ?a ?b ?c - object)))",
+]
+
+
+def colours(svg: str) -> dict[str, str]:
+    """Return the colours of coloured texts."""
+    root = ET.fromstring(svg)  # noqa: S314  our own
+    return {one.text or "": one.get("fill", "") for one in root.iter("{http://www.w3.org/2000/svg}tspan")}
+
+
+def test_facts_have_the_colours_of_their_kinds_also_from_a_store(tmp_path) -> None:
+    schema = Schema.parse(KINDS[0]).merged(Schema.parse(KINDS[1]))
+    facts = "(sees c0 c1) (ask c0 c1) (busy c0) (tells c0 c1 c2)"
+    with KnowledgeBase.open(schema, tmp_path / "w.kb") as kb:
+        kb.apply(Delta(nodes={"c0": "object", "c1": "object", "c2": "object"}), "me")
+        kb.apply(facts, author="me")
+        drawn = colours(draw(kb))
+    assert drawn["ask"] == drawn["busy"] == drawn["dialogue"] != drawn["sees"] == drawn["perception"]
+    with KnowledgeBase.open(None, tmp_path / "w.kb") as kb:
+        assert colours(draw(kb)) == drawn
+
+
+def test_facts_of_one_kind_have_no_colour() -> None:
+    assert colours(draw(world(fact("on", "c0", "table")))) == {}
