@@ -409,7 +409,7 @@ def test_no_kind_of_file_gives_a_traceback_or_a_wait(dsc, tmp_path, store, monke
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("knowledge_base.pddl.files.WRITER_S", 0.0)
     monkeypatch.setattr("knowledge_base.output_files.PATIENCE_S", 0.0)
-    monkeypatch.setattr("dsc.cli.runs.until_interrupt", lambda _: None)
+    monkeypatch.setattr("dsc.cli.view.until_interrupt", lambda _: None)
     monkeypatch.setattr(Robot, "report", would_run)
     for path in bad_files(tmp_path / "bad", store):
         before = content(path)

@@ -1,26 +1,18 @@
-"""Commands `dsc runs` and `dsc view`: inspect or end kept runs, and show a run in the browser.
-
-Function `page` also shows the page of `dsc run --view`: it prints the address before the run has begun.
-"""
+"""Commands `dsc runs`: inspect, learn from, or end kept runs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from knowledge_base.cli.console import print_line
-from knowledge_base.errors import InputError
 
 if TYPE_CHECKING:
     from dsc.runs.archive import RunArchive, RunRow, StepRow
-    from dsc.viewer.live import LivePage
-    from dsc.viewer.records import RecordLog
-    from dsc.viewer.server import Viewer
     from knowledge_base.world.live_rows import Rows
 
 app = typer.Typer(
@@ -32,15 +24,6 @@ DIVERGED = 1
 Store = Annotated[Path, typer.Argument(metavar="FILE", help="The store.")]
 Number = Annotated[int | None, typer.Option("--run", min=1, help="Which run.  [default: the last one]")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-MOST_COMPLAINTS = 5
-"""Maximum number of damaged records that are reported on the terminal; further ones are counted."""
-Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 picks a free one.")]
-DataOption = Annotated[
-    Path | None,
-    typer.Option("--data", metavar="FOLDER", help="The folder of pictures and scans that the records name."),
-]
-NoOpen = Annotated[bool, typer.Option("--no-open", help="Only print the address.")]
-P = TypeVar("P", "LivePage", "Viewer")
 
 
 def kept_relations(store: Path) -> Mapping[str, Rows]:
@@ -120,6 +103,37 @@ def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
         typer.echo(f"  under way since {one['since']:.1f} s: {one['skill']} ({one['id']})")
 
 
+_TRUTHS = {True: "true", False: "false", None: "unknown"}
+
+
+@app.command()
+def conditions(
+    file: Annotated[Path, typer.Argument(metavar="TRACE.jsonl|STORE", help="A trace, or a store with runs.")],
+    as_json: AsJson = False,
+) -> None:
+    """Print the conditions that the states of a run watch or have watched, with their truth and their parts."""
+    from dsc.cli.view import complain
+    from dsc.monitoring.watched import conditions_in
+    from dsc.trace import Record
+    from dsc.viewer.record_sources import records_of
+
+    with records_of(file) as log:
+        complain(file, log)
+        found = conditions_in(Record.from_line(log.line(number)) for number in range(1, len(log) + 1))
+    for one in found:
+        if as_json:
+            print_line(one.to_json())
+            continue
+        until = "" if one.ended is None else f" until {one.ended:.1f} s"
+        last = "" if one.last is None else f", the last at {one.last:.1f} s"
+        typer.echo(f"{_TRUTHS[one.truth]:8}{one.text}")
+        for text, truth in one.parts.items() if len(one.parts) > 1 else ():
+            typer.echo(f"  {_TRUTHS[truth]:8}{text}")
+        typer.echo(f"        {one.skill} since {one.since:.1f} s{until}; {one.reports} reports{last}")
+    if not found and not as_json:
+        typer.echo("no state has watched a condition")
+
+
 @app.command()
 def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
     """Replay the messages of a run and compare the results.
@@ -185,58 +199,6 @@ def check(file: Store) -> None:
             typer.echo(f"run {run.number}: {last.number} steps as they were written, {_state(run)}")
 
 
-def view_command(
-    file: Annotated[Path, typer.Argument(metavar="TRACE.jsonl|STORE", help="A trace or a store.")],
-    port: Port = 0,
-    no_open: NoOpen = False,
-    data: DataOption = None,
-) -> None:
-    """Show a recorded run, or a store while other programs change it, in the browser until Ctrl-C."""
-    viewer_installed()
-    from dsc.viewer.access import PageAddress
-    from dsc.viewer.record_sources import records_of
-    from dsc.viewer.server import Viewer
-
-    with records_of(file) as log:
-        _complain(file, log)
-        with page(Viewer(log, PageAddress.on(port), data=data), opens=not no_open) as viewer:
-            until_interrupt(viewer)
-
-
-@contextmanager
-def page(shown: P, *, opens: bool) -> Iterator[P]:
-    """Show a page in a browser during the block; print its address first."""
-    shown.start()
-    typer.echo(shown.url)
-    if opens:
-        import webbrowser
-
-        with suppress(webbrowser.Error):  # the address is printed, so that people can open it themselves
-            webbrowser.open(shown.one_time_url)
-    try:
-        yield shown
-    finally:
-        shown.close()
-
-
-def until_interrupt(viewer: LivePage | Viewer) -> None:
-    """Serve the page until Ctrl-C."""
-    typer.echo("Ctrl-C ends it", err=True)
-    try:
-        viewer.wait()
-    except KeyboardInterrupt:
-        typer.echo("", err=True)
-
-
-def viewer_installed() -> None:
-    """Raise `InputError` unless the packages of the extra `viewer` are installed."""
-    from importlib.util import find_spec
-
-    missing = [name for name in ("starlette", "uvicorn", "websockets") if find_spec(name) is None]
-    if missing:
-        raise InputError(f"the viewer needs {', '.join(missing)}: pip install {' '.join(missing)}", found=missing[0])
-
-
 def _summary(runs: RunArchive, run: RunRow) -> dict[str, Any]:
     last = runs.last(run.number)
     return {"run": run.number, "plot": run.plot, "steps": last.number, "seconds": last.time, "state": _state(run)}
@@ -279,13 +241,3 @@ def _step_form(step: StepRow) -> dict[str, Any]:
         "step": step.number, "t": step.time, "version": step.version, "message": step.message,
         "configuration": step.configuration,
     }  # fmt: skip
-
-
-def _complain(file: Path, log: RecordLog) -> None:
-    """Report on the terminal the damaged records, which the page cannot show."""
-    for complaint in log.complaints[:MOST_COMPLAINTS]:
-        typer.echo(complaint, err=True)
-    if (more := len(log.complaints) - MOST_COMPLAINTS) > 0:
-        typer.echo(f"{file}: {more} more records are damaged", err=True)
-    if not log.live and len(log) == 0:
-        typer.echo(f"{file}: there are no records", err=True)

@@ -17,6 +17,8 @@ from dsc.sensing.watched_condition import WatchedCondition, Work
 from dsc.skills import Declared, SkillBody
 from knowledge_base.store import KnowledgeBase
 
+_OUTCOMES = {event: {"values": "map of any", "parts": "map of any"} for event in WATCH_OUTCOMES}
+
 
 async def _watch(handler: Any, _: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
     condition: WatchedCondition = handler.condition(call, arguments)
@@ -39,7 +41,7 @@ class ConditionHandler(Component):
         super().__init__()
         self._sources = components, work, knowledge
 
-    @Declared(WATCH_TYPES, WATCH_OUTCOMES, _watch, own=1, pattern="event", after_crash="repeat")
+    @Declared(WATCH_TYPES, _OUTCOMES, _watch, own=1, pattern="event", after_crash="repeat")
     def watch_truth(
         self, condition: str, values: Mapping[str, Any] | None = None, hysteresis: float = 0.0, hold: float = 0.0
     ) -> None:

@@ -41,9 +41,11 @@ class Part:
         condition: the part. Names of a single component's values lack the component, as in `pose.position`.
         components: the components whose values the part reads; without any, the knowledge base evaluates the part.
         live: the terms of the knowledge base in the part, by the variables that stand for their present values.
+        text: the part as it is written.
     """
 
     condition: Expression
+    text: str
     components: tuple[str, ...] = ()
     live: Mapping[str, Term] = field(default_factory=dict)
 
@@ -149,14 +151,14 @@ class _Splitter:
     def _part(self, e: Expression) -> Part:
         components = components_in(e)
         if not components:
-            return Part(substitute(e, self._known))
+            return Part(substitute(e, self._known), to_text(e))
         for one in inside(e):
             if isinstance(one, Exists | Forall):
                 message = f"a condition on values of components has no quantifiers: {to_text(one)}"
                 raise InputError(message, place=one.place)
         live: dict[str, Term] = {}
         prefix = f"{components[0]}." if len(components) == 1 else ""
-        return Part(with_terms(e, lambda term: self._read(term, prefix, live)), components, live)
+        return Part(with_terms(e, lambda term: self._read(term, prefix, live)), to_text(e), components, live)
 
     def _read(self, term: Term, prefix: str, live: dict[str, Term]) -> Term:
         """Return a term without the component's name, and with variables for the terms that `live` receives."""

@@ -56,7 +56,7 @@ class WatchedCondition:
 
     def __init__(
         self,
-        call: SkillCall[BecameTrue | BecameFalse],
+        call: SkillCall[Outcome],
         condition: str,
         values: Mapping[str, Any],
         hysteresis: float,
@@ -207,7 +207,7 @@ class WatchedCondition:
 
     def _report(self) -> None:
         """Report a change of the truth, or begin the time for which the condition must stay true."""
-        holds = truth_of(self._structure, lambda part: None if part in self._unknown else self._truths.get(part))
+        holds = truth_of(self._structure, self._truth_of)
         if not holds:
             self._stop_hold()
         if holds is None:
@@ -224,8 +224,12 @@ class WatchedCondition:
         if truth is self._truth:
             return
         self._truth = truth
-        values = dict(self._read)
-        self._call.report(BecameTrue(values=values) if truth else BecameFalse(values=values))
+        parts = {part.text: self._truth_of(part) for part in parts_in(self._structure)}
+        event = BecameTrue.event if truth else BecameFalse.event
+        self._call.report(Outcome(event, {"values": dict(self._read), "parts": parts}))
+
+    def _truth_of(self, part: Part) -> bool | None:
+        return None if part in self._unknown else self._truths.get(part)
 
     def _stop_hold(self) -> None:
         if self._held is not None:

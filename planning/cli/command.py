@@ -17,8 +17,9 @@ from dsc.cli.controllers import app as controllers_app
 from dsc.cli.logs import PROGRAMMING_ERROR
 from dsc.cli.monitor import monitor_command
 from dsc.cli.runs import app as runs_app
-from dsc.cli.runs import kept_relations, view_command
+from dsc.cli.runs import kept_relations
 from dsc.cli.trees import app as trees_app
+from dsc.cli.view import view_command
 from dsc.cli.wire import call_command, ps_command
 from knowledge_base.cli import app as kb_app
 from knowledge_base.cli import register_reader, register_relations

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dsc.cli.logs import PROGRAMMING_ERROR, Quiet, Verbose, show_logs
-from dsc.cli.runs import DataOption, NoOpen, Port
+from dsc.cli.view import DataOption, NoOpen, Port
 from dsc.cli.wire import REALM, Connect, Realm, ZenohFile, texts_by_name
 
 if TYPE_CHECKING:
@@ -307,7 +307,7 @@ def _viewed(
     as_json: bool,
 ) -> Report:
     """Run with a page in the browser, and return the report; with `wait`, the page stays open after the run."""
-    from dsc.cli.runs import page, until_interrupt, viewer_installed
+    from dsc.cli.view import page, until_interrupt, viewer_installed
     from dsc.trace import header
 
     viewer_installed()

@@ -146,7 +146,7 @@ def _nobody_waits() -> Iterator[None]:
     whole = _command()
     with (
         patch("typer.main.get_command", lambda _: whole),
-        patch("dsc.cli.runs.until_interrupt", lambda viewer: None),
+        patch("dsc.cli.view.until_interrupt", lambda viewer: None),
         patch("webbrowser.open", lambda url: True),
         patch("knowledge_base.cli.queries.time", SimpleNamespace(sleep=_interrupted, monotonic=time.monotonic)),
         patch("sys.stdin", io.TextIOWrapper(io.BytesIO())),

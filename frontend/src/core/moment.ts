@@ -1,6 +1,7 @@
 /** How things were after a record: a pure function of the records up to it. */
 
 import { withAction, withComponent, type Components } from "./components";
+import { isWatch, withReport, withWatch, type Conditions } from "./conditions";
 import { newPlan, withEnd, withOrder, withStep, type Plan } from "./plans";
 import { splitPath, stepsOf, stepTexts, type PlotForm } from "./plots";
 import {
@@ -48,6 +49,7 @@ export interface Moment {
   /** Skills at work, by the seq of the record that started them. */
   working: Map<number, ActionRec>;
   components: Components;
+  conditions: Conditions;
   plans: Plan[];
   /** Path of a state -> place in `plans` of the plan that is carried out in it. */
   running: Map<string, number>;
@@ -71,7 +73,7 @@ export type Plots = ReadonlyMap<string, PlotForm>;
 export function beginning(): Moment {
   return {
     seq: 0, t: 0, active: new Map(), bound: new Map(), variables: new Map(), trail: [],
-    working: new Map(), components: new Map(), plans: [], running: new Map(), search: null, trouble: null, broken: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
+    working: new Map(), components: new Map(), conditions: new Map(), plans: [], running: new Map(), search: null, trouble: null, broken: null, version: 0, nodes: new Map(), facts: new Map(), values: new Map(),
     scene: null, end: null,
   };
 }
@@ -80,7 +82,7 @@ export function beginning(): Moment {
 export function copyOf(moment: Moment): Moment {
   return {
     ...moment, active: new Map(moment.active), bound: new Map(moment.bound), variables: new Map(moment.variables),
-    working: new Map(moment.working), components: new Map(moment.components), plans: [...moment.plans], running: new Map(moment.running),
+    working: new Map(moment.working), components: new Map(moment.components), conditions: new Map(moment.conditions), plans: [...moment.plans], running: new Map(moment.running),
     nodes: new Map(moment.nodes), facts: new Map(moment.facts), values: new Map(moment.values),
   };
 }
@@ -119,8 +121,13 @@ const CHANGES: ReadonlyMap<string, Change> = new Map(Object.entries<Change>({
 
 /** A skill has ended, or something came from outside. */
 function happened(moment: Moment, rec: EventRec): void {
-  if (rec.cause !== null) moment.working.delete(rec.cause);
+  withReport(moment.conditions, rec);
+  if (rec.cause !== null && !isFlip(rec)) moment.working.delete(rec.cause);
   searchEnds(moment, rec.source);
+}
+
+function isFlip({ original, name, source }: EventRec): boolean {
+  return isWatch(source) && ["became_true", "became_false"].includes(original ?? name);
 }
 
 /** Without a record of its own, a search ends with the skill that searches. */
@@ -131,6 +138,7 @@ function searchEnds(moment: Moment, skill = "planner.plan"): void {
 /** A skill is started, waits for its component, gets it, or is cancelled since its state was left. */
 function acted(moment: Moment, rec: ActionRec): void {
   withAction(moment.components, rec);
+  withWatch(moment.conditions, rec);
   if (rec.action === "start") moment.working.set(rec.seq, rec);
   if (rec.action !== "wait" && rec.action !== "begin" && rec.action !== "cancel") return;
   for (const [seq, one] of moment.working) {

@@ -182,6 +182,8 @@ export interface PlotsRec extends Rec {
 
 export interface EventRec extends Rec {
   readonly name: string;
+  /** The outcome of the skill, if the chart gives it another name. */
+  readonly original?: string;
   readonly source: string;
   readonly attributes: Named;
 }

@@ -4,6 +4,7 @@ import type { ComponentState, Point } from "../core/components";
 import { lineOf } from "../core/components";
 import { session } from "../session";
 import { useMoment } from "../turn";
+import { Conditions } from "./Conditions";
 import { jsonOf } from "./parts";
 import { seconds } from "./Timeline";
 
@@ -15,6 +16,7 @@ export function Components() {
   const names = [...new Set([...moment.components.keys(), ...observed.names])].sort();
   return (
     <div className="scrolls components" role="tabpanel">
+      <Conditions />
       {names.length === 0 && <p className="quiet">No component has been used yet.</p>}
       {names.map((name) => <One key={name} name={name} state={moment.components.get(name)} />)}
     </div>

@@ -81,15 +81,15 @@ def put(component, x):
 PLOT = """
     plot: p
     parameters: {object: {type: list of number, default: [5, 0, 0]}, cup: {type: text, default: cup1}}
-    emits: {flip: {truth: boolean, values: map of any}, broken: {why: text}}
+    emits: {flip: {truth: boolean, values: map of any, parts: map of any}, broken: {why: text}}
     states:
       w:
         entry:
           - {trigger: player.play}
           - {trigger: conditions.watch_truth, with: %s}
         on:
-          became_true: {emit: flip, with: {truth: true, values: ?event.values}}
-          became_false: {emit: flip, with: {truth: false, values: ?event.values}}
+          became_true: {emit: flip, with: {truth: true, values: ?event.values, parts: ?event.parts}}
+          became_false: {emit: flip, with: {truth: false, values: ?event.values, parts: ?event.parts}}
           programming_error: {to: e, emit: broken, with: {why: ?event.reason}}
           skill_error: {to: e, emit: broken, with: {why: ?event.reason}}
           played: e
@@ -141,10 +141,16 @@ def test_box_1_of_armarx(far):
     script = [(1, "hand", 9), (1, "wrist", 1), (2, "hand", 4.5), (3, "wrist", 7), (4, "hand", 9), (5, "wrist", 0)]
     flips, emitted, _ = run(BOX_1, script, far=far, values="{object: ?object}")
     assert flips == [(1, False), (2, True), (5, False)]
+    assert emitted[1].attributes["parts"] == {
+        "(< (distance hand.pose.position ?object) 1)": True,
+        "(> (magnitude wrist.force.tool) 5)": False,
+    }
     assert emitted[1].attributes["values"] == {"hand.pose.position": [4.5, 0, 0], "wrist.force.tool": [0, 0, 1]}
 
 
 def test_one_known_part_may_decide():
+    _, emitted, _ = run(BOX_1, [(2, "wrist", 9)], values="{object: ?object}")
+    assert emitted[0].attributes["parts"]["(< (distance hand.pose.position ?object) 1)"] is None
     assert run(BOX_1, [(2, "wrist", 9)], values="{object: ?object}")[0] == [(2, True)]
     both = "(and (> hand.pose.x 1) (> wrist.force.x 1))"
     assert run(both, [(2, "wrist", 0)])[0] == [(2, False)]

@@ -14,7 +14,7 @@ pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 pytest.importorskip("uvicorn", reason="the extra `viewer` is not installed")
 httpx = pytest.importorskip("httpx", reason="the extra `viewer` is not installed")
 
-from dsc.cli.runs import page  # noqa: E402
+from dsc.cli.view import page  # noqa: E402
 from dsc.trace import header  # noqa: E402
 from dsc.viewer.access import (  # noqa: E402
     CODE_LIFE_S,

@@ -98,11 +98,11 @@ def test_what_cannot_be_shown_is_refused_with_its_line(tmp_path, lines, message)
 
 
 def test_the_command_names_what_is_damaged(tmp_path, monkeypatch) -> None:
-    from dsc.cli import runs
+    from dsc.cli import view
     from planning.cli.command import app
 
     path = tmp_path / "run.jsonl"
-    monkeypatch.setattr(runs, "until_interrupt", lambda _viewer: None)
+    monkeypatch.setattr(view, "until_interrupt", lambda _viewer: None)
     path.write_text("\n".join([HEADER, *(line[:-1] for line in LINES)]))
     said = CliRunner().invoke(app, ["view", str(path), "--no-open"])
     assert (said.exit_code, said.stderr.count("is damaged: it ends in the middle")) == (0, 5)
