@@ -1,7 +1,7 @@
 /** What the page asks the program beyond records. */
 
 import { parsed } from "../core/reading";
-import type { Explanation, Fact, Value } from "../core/records";
+import type { Explanation, Fact, Named, Value } from "../core/records";
 
 export interface Answer {
   readonly variables: readonly string[];
@@ -32,7 +32,7 @@ export interface Obeyed {
   readonly dropped?: readonly string[];
 }
 
-export const query = (seq: number, expression: string) => ask<Answer>("query", { seq, expression });
+export const query = (seq: number, expression: string, params: Named = {}) => ask<Answer>("query", { seq, expression, params });
 export const control = (command: object) => ask<Obeyed>("control", command);
 
 async function ask<T>(what: string, body: object): Promise<T> {

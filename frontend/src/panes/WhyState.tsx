@@ -5,6 +5,7 @@ import type { Named } from "../core/records";
 import { eventWords, stateWords } from "../core/words";
 import { session } from "../session";
 import { useMoment } from "../turn";
+import { Guard } from "./Guard";
 import { Values } from "./parts";
 import { Links } from "./WhyPlan";
 import { seconds } from "./Timeline";
@@ -33,7 +34,7 @@ export function WhyState({ path }: { path: string }) {
       {content && <Running path={path} content={content} />}
       {moment.variables.has(holder) && <><h3>{`Variables of ${plot?.plot ?? "its plot"}`}</h3><Values values={used(moment.variables.get(holder)!)} words={plot?.words?.variables} /></>}
       {decision !== undefined && <><h3>Decision</h3><Decision rec={decision} /></>}
-      {state && plot && <Leads form={state.form} plot={plot} />}
+      {state && plot && <Leads form={state.form} plot={plot} values={since ? moment.variables.get(holder) ?? {} : null} seq={moment.seq} />}
     </div>
   );
 }
@@ -55,7 +56,8 @@ function used(values: Named): Named {
   return Object.fromEntries(Object.entries(values).filter(([name, value]) => !(name.startsWith("tries_") && value === 0)));
 }
 
-function Leads({ form, plot }: { form: StateForm; plot: PlotForm }) {
+/** `values` are the variables of an active state, whose guards are asked; null for another one. */
+function Leads({ form, plot, values, seq }: { form: StateForm; plot: PlotForm; values: Named | null; seq: number }) {
   const ways = [...Object.entries(form.on ?? {}), ["after", form.after ?? []] as const, ["always", form.always ?? []] as const]
     .flatMap(([on, found]) => found.map((way) => ({ on, ...way })));
   if (ways.length === 0) return null;
@@ -67,7 +69,7 @@ function Leads({ form, plot }: { form: StateForm; plot: PlotForm }) {
           <li key={i}>
             <b>{eventWords(plot, way.on)}</b>{way.seconds !== undefined && ` ${way.seconds} s`}{" → "}{way.to === undefined ? "stays" : stateWords(plot, way.to)}
             {way.rule && <span className="badge">{`rule ${way.rule}`}</span>}
-            {way.when && <code className="block" title={way.when}>{way.when}</code>}
+            {way.when && (values === null ? <code className="block" title={way.when}>{way.when}</code> : <Guard text={way.when} seq={seq} values={values} />)}
           </li>
         ))}
       </ul>
