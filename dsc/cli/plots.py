@@ -1,4 +1,4 @@
-"""Command `dsc plot`: check, show, draw, convert, compare and clone action plots."""
+"""Command `dsc plot`: check, show, draw, convert, compare, rename and clone action plots."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, report
+from dsc.cli.renaming import rename_command
 from dsc.errors import Finding
 from knowledge_base.cli.console import print_json
 from knowledge_base.errors import InputError, UnknownNameError
@@ -29,6 +30,7 @@ app = typer.Typer(
     no_args_is_help=True,
     help="Check, show and draw action plots.",
 )
+app.command("rename")(rename_command)
 
 BAD_INPUT = 2
 """Exit status of `check` with findings, and of every command with invalid input."""

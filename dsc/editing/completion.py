@@ -9,9 +9,10 @@ from typing import Any
 from dsc.editing.cursor import Cursor, cursor_at
 from dsc.editing.keys import Schema, keys_at, plot_form, profile_form, values_at
 from dsc.editing.kinds import Kind
-from dsc.editing.names import NameKind, used_plots
+from dsc.editing.names import NameKind
+from dsc.editing.plot_data import used_plots
 from dsc.editing.roles import PLOT, role_of
-from dsc.editing.workspace import View
+from dsc.editing.view import View
 from dsc.events import EXECUTIVES
 from knowledge_base.language.syntax.expression import KEYWORDS
 

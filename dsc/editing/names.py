@@ -7,12 +7,21 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from dsc.data_types import WORDS, data_type, names_in
+from dsc.editing.plot_data import part_at, plots_in, used_plots
 from dsc.editing.roles import PLOT, PROFILE, role_of
 from dsc.text.yaml import Document, Spans
+from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.expression import KEYWORDS
 
-NameKind = Literal["state", "plot", "skill", "variable", "event", "relation", "type", "object", "action"]
-"""The kind of a name; a relation is a predicate or function, and a variable is also a parameter or output of a plot."""
+NameKind = Literal["state", "plot", "skill", "variable", "event", "relation", "type", "object", "action", "offer"]
+"""The kind of a name.
+
+A relation is a predicate or function. A variable is also a parameter or output of a plot. An offer is a name under
+which dynamic states find candidates.
+"""
+ANY_STEP = "*"
+"""All plots of planning actions, in `Occurrence.scopes`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +35,7 @@ class Occurrence:
         defines: whether the name is defined here.
         scope: the plot or `action NAME` in which the name is valid; empty for names of the whole project.
         about: a line about a defined name.
+        scopes: the possible scopes, if other files decide: every scope that defines the name, else the last one.
     """
 
     kind: NameKind
@@ -35,20 +45,25 @@ class Occurrence:
     defines: bool = False
     scope: str = ""
     about: str = ""
+    scopes: tuple[str, ...] = ()
+
+    @property
+    def identity(self) -> tuple[NameKind, str, str]:
+        """Kind, name and scope, which all places of one name have in common."""
+        return self.kind, self.name if self.scope else self.name.lower(), self.scope
 
     def means(self, other: Occurrence) -> bool:
         """Return whether both are places of the same name."""
-        mine, its = (one.name if one.scope else one.name.lower() for one in (self, other))
-        return (self.kind, mine, self.scope) == (other.kind, its, other.scope)
+        return self.identity == other.identity
 
 
 _VALUES: Mapping[str, NameKind] = {
     "target": "state", "ways": "state", "way": "state", "cases": "state", "plot": "plot", "plots": "plot",
-    "skill": "skill", "action": "action", "event": "event", "type": "type", "name": "plot", "history": "state",
-    "variable": "variable",
+    "skill": "skill", "action": "action", "name": "plot", "history": "state", "variable": "variable", "offer": "offer",
+    "value": "object",
 }  # fmt: skip
 _KEYS: Mapping[str, NameKind] = {
-    "states": "state", "parameters": "variable", "variables": "variable", "on": "event", "events": "event",
+    "states": "state", "parameters": "variable", "variables": "variable", "records": "type",
 }  # fmt: skip
 _OF_PLOT = frozenset({"state", "variable"})
 """Kinds of names that are valid in one plot."""
@@ -56,6 +71,7 @@ _TOKEN = re.compile(r"""(?P<head>\(\s*)?(?P<word>\??[^\s()"';{}\[\],]+)""")
 _IN_STATE = "in-state"
 _PATHS = frozenset({"dsc:active", "dsc:running", "dsc:executes", "dsc:waits"})
 """Relations whose first argument is the path of a state."""
+_SYMBOL = re.compile(r"[A-Za-z_][\w\-]*")
 _SEGMENT = re.compile(r"[^/]+")
 
 
@@ -64,40 +80,95 @@ def plot_names(document: Document, spans: Spans, text: str) -> Iterator[Occurren
     data = document.data if isinstance(document.data, dict) else {}
     plot = str(data.get("plot", ""))
     own = {name for group in ("parameters", "variables", "outputs") for name in data.get(group) or {}}
+    states = {path[-1] for path in spans.keys if role_of(PLOT, path[:-1]) == "states"}
+    yield from _key_names(data, spans, plot, own)
+    yield from event_names(data, spans, text)
+    for path, (begin, end) in spans.values.items():
+        value, role = part_at(data, path), role_of(PLOT, path)
+        if not isinstance(value, str) or path[-1:] == ("about",):
+            continue
+        if value[:1] in {"(", "?"}:
+            yield from expression_names(text[begin:end], begin, plot, own)
+        elif role in {"type", "declaration"}:
+            yield from _type_names(value, text[begin:end], begin)
+        elif (role in _VALUES or role == "step") and (role != "value" or _SYMBOL.fullmatch(value)):
+            kind = _VALUES.get(role) or ("state" if value in states else "action")
+            start = begin + (text[begin : begin + 1] in {"'", '"'})
+            scope, about = (plot if kind in _OF_PLOT else ""), (_signature(data) if role == "name" else "")
+            name = value.removesuffix("*") if role == "history" else value
+            defines = role == "name" or path[0] == "offers"
+            yield Occurrence(kind, name, start, start + len(name), defines, scope, about)
+
+
+def _key_names(data: Mapping[str, Any], spans: Spans, plot: str, own: set[str]) -> Iterator[Occurrence]:
+    """Yield the names that are keys: of states, variables, records, and of parameters that receive arguments."""
     for path, (begin, end) in spans.keys.items():
         role, name = role_of(PLOT, path[:-1]), str(path[-1])
         if role in _KEYS:
             scope = plot if _KEYS[role] in _OF_PLOT else ""
-            yield Occurrence(_KEYS[role], name, begin, end, role != "on", scope, _about(_part(data, path)))
+            yield Occurrence(_KEYS[role], name, begin, end, True, scope, _about(part_at(data, path)))  # noqa: FBT003
             if role == "parameters" and data.get("implements"):
                 yield Occurrence("variable", name, begin, end, False, f"action {data['implements']}")  # noqa: FBT003
         elif role == "assigned" and name in own:
             yield Occurrence("variable", name, begin, end, scope=plot)
         elif role == "arguments":
-            for used in used_plots(_part(data, path[:-2])):
+            for used in used_plots(part_at(data, path[:-2])):
                 yield Occurrence("variable", name, begin, end, scope=used)
+        elif role == "passed":
+            yield Occurrence("variable", name, begin, end, scopes=(*plots_in(data), ANY_STEP, ""))
+
+
+def event_names(data: Mapping[str, Any], spans: Spans, text: str) -> Iterator[Occurrence]:
+    """Yield the names of events in a plot: its outcomes, events from outside, and events inside.
+
+    The outcomes of a plot have its name as their scope, and its inner events `inside PLOT`.
+    """
+    plot, outcomes = str(data.get("plot", "")), data.get("emits") or {}
+    inside = f"inside {plot}"
+    for path, (begin, end) in spans.keys.items():
+        role, name = role_of(PLOT, path[:-1]), str(path[-1])
+        if role == "events":
+            scope = plot if path[0] == "emits" else ""
+            yield Occurrence("event", name, begin, end, True, scope, _about(part_at(data, path)))  # noqa: FBT003
+        elif role == "on":
+            used = plots_in(part_at(data, path[:-2]))
+            yield Occurrence("event", name, begin, end, scopes=(*used, "", inside))
+        elif role == "answers":
+            yield Occurrence("event", name, begin, end, scopes=(*used_plots(part_at(data, path[:-2])), inside))
     for path, (begin, end) in spans.values.items():
-        value, role = _part(data, path), role_of(PLOT, path)
-        if not isinstance(value, str) or path[-1:] == ("about",):
+        value = part_at(data, path)
+        if role_of(PLOT, path) != "event" or not isinstance(value, str):
             continue
-        if value[:1] in {"(", "?"}:
-            yield from expression_names(text[begin:end], begin, plot, own)
-        elif role in _VALUES:
-            kind = _VALUES[role]
-            start = begin + (text[begin : begin + 1] in {"'", '"'})
-            scope, about = (plot if kind in _OF_PLOT else ""), (_signature(data) if role == "name" else "")
-            name = value.removesuffix("*") if role == "history" else value
-            yield Occurrence(kind, name, start, start + len(name), role == "name", scope, about)
+        span = (begin + (text[begin : begin + 1] in {"'", '"'}), end - (text[end - 1 : end] in {"'", '"'}))
+        if path[-1] == "on":
+            yield Occurrence("event", value, *span, scopes=(*plots_in(data), ANY_STEP, "", inside))
+        else:
+            yield Occurrence("event", value, *span, value not in outcomes, plot if value in outcomes else inside)
 
 
-def profile_names(spans: Spans) -> Iterator[Occurrence]:
-    """Yield the names of plots, parameters and states in a profile."""
+def _type_names(value: str, text: str, start: int) -> Iterator[Occurrence]:
+    """Yield the types of the domain and the records in the text of a type."""
+    try:
+        named = {*names_in(data_type(value))} - {*WORDS}
+    except InputError:
+        return
+    for name in named:
+        for match in re.finditer(rf"(?<![\w\-]){re.escape(name)}(?![\w\-])", text):
+            yield Occurrence("type", name, start + match.start(), start + match.end())
+
+
+def profile_names(data: Any, spans: Spans) -> Iterator[Occurrence]:
+    """Yield the names of plots, parameters, states and objects in a profile."""
     for path, (begin, end) in spans.keys.items():
         role, name = role_of(PROFILE, path[:-1]), str(path[-1])
         if role == "settings":
             yield Occurrence("plot", name, begin, end)
         elif role == "values":
             yield Occurrence("variable" if path[0] == "plots" else "state", name, begin, end, scope=str(path[1]))
+    for path, (begin, end) in spans.values.items():
+        value = part_at(data, path)
+        if path[:1] == ("plots",) and isinstance(value, str) and _SYMBOL.fullmatch(value):
+            yield Occurrence("object", value, begin, end)
 
 
 def expression_names(text: str, start: int, scope: str, variables: Iterable[str]) -> Iterator[Occurrence]:
@@ -129,25 +200,6 @@ def variables_in(data: Any) -> set[str]:
 
 
 _VARIABLE = re.compile(r"\?([\w\-]+)")
-
-
-def _part(data: Any, path: Iterable[str | int]) -> Any:
-    """Return the part of data at a path; `None` if there is none."""
-    for key in path:
-        try:
-            data = data[key]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return data
-
-
-def used_plots(state: Any) -> list[str]:
-    """Return the names of the plots that a state, or a reaction of a rule, uses."""
-    if not isinstance(state, dict):
-        return []
-    use, dynamic = state.get("use"), state.get("dynamic")
-    names = [use] if isinstance(use, str) else []
-    return names + [one for one in (dynamic if isinstance(dynamic, list) else []) if isinstance(one, str)]
 
 
 def _about(value: Any) -> str:

@@ -17,7 +17,10 @@ from dsc.editing.completion import Proposal, complete, word_before
 from dsc.editing.diagnostics import Diagnostic
 from dsc.editing.lines import Lines, Spot
 from dsc.editing.projects import Examiner, Project
-from dsc.editing.workspace import View, Workspace, text_of
+from dsc.editing.renaming import rename_at
+from dsc.editing.surgery.text_edits import TextEdit
+from dsc.editing.view import View
+from dsc.editing.workspace import Workspace, text_of
 from knowledge_base.errors import InputError
 
 _SOURCE = "dsc"
@@ -137,16 +140,16 @@ def add_answers(server: Server) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_RENAME)
     def answer_rename(given: lsp.RenameParams) -> lsp.WorkspaceEdit:
         try:
-            found = navigation.rename(*question(given), given.new_name)
+            found = rename_at(*question(given), given.new_name)
         except InputError as error:
             raise JsonRpcInvalidParams(str(error)) from None
         if found.in_python:
             places = ", ".join(f"{file}:{line}" for file, line in found.in_python)
             line = f"Python code also has this name, and is not changed: {places}"
             server.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, line))
-        changes: dict[str, list[lsp.TextEdit]] = {}
-        for place in _locations(found.edits, server.checks.texts):
-            changes.setdefault(place.uri, []).append(lsp.TextEdit(place.range, given.new_name.removeprefix("?")))
+        changes = {
+            uri_of(file): _edits(edits, text_of(file, server.checks.texts)) for file, edits in found.edits.items()
+        }
         return lsp.WorkspaceEdit(changes=changes)
 
     @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions([lsp.CodeActionKind.QuickFix]))
@@ -191,6 +194,14 @@ def _locations(ranges: Iterable[navigation.Range], texts: Mapping[Path, str]) ->
             begin = end = lsp.Position(one.line, 0)
         found.append(lsp.Location(uri_of(one.file), lsp.Range(begin, end)))
     return found
+
+
+def _edits(edits: Iterable[TextEdit], text: str) -> list[lsp.TextEdit]:
+    lines = Lines(text)
+    return [
+        lsp.TextEdit(lsp.Range(_position(lines.spot(one.begin)), _position(lines.spot(one.end))), one.text)
+        for one in edits
+    ]
 
 
 def _symbol(one: navigation.Symbol, lines: Lines) -> lsp.DocumentSymbol:

@@ -12,7 +12,6 @@ from typing import Any
 from dsc.editing.kinds import Kind, kind_of
 from dsc.editing.names import Occurrence, plot_names, profile_names
 from dsc.editing.pddl_names import pddl_names
-from dsc.editing.project_facts import ProjectFacts
 from dsc.text.incremental import IncrementalReader
 from dsc.text.yaml import Spans
 from knowledge_base.errors import InputError
@@ -48,11 +47,6 @@ class Page:
     def plot(self) -> str:
         """The name of the plot in the text; empty for other files."""
         return str(self.data.get("plot", "")) if isinstance(self.data, dict) else ""
-
-    def name_at(self, offset: int) -> Occurrence | None:
-        """Return the name at an offset; of several, the definition."""
-        found = [one for one in self.names if one.begin <= offset <= one.end] if self.fresh else []
-        return max(found, key=lambda one: one.defines, default=None)
 
 
 class Workspace:
@@ -91,30 +85,8 @@ class Workspace:
                 names, data, old = before.names, before.data, before.spans
             return Page(file, text, kind, names, data, old, fresh=False)
         names = tuple(plot_names(document, spans, text) if kind is Kind.PLOT else ())
-        names = tuple(profile_names(spans)) if kind is Kind.PROFILE else names
+        names = tuple(profile_names(document.data, spans)) if kind is Kind.PROFILE else names
         return Page(file, text, kind, names, document.data, spans, fresh=True)
-
-
-@dataclass(frozen=True, slots=True)
-class View:
-    """The material of an answer: the page of the cursor, the pages of its project, and the facts of its robot."""
-
-    page: Page
-    pages: tuple[Page, ...]
-    facts: ProjectFacts
-    root: Path
-
-    def names(self) -> Iterator[tuple[Page, Occurrence]]:
-        """Yield all names of the project with their pages."""
-        return ((page, one) for page in self.pages for one in page.names)
-
-    def definitions(self, kind: str, scope: str | None = None) -> dict[str, str]:
-        """Return the defined names of a kind with a line about each; of one scope, or of all."""
-        return {
-            one.name: one.about
-            for _, one in self.names()
-            if one.kind == kind and one.defines and (scope is None or one.scope == scope)
-        }
 
 
 def text_of(file: Path, texts: Mapping[Path, str]) -> str:
@@ -122,15 +94,13 @@ def text_of(file: Path, texts: Mapping[Path, str]) -> str:
     return texts[file] if file in texts else readable_text(file)
 
 
-def places_in_python(root: Path, name: str) -> list[tuple[Path, int]]:
-    """Return file and line, from 1, of each place in a folder's Python code that has a name in quotes."""
-    quoted = re.compile(rf"""["']{re.escape(name)}["']""")
-    return [
-        (file, number)
-        for file in sorted(_walk(root, {".py"}))
-        for number, line in enumerate(readable_text(file).splitlines(), 1)
-        if quoted.search(line)
-    ]
+def lines_in_python(root: Path, pattern: str) -> Iterator[tuple[Path, int]]:
+    """Yield file and line, from 1, of each line of a folder's Python code that has a pattern."""
+    found = re.compile(pattern)
+    for file in sorted(_walk(root, {".py"})):
+        for number, line in enumerate(readable_text(file).splitlines(), 1):
+            if found.search(line):
+                yield file, number
 
 
 def _files(root: Path, texts: Mapping[Path, str]) -> set[Path]:

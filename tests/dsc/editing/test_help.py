@@ -10,9 +10,12 @@ from hypothesis import strategies as st
 
 from dsc.editing.completion import complete
 from dsc.editing.cursor import cursor_at
-from dsc.editing.navigation import definitions, hover, references, rename, symbols
+from dsc.editing.navigation import definitions, hover, references, symbols
 from dsc.editing.project_facts import ComponentFacts, ProjectFacts
-from dsc.editing.workspace import View, Workspace, text_of
+from dsc.editing.renaming import rename_at
+from dsc.editing.surgery.text_edits import patch
+from dsc.editing.view import View
+from dsc.editing.workspace import Workspace, text_of
 from dsc.skills import SkillSignature
 from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
@@ -144,15 +147,12 @@ def test_definitions_and_references_are_found_across_files():
     assert found_texts(found) == [("d.pddl", "in"), ("d.pddl", "in"), ("take.yaml", "in")]
 
 
-def changed(ranges, new: str) -> dict[Path, str]:
-    texts = dict(FILES)
-    for one in sorted(ranges, key=lambda one: -one.begin):
-        texts[one.file] = texts[one.file][: one.begin] + new + texts[one.file][one.end :]
-    return texts
+def changed(rename) -> dict[Path, str]:
+    return {file: patch(text, rename.edits.get(file, ())) for file, text in FILES.items()}
 
 
 def test_a_parameter_is_renamed_in_its_plot_its_action_and_its_callers():
-    texts = changed(rename(*parts("plots/take.yaml", "?item", 2), "thing").edits, "thing")
+    texts = changed(rename_at(*parts("plots/take.yaml", "?item", 2), "thing"))
     assert "parameters: {thing: item, room: room}" in texts[ROOT / "plots/take.yaml"]
     assert "when: (in ?thing ?room)" in texts[ROOT / "plots/take.yaml"]
     assert "with: {item: ?thing}" in texts[ROOT / "plots/take.yaml"]  # that is a parameter of the skill
@@ -174,13 +174,10 @@ def test_a_renamed_state_makes_the_same_plot_with_another_name(pick, new):
     file, old = pick
     own = view(file)
     begin = next(one.begin for one in own.page.names if one.kind == "state" and one.name == old and one.defines)
-    text = changed(rename(own, begin, new).edits, new)[ROOT / file]
+    text = changed(rename_at(own, begin, new))[ROOT / file]
     back = view(file, text)
     begin = next(one.begin for one in back.page.names if one.name == new and one.defines)
-    again = rename(back, begin, old).edits
-    for one in sorted(again, key=lambda one: -one.begin):
-        text = text[: one.begin] + old + text[one.end :]
-    assert text == FILES[ROOT / file]
+    assert patch(text, rename_at(back, begin, old).edits[ROOT / file]) == FILES[ROOT / file]
 
 
 @pytest.mark.parametrize(
@@ -194,14 +191,14 @@ def test_a_renamed_state_makes_the_same_plot_with_another_name(pick, new):
 )
 def test_a_rename_that_would_break_something_is_refused(part, new, said):
     with pytest.raises(InputError, match=said):
-        rename(*parts("plots/take.yaml", part), new)
+        rename_at(*parts("plots/take.yaml", part), new)
 
 
 def test_nothing_is_renamed_while_a_file_is_half_written():
     own = view("plots/main.yaml", MAIN + "  x: {", MAIN)
     other = View(next(one for one in own.pages if one.plot == "take"), own.pages, FACTS, ROOT)
     with pytest.raises(InputError, match=r"main\.yaml"):
-        rename(other, TAKE.index("over: {"), "end")
+        rename_at(other, TAKE.index("over: {"), "end")
 
 
 def test_the_outline_of_a_plot_is_the_tree_of_its_states():
