@@ -99,7 +99,9 @@ class PlotProject:
             Path("__init__.py"): '"""A robot, made from its plots."""\n',
             Path("skills/__init__.py"): '"""The components of the robot."""\n',
             Path("domain.pddl"): self.domain,
-            Path("robot.py"): _ROBOT.replace("PACKAGE", self.package).replace("MAIN", main.name),
+            Path("robot.py"): _ROBOT.replace("PACKAGE", self.package)
+            .replace("MAIN", main.name)
+            .replace("FAILURES", _failures(main)),
             Path("simulation.py"): _SIMULATION.replace("PACKAGE", self.package).replace("NODES", nodes),
         }
         return texts | ({} if main in tops else {Path(f"plots/{TRY_ALL}.yaml"): plot_to_yaml(main)})
@@ -163,6 +165,12 @@ def _domain_of(package: str, plots: Iterable[ActionPlot]) -> str:
     return f"{about}\n(define (domain {package})\n  (:types {types}))\n"
 
 
+def _failures(main: ActionPlot) -> str:
+    """Return the line that declares the outcomes of the main plot as failures; empty without outcomes."""
+    outcomes = ", ".join(f'"{event}"' for event in main.emits)
+    return f"    failures={{{outcomes}}},  # strike out each outcome that reaches the goal\n" if outcomes else ""
+
+
 def _sample_arguments(plot: ActionPlot) -> dict[str, Any]:
     """Return sample values for the parameters without a default."""
     return {name: sample_value(one.type) for name, one in plot.parameters.items() if one.required}
@@ -196,7 +204,7 @@ robot = Bundle.in_folder(
     name="PACKAGE",
     main="MAIN",
     simulation=World,
-)
+FAILURES)
 '''
 _SIMULATION = '''"""The simulated world: its components, and the objects that the robot knows at the start."""
 

@@ -112,6 +112,14 @@ def test_plots_and_persons_files_after_edits_of_both(project):
     assert "6 passed" in run(sys.executable, "-m", "pytest", "-q", "-p", "no:asyncio", cwd=project)
 
 
+def test_a_main_plot_with_an_outcome_that_is_a_failure(project):
+    plot = project / "tidy_bot" / "plots" / "tidy.yaml"
+    plot.write_text(plot.read_text().replace("done: over, slipped: go", "done: lost, slipped: over"))
+    said = run(DSC, "run", ".", cwd=project, status=1)
+    assert "Goal not reached" in said
+    assert "unreachable" in said
+
+
 def test_a_file_without_the_mark_is_kept(project):
     module = project / "tidy_bot" / "generated" / "components.py"
     module.write_text("# Mine.\n")
