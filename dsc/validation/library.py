@@ -18,6 +18,7 @@ from dsc.validation.flow import check_wiring
 from dsc.validation.reach import check_reach
 from dsc.validation.shape import check_size, check_structure
 from dsc.validation.subject import Components, Subject, by_trigger
+from dsc.validation.watched_conditions import check_watched_conditions
 from knowledge_base.errors import InputError
 from knowledge_base.language.checking.inputs import require, require_several
 from knowledge_base.world.schema import Schema
@@ -26,6 +27,7 @@ MAX_FINDINGS = 50
 """Upper bound of findings about one plot: authors read no more, and each finding needs a search for similar names."""
 _CHECKS = (
     check_reach, check_wiring, check_arguments, check_parameters, check_outputs, check_data, check_commands,
+    check_watched_conditions,
 )  # fmt: skip
 
 
@@ -83,7 +85,7 @@ def _with_others(findings: list[Finding], subject: Subject) -> list[Finding]:
     A check may be unable to read a plot of unsound structure; then its findings come after the structure is repaired.
     """
     found = {finding.place: finding for finding in reversed(findings)}
-    for check in (check_data, check_commands, _check_outcomes):
+    for check in (check_data, check_commands, check_watched_conditions, _check_outcomes):
         with suppress(InputError, LookupError):
             for finding in islice(check(subject), MAX_FINDINGS):
                 found.setdefault(finding.place, finding)
