@@ -25,6 +25,7 @@ from dsc.components.streams import Push as Push
 from dsc.components.streams import Stream as Stream
 from dsc.conversions import Conversion as Conversion
 from dsc.conversions import conversion as conversion
+from dsc.cycles import CycleController as CycleController
 from dsc.data_folder import DataFolder as DataFolder
 from dsc.dynamic.experience import Experience as Experience
 from dsc.dynamic.library import Library as Library

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from dsc.controllers.expressions import RefusedError, Typing
 from dsc.controllers.model import (
@@ -57,10 +57,14 @@ class BlockBuilder:
                 made.append(self._action(about, action, path, node))
         return made
 
-    def _action(self, about: str, action: AnyAction, path: FormPath, node: int) -> Action:
+    def _action(  # noqa: PLR0911  # a table by kind
+        self, about: str, action: AnyAction, path: FormPath, node: int
+    ) -> Action:
         match action:
             case model.Assign(assign=terms):
-                return Assign(tuple([(name, self._assign(name, term)) for name, term in terms.items()]))
+                return self._assignment(terms)
+            case model.Perform(perform=name):
+                return self._assignment(self._compiled.plot.operation(name))
             case model.Emit():
                 return self._fire(action)
             case model.Trigger():
@@ -75,9 +79,12 @@ class BlockBuilder:
             case _:
                 raise AssertionError(action)
 
+    def _assignment(self, terms: Mapping[str, TermField]) -> Assign:
+        return Assign(tuple([(name, self._assign(name, term)) for name, term in terms.items()]))
+
     def _assign(self, name: str, term: TermField) -> Value:
         plot = self._compiled.plot
-        declared = {**plot.parameters, **plot.variables, **plot.outputs}
+        declared = {**plot.parameters, **plot.all_variables, **plot.outputs}
         if name not in declared:
             raise RefusedError(f"there is no variable '{name}'", found=name, valid=[*declared])
         return self._typing.of_type(self._typing.value(term), data_type(declared[name].type), term.place)

@@ -20,7 +20,7 @@ from dsc.controllers.model import (
 )
 from dsc.controllers.runtime.values import EXACT, INT64_MAX, INT64_MIN
 from dsc.data_types import DataType
-from dsc.engine.situation import IN_STATE
+from dsc.engine.membership import IN_STATE
 from knowledge_base.errors import Place
 from knowledge_base.language.syntax import expression as lang
 from knowledge_base.language.syntax.text import to_text
@@ -147,7 +147,7 @@ class Typing:
     def condition(self, e: lang.Expression) -> Condition:
         """Return a condition as a typed one."""
         match e:
-            case lang.Atom(predicate, (lang.Constant(name),)) if predicate == IN_STATE and not self.checked:
+            case lang.Atom(predicate, (lang.Constant(name),)) if predicate == IN_STATE:
                 node = self.states.get(str(name))
                 return Fixed(value=False, kind="boolean") if node is None else Active(node)
             case lang.Not(body):

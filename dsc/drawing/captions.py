@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from dsc.drawing.layout import TextStyle, pack
@@ -17,6 +17,7 @@ from dsc.model.actions import (
     ExternalAction,
     Internal,
     Log,
+    Perform,
     Send,
     Switch,
     Tell,
@@ -28,6 +29,7 @@ from dsc.model.actions import (
 from dsc.model.declarations import PlotParameter, PlotVariable
 from dsc.model.language import term_text
 from dsc.model.plot import ActionPlot
+from dsc.model.robot import RobotSection
 from dsc.model.rules import Handler, Reaction, Rule
 from dsc.model.states import DynamicState, State
 from dsc.model.transitions import CHOICE, SelectState, TimedTransition, Transition, TransitionSource, case_value
@@ -228,6 +230,8 @@ def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> st
             return f"{', '.join(names)} {':= all' if every else '∈'} {to_text(condition)}"
         case Assign(assign=values):
             return ", ".join(f"{name} := {term_text(value)}" for name, value in values.items())
+        case Perform(perform=name):
+            return name
         case Tell(tell=effect):
             return f"tell {to_text(effect)}"
         case Withdraw(withdraw=sent):
@@ -290,6 +294,7 @@ def facts(plot: ActionPlot) -> list[str]:
             ("outcomes", _events(plot.emits)),
             ("outputs", _declared(plot.outputs)),
             ("variables", _declared(plot.variables)),
+            *(_robot(plot.robot) if plot.robot is not None else ()),
         )
         if text
     ]
@@ -297,6 +302,15 @@ def facts(plot: ActionPlot) -> list[str]:
 
 def _declared(names: Mapping[str, PlotParameter | PlotVariable]) -> str:
     return ", ".join(f"{name}: {one.type}" for name, one in names.items())
+
+
+def _robot(robot: RobotSection) -> Iterator[tuple[str, str]]:
+    """Yield the interface of a robot section: the kinds of its parts and their texts."""
+    yield "sensors", _declared(robot.sensors)
+    yield "motors", _declared(robot.motors)
+    yield "constants", ", ".join(f"{name} = {value_text(value)}" for name, value in robot.constants.items())
+    for name, values in robot.operations.items():
+        yield f"operation {name}", ", ".join(f"{motor} := {term_text(term)}" for motor, term in values.items())
 
 
 def _events(declared: Mapping[str, Mapping[str, str] | None]) -> str:

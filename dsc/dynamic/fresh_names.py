@@ -22,7 +22,7 @@ class FreshNames:
     def __init__(self, plot: ActionPlot) -> None:
         self._names = {name for name, _, _ in plot.walk()}
         self._events = {*plot.receives, *plot.emits}
-        self._declared = plot.parameters, plot.variables, plot.outputs
+        self._declared = plot.parameters, plot.all_variables, plot.outputs
         self.variables: dict[str, PlotVariable] = {}
         self.words = AddedNames({}, {}, {})
 

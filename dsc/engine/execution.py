@@ -346,7 +346,7 @@ class Execution:
 def _kept_values(before: Frame, compiled: CompiledPlot) -> dict[str, Any]:
     """Return the values that a plot keeps in its replacement: of variables and outputs, and failures of candidates."""
     own, known = before.compiled.plot, compiled.types
-    declared = {**own.variables, **own.outputs}
+    declared = {**own.all_variables, **own.outputs}
     kept = {name: before.variables[name] for name, one in declared.items() if known.get(name) == one.type}
     failures = {name: one for name, one in before.variables.items() if name not in {*declared, *own.parameters}}
     return {**kept, **failures}

@@ -12,10 +12,11 @@ from dsc.engine.macrostep import Macrostep
 from dsc.engine.plot_changes import ActivePlots, keep_plots
 from dsc.engine.reaction import CompiledReaction
 from dsc.engine.reaction_choice import Choice, Question
+from dsc.engine.sensing import read_sensors
 from dsc.engine.situation import Chart, Situation
 from dsc.engine.steps import NO_CHANGE, Microstep, SendMessage, Step
 from dsc.errors import RunawayError
-from dsc.events import Event
+from dsc.events import CYCLE, Event
 from knowledge_base.errors import InputError
 
 _new = tuple.__new__
@@ -88,6 +89,8 @@ def step(chart: Chart, state: MachineState, event: Event | None, situation: Situ
     Raises:
         RunawayError: the macrostep does not end.
     """
+    if event is not None and event.name == CYCLE:
+        state = read_sensors(state, event)
     if state.root is None:
         return Step(state, event, handled=False)
     if event is not None and event.to is None and event.frame is None:

@@ -247,7 +247,7 @@ class Macrostep:
     def _guard(self, frame: Frame, edge: TransitionEdge) -> bool:
         if edge.guard is None:
             return True
-        return self._holds(frame, edge, settled(edge.guard, frame.configuration))
+        return self._holds(frame, edge, settled(edge, edge.guard, frame.configuration))
 
     def _holds(self, frame: Frame, edge: TransitionEdge, condition: Expression) -> bool:
         try:

@@ -26,6 +26,7 @@ from dsc.model.actions import (
     ExternalAction,
     Internal,
     Log,
+    Perform,
     Send,
     Switch,
     Tell,
@@ -199,10 +200,14 @@ class Performer:
                 component, port = action.unwire.split(".")
                 return steps.SetWire(component, port, None, activation)
 
-    def _perform(self, frame: Frame, state: str, action: Internal) -> None:
+    def _perform(  # noqa: C901, PLR0912  # a table by kind
+        self, frame: Frame, state: str, action: Internal
+    ) -> None:
         match action:
             case Assign(assign=terms):
                 _set_variables(frame, self.values(frame, terms))
+            case Perform(perform=name):
+                _set_variables(frame, self.values(frame, frame.compiled.plot.operation(name)))
             case Bind(names=names):
                 found = self.find(frame, action)
                 if found is None:
@@ -293,7 +298,7 @@ def fill_parameters(compiled: CompiledPlot, arguments: Mapping[str, Any], situat
         InputError: a parameter is missing, out of its range or of another type, or an argument names no parameter.
     """
     plot = compiled.plot
-    if not (arguments or plot.parameters or plot.variables or plot.outputs):
+    if not (arguments or plot.parameters or plot.all_variables or plot.outputs):
         return NOTHING
     for given in arguments:
         if given not in plot.parameters:
@@ -311,7 +316,7 @@ def fill_parameters(compiled: CompiledPlot, arguments: Mapping[str, Any], situat
         variables[name] = value
         if parameter.bounded and value is not None:
             variables[name] = parameter.range.check(f"{plot.name}.{name}", value)
-    for name, variable in (*plot.variables.items(), *plot.outputs.items()):
+    for name, variable in (*plot.all_variables.items(), *plot.outputs.items()):
         variables[name] = (
             None if variable.initial is None else evaluate(variable.initial, variables, situation, compiled)
         )

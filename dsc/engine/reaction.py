@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from dsc.engine.machine_state import Configuration, configuration_of
-from dsc.engine.situation import settle
+from dsc.engine.membership import settle
 from dsc.engine.steps import Taken
 from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
 from dsc.engine.transition_selection import EntrySet, domain, left_by

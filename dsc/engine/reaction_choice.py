@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from dsc.engine.frames import Frame
 from dsc.engine.machine_state import MOST_TRIGGERS, Configuration, FrameState
+from dsc.engine.membership import FALSE, settle
 from dsc.engine.reaction import CompiledReaction, reaction_of
-from dsc.engine.situation import FALSE, settle
 from dsc.engine.tables import TransitionEdge
 from dsc.engine.transition_selection import Trigger, edges_of, select
 from knowledge_base.language.syntax.expression import TRUE, Expression
@@ -61,9 +61,9 @@ def choice_of(plot: Frame | FrameState, trigger: Trigger) -> Choice | None:
     return found  # type: ignore[no-any-return]
 
 
-def settled(guard: Expression, configuration: Configuration) -> Expression:
-    """Return a guard of the configuration's plot with each `in-state` replaced by its truth value."""
-    return settle(guard, configuration.is_active) if configuration.compiled.scxml else guard
+def settled(edge: TransitionEdge, guard: Expression, configuration: Configuration) -> Expression:
+    """Return the guard of a transition with each `in-state` replaced by its truth value."""
+    return settle(guard, configuration.is_active) if edge.asks else guard
 
 
 class _Open(Exception):  # noqa: N818  # control flow: the search stops at a guard without a result
@@ -76,7 +76,7 @@ def _compute(configuration: Configuration, trigger: Trigger, answers: Mapping[Tr
     def guard(_frame: Frame, edge: TransitionEdge) -> bool:
         if edge.guard is None:
             return True
-        condition = settled(edge.guard, configuration)
+        condition = settled(edge, edge.guard, configuration)
         if condition in (TRUE, FALSE):
             return condition == TRUE
         if edge not in answers:

@@ -1,13 +1,9 @@
-"""Situation and chart, the engine's only interfaces to knowledge and plots; conditions on active states.
-
-The engine itself evaluates `(in-state NAME)`: whether a state of the condition's plot is active. This is `In()` of
-SCXML (5.9.1), and exists only in dialect `scxml`.
-"""
+"""Situation and chart, the engine's only interfaces to knowledge and plots."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from dsc.engine.exclusion import FailedCandidate
@@ -15,25 +11,9 @@ from dsc.engine.tables import CompiledPlot
 from dsc.model.states import DynamicState
 from knowledge_base.facts import Delta
 from knowledge_base.language.syntax.effect import Effect
-from knowledge_base.language.syntax.expression import (
-    TRUE,
-    And,
-    Atom,
-    Constant,
-    Exists,
-    Expression,
-    Forall,
-    Imply,
-    Not,
-    Or,
-    Term,
-    parts_of,
-)
+from knowledge_base.language.syntax.expression import Expression, Term
 from knowledge_base.notebook import table
 
-IN_STATE = "in-state"
-"""Name of the predicate that tests whether a state is active."""
-FALSE = Or(())
 Bindings = Mapping[str, Any]
 """Values of chart variables, parameters and `event.attribute`s by name."""
 
@@ -148,30 +128,3 @@ class Chart(Protocol):
     def bind(self, form: Mapping[str, Any] | str) -> CompiledPlot:
         """Compile a plot given as data, e.g. one made from a plan; raise `InputError` for data that are not a plot."""
         ...
-
-
-def asked_states(e: Expression) -> list[str]:
-    """Return the names of the states that the condition tests with `in-state`."""
-    if isinstance(e, Atom):
-        return [str(e.args[0].value)] if _asks(e) and isinstance(e.args[0], Constant) else []
-    inner = [part for part in parts_of(e) if isinstance(part, Expression)]
-    return [name for part in inner for name in asked_states(part)]
-
-
-def settle(e: Expression, active: Callable[[str], bool]) -> Expression:
-    """Return the condition with each `in-state` replaced by its truth value; the rest stays to be evaluated."""
-    match e:
-        case Atom(_, args) if _asks(e):
-            return TRUE if isinstance(args[0], Constant) and active(str(args[0].value)) else FALSE
-        case And(parts) | Or(parts):
-            return replace(e, parts=tuple(settle(part, active) for part in parts))
-        case Not(body) | Exists(_, body) | Forall(_, body):
-            return replace(e, body=settle(body, active))
-        case Imply(premise, conclusion):
-            return replace(e, premise=settle(premise, active), conclusion=settle(conclusion, active))
-        case _:
-            return e
-
-
-def _asks(e: Atom) -> bool:
-    return e.predicate == IN_STATE and len(e.args) == 1

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from dsc.conversions import Conversions
 from dsc.data_types import NO_RECORDS, Records, data_type
 from dsc.engine.binding_types import with_types
+from dsc.engine.membership import asked_states
 from dsc.events import DONE
 from dsc.model import states
 from dsc.model.actions import Bind, ExternalAction, Internal
@@ -34,6 +35,7 @@ class TransitionEdge:
         cleared: indices of the history nodes whose memory the transition clears.
         keeps: whether the plot inside the source continues in the plot that replaces it.
         interrupts: whether the source is exited as by another state's transition, with `on_break`.
+        asks: whether the guard tests active states.
         bind: the action that binds variables to values, without which the transition is not taken; it is also the
             first action of `effect`.
     """
@@ -51,6 +53,7 @@ class TransitionEdge:
     keeps: bool = False
     interrupts: bool = False
     bind: Bind | None = None
+    asks: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,7 +242,7 @@ def compile_plot(
         SchemaError: targets of a transition cannot be active together, or a history's default is outside its scope.
     """
     scxml = plot.dialect == "scxml"
-    declared = {} if scxml else {**plot.parameters, **plot.variables, **plot.outputs}
+    declared = {} if scxml else {**plot.parameters, **plot.all_variables, **plot.outputs}
     types = {name: one.type for name, one in declared.items()}
     layout = _Layout(plot, types, records)
     for node in layout.nodes:
@@ -366,6 +369,7 @@ class _Layout:
             transition.internal and isinstance(node.state, states.CompositeState), place, transition.passed,
             tuple(self._cleared(node, transition)) if transition.clear else (),
             transition.keep and node.holds_plot and targets == (node.index,), bind=bind,
+            asks=guard is not None and bool(asked_states(guard)),
         )  # fmt: skip
 
     def _with_types(self, action: Internal) -> Internal:

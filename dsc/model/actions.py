@@ -93,6 +93,12 @@ class Assign(Frozen):
     assign: dict[str, TermField]
 
 
+class Perform(Frozen):
+    """Assign the values of an operation to motors; `robot` declares operations (S3.7)."""
+
+    perform: str
+
+
 class Tell(Frozen):
     """Change the knowledge base; later guards of the same macrostep read the changed knowledge."""
 
@@ -156,7 +162,7 @@ class Block(Frozen):
     block: tuple[InternalAction, ...]
 
 
-WrittenAction = Assign | Tell | Emit | Withdraw | Log | Choose | Block
+WrittenAction = Assign | Perform | Tell | Emit | Withdraw | Log | Choose | Block
 """The internal actions that a list of actions contains, as a union of types."""
 Internal = WrittenAction | Bind
 """The internal actions as a union of types."""
@@ -166,7 +172,10 @@ Choose.model_rebuild()
 Block.model_rebuild()
 
 Action = Annotated[ExternalAction | WrittenAction, ByKey()]
-"""An action in entry or exit; internal actions are allowed there only in dialect `scxml` (SCXML 3.8)."""
+"""An action in entry or exit.
+
+The only internal actions there set motors; other ones are allowed only in dialect `scxml` (SCXML 3.8).
+"""
 
 
 def flat(actions: Iterable[ExternalAction | Internal]) -> Iterator[ExternalAction | Internal]:
@@ -189,5 +198,5 @@ def component_of(action: ExternalAction | Internal) -> str | None:
             return port.partition(".")[0]
         case Switch(switch=name):
             return name
-        case Bind() | Assign() | Tell() | Emit() | Withdraw() | Log() | Choose() | Block():
+        case Bind() | Assign() | Perform() | Tell() | Emit() | Withdraw() | Log() | Choose() | Block():
             return None

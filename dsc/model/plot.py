@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from dsc.events import CYCLE
 from dsc.model import relations  # noqa: F401  declares them for all texts
 from dsc.model.actions import ExternalAction, Internal, flat
 from dsc.model.declarations import PlotParameter, PlotVariable, TypeText
 from dsc.model.language import ConditionField, TermField, Written, constant
+from dsc.model.plot_names import check_declarations, check_states, check_variables
 from dsc.model.ranges import Who, refuse_change
 from dsc.model.reading import LOCATED, FormPath
+from dsc.model.robot import RobotSection
 from dsc.model.rules import Handler, Names, Rule, told_apart
 from dsc.model.states import (
     AnyState,
@@ -31,14 +33,9 @@ from dsc.model.states import (
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.language.syntax.expression import Term
 from knowledge_base.notebook import svg_by
-from knowledge_base.spelling import is_plain_name
 
 Path = FormPath
 """Path of a part in the written form of a plot, e.g. `("states", "look", "on", "recognised")`."""
-
-
-_STATE_NAME = re.compile(r"[^/#][^/]*")
-# Slashes separate state names in paths. In a stored state, a name that begins with # identifies a region.
 
 
 class AddedNames(NamedTuple):
@@ -66,6 +63,7 @@ class ActionPlot(Written):
         outputs: typed values that the plot returns (S2.1). The plot assigns and reads them like variables. At the
             plot's end they become the attributes of the host state's `done` event.
         types: records by name: the types of their fields. Plots of one library share their records.
+        robot: sensors, motors, constants and operations of a robot that the plot drives in cycles (S3.3).
         emits: outcome events with the types of their attributes; the host state must handle every outcome event.
         when: condition under which the plot fits as a candidate of a dynamic state (bottom-up, S0.4).
         priority, utility, cost: terms by which dynamic states may choose among candidates that fit, see `choose`
@@ -90,6 +88,7 @@ class ActionPlot(Written):
     outputs: dict[str, PlotVariable] = Field(default_factory=dict)
     types: dict[str, dict[str, TypeText]] = Field(default_factory=dict)
     receives: dict[str, dict[str, TypeText] | None] = Field(default_factory=dict)
+    robot: RobotSection | None = None
     emits: dict[str, dict[str, TypeText] | None] = Field(default_factory=dict)
     when: ConditionField | None = None
     priority: TermField | None = None
@@ -139,43 +138,49 @@ class ActionPlot(Written):
         return told_apart(handlers)
 
     @model_validator(mode="after")
-    def _names_are_unique(self) -> ActionPlot:
-        seen: set[str] = set()
-        for name, _, path in self.walk():
-            if _STATE_NAME.fullmatch(name) is None:
-                wrong = "'{name}' is not a name for a state: it has a slash, begins with # or is empty"
-                raise PydanticCustomError(LOCATED, wrong, {"name": name, "path": path})
-            if name in seen:
-                twice = "two states are named '{name}'; names are unique in a plot"
-                raise PydanticCustomError(LOCATED, twice, {"name": name, "path": path})
-            seen.add(name)
+    def _names_are_valid(self) -> ActionPlot:
+        check_states((name, path) for name, _, path in self.walk())
+        data = [*self._data_paths()]
+        groups = (("emits", self.emits), ("receives", self.receives))
+        attributes = (
+            (group, event, name) for group, many in groups for event, one in many.items() for name in one or ()
+        )
+        check_variables((*data, *attributes))
+        check_declarations(data)
         return self
+
+    def _data_paths(self) -> Iterator[Path]:
+        """Yield the path of each declared name of data."""
+        for group in ("parameters", "variables", "outputs"):
+            yield from ((group, name) for name in getattr(self, group))
+        for group in ("sensors", "motors", "constants") if self.robot is not None else ():
+            yield from (("robot", group, name) for name in getattr(self.robot, group))
 
     @model_validator(mode="after")
-    def _variables_can_be_written(self) -> ActionPlot:
-        for path in self._variable_paths():
-            name = path[-1]
-            if not is_plain_name(str(name)):
-                wrong = "'{name}' is not a name for a variable: the language folds names to lower case"
-                raise PydanticCustomError(LOCATED, wrong, {"name": name, "path": path})
-        self._is_declared_once("variable", self.variables, {"parameter": self.parameters})
-        self._is_declared_once("output", self.outputs, {"parameter": self.parameters, "variable": self.variables})
+    def _robot_is_of_dialect_dsc(self) -> ActionPlot:
+        if self.robot is not None and self.dialect != "dsc":
+            message = "a plot with a robot section is of dialect dsc"
+            raise PydanticCustomError(LOCATED, message, {"path": ("robot",)})
         return self
 
-    def _is_declared_once(self, kind: str, names: Iterable[str], others: Mapping[str, Container[str]]) -> None:
-        for name in names:
-            for other, declared in others.items():
-                if name in declared:
-                    context = {"name": name, "other": other, "kind": kind, "path": (f"{kind}s", name)}
-                    raise PydanticCustomError(LOCATED, "'{name}' is declared twice: as {other} and as {kind}", context)
+    @property
+    def all_variables(self) -> dict[str, PlotVariable]:
+        """The variables, with the sensors, motors and constants of the robot section."""
+        return self.variables if self.robot is None else {**self.variables, **self.robot.variables}
 
-    def _variable_paths(self) -> Iterator[Path]:
-        """Yield the path of each name that a condition or term can read as `?name` or `?event.name`."""
-        yield from (("parameters", name) for name in self.parameters)
-        yield from (("variables", name) for name in self.variables)
-        yield from (("outputs", name) for name in self.outputs)
-        for group, events in (("emits", self.emits), ("receives", self.receives)):
-            yield from ((group, event, name) for event, attributes in events.items() for name in attributes or ())
+    @property
+    def all_receives(self) -> dict[str, dict[str, TypeText] | None]:
+        """The events from outside; a robot section adds `cycle`, whose attributes are the values of the sensors."""
+        if self.robot is None:
+            return self.receives
+        return {**self.receives, CYCLE: {name: one.type for name, one in self.robot.sensors.items()}}
+
+    def operation(self, name: str) -> dict[str, TermField]:
+        """Return the values of motors in an operation; raise `UnknownNameError` if there is none of that name."""
+        operations: dict[str, dict[str, TermField]] = {} if self.robot is None else self.robot.operations
+        if name not in operations:
+            raise UnknownNameError(f"there is no operation '{name}'", found=name, valid=operations)
+        return operations[name]
 
     def walk(self) -> Iterator[tuple[str, AnyState, Path]]:
         """Yield name, state and path of every state at any depth, in document order."""
@@ -192,7 +197,7 @@ class ActionPlot(Written):
         """Return the names of the events that the plot declares under `receives`, or for which it has a reaction."""
         ways = (event for _, state, _ in self.walk() if isinstance(state, State) for event in state.on)
         rules, handlers = (rule.on for rule in self.rules if rule.on), (handler.on for handler in self.handlers)
-        return frozenset((*self.receives, *ways, *rules, *handlers))
+        return frozenset((*self.all_receives, *ways, *rules, *handlers))
 
     def scopes(self) -> Iterator[Scope]:
         """Yield the scopes: the plot, then each composite state and region. A transition must not leave its scope."""

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from dsc.engine.situation import IN_STATE
+from dsc.engine.membership import IN_STATE
 from dsc.errors import NotExpressibleError
 from dsc.scxml.value_kinds import ANY, BOOLEAN, NO_VALUE, NUMBER, TEXT, UNDEFINED, WHOLE, Scope
 from knowledge_base.errors import Place, UnknownNameError

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from xml.etree import ElementTree as ET
 
-from dsc.engine.situation import asked_states
+from dsc.engine.membership import asked_states
 from dsc.errors import NotExpressibleError
 from dsc.model.actions import (
     Assign,
@@ -115,7 +115,7 @@ def to_scxml(plot: ActionPlot) -> str:
     """
     require_targets(plot)
     for what, there in (("parameters", plot.parameters), ("outputs", plot.outputs), ("rules", plot.rules),
-                        ("handlers", plot.handlers),
+                        ("handlers", plot.handlers), ("robot section", plot.robot),
                         ("outcome events", plot.emits), ("condition", plot.when), ("choice", plot.scores()),
                         ("planning action", plot.implements)):  # fmt: skip
         if there:

@@ -107,7 +107,7 @@ def _content(state: State) -> tuple[str, ...]:
 def _attributes(plot: ActionPlot, way: Transition) -> Types:
     """Return the attributes of the event that a transition reads, with the types of the places that receive them."""
     types: Types = dict.fromkeys(_ATTRIBUTE.findall(way.model_dump_json(by_alias=True)))
-    declared: Types = {name: one.type for name, one in (*plot.variables.items(), *plot.outputs.items())}
+    declared: Types = {name: one.type for name, one in (*plot.all_variables.items(), *plot.outputs.items())}
     emitted: Mapping[str, Any] = (plot.emits.get(way.emit) if way.emit else None) or {}
     for into, values in ((declared, way.assign), (emitted, way.arguments)):
         for name, term in values.items():
@@ -118,7 +118,7 @@ def _attributes(plot: ActionPlot, way: Transition) -> Types:
 
 def _argument_types(plot: ActionPlot, values: Mapping[str, Any]) -> Types:
     """Return the types of the values for parameters."""
-    declared = {**plot.parameters, **plot.variables, **plot.outputs}
+    declared = {**plot.parameters, **plot.all_variables, **plot.outputs}
     types: Types = {}
     for name, term in values.items():
         types[name] = None

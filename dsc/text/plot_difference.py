@@ -10,8 +10,8 @@ from dsc.drawing import draw
 from dsc.model.plot import ActionPlot
 
 _PARTS = (
-    "parameters", "variables", "outputs", "receives", "emits", "rules", "handlers", "when", "offers", "priority",
-    "utility", "cost", "implements", "effects", "initial",
+    "parameters", "variables", "outputs", "robot", "receives", "emits", "rules", "handlers", "when", "offers",
+    "priority", "utility", "cost", "implements", "effects", "initial",
 )  # fmt: skip
 _INSIDE = ("states", "regions")
 

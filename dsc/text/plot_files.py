@@ -61,12 +61,13 @@ def plot_to_yaml(plot: ActionPlot) -> str:
 
 
 _ORDER = (
-    "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs",
-    "receives", "emits", "seconds", "set", "switch", "send", "to", "pass", "before", "when", "offers", "utility",
-    "cost", "of", "interrupt", "listen", "trigger", "use", "dynamic", "choose", "exclude", "situation", "explore",
-    "bind", "bind_all", "order_by", "assign", "tell", "emit", "command", "with", "as", "within", "goal", "budget",
-    "clear", "do", "then", "limit", "rule", "choice", "select", "cases", "else", "entry", "at_least", "initial",
-    "final", "states", "regions", "on", "after", "every", "always", "exit", "on_break", "rules", "handlers",
+    "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs", "robot",
+    "sensors", "motors", "constants", "operations", "receives", "emits", "seconds", "set", "switch", "send", "to",
+    "pass", "before", "when", "offers", "utility", "cost", "of", "interrupt", "listen", "trigger", "use", "dynamic",
+    "choose", "exclude", "situation", "explore", "bind", "bind_all", "order_by", "assign", "perform", "tell",
+    "emit", "command", "with", "as", "within", "goal", "budget", "clear", "do", "then", "limit", "rule", "choice",
+    "select", "cases", "else", "entry", "at_least", "initial", "final", "states", "regions", "on", "after", "every",
+    "always", "exit", "on_break", "rules", "handlers",
 )  # fmt: skip
 """Keys of a plot file in the order in which they are written."""
 _SINGLE = frozenset({
@@ -77,6 +78,7 @@ _SINGLE = frozenset({
 _NAMES = {
     "on": "event", "states": "state", "connectors": "state", "regions": "region", "cases": "transition",
     "parameters": "declaration", "variables": "declaration", "outputs": "declaration",
+    "sensors": "declaration", "motors": "declaration", "constants": "value", "operations": "value",
     "emits": "attributes", "receives": "attributes", "with": "value", "pass": "value", "as": "value",
     "assign": "value", "bind": "value", "bind_all": "value",
 }  # fmt: skip

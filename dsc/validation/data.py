@@ -114,6 +114,8 @@ class _Data:
             for name, variable in declared.items():
                 yield from self._type_exists(variable.type, (group, name))
                 yield from self._fits(variable.initial, variable.type, self._own, (group, name, "initial"))
+        for name, values in ({} if plot.robot is None else plot.robot.operations).items():
+            yield from self._terms(values, self._own, ("robot", "operations", name), self._assigned)
         for group, events in (("types", plot.types), ("emits", plot.emits), ("receives", plot.receives)):
             for event, attributes in events.items():
                 for name, kind in (attributes or {}).items():
@@ -168,7 +170,7 @@ class _Data:
 
     def _transition(self, transition: Transition, scope: Types | None, path: Path) -> Iterator[Finding]:
         if transition.guard is not None:
-            yield from self._condition(transition.guard, scope, (*path, "when"))
+            yield from self._condition(transition.guard, scope, (*path, "when"), guard=not transition.bind)
         if transition.bind or transition.bind_all:
             yield from self._bindings(transition, scope, path)
         if transition.passed:
@@ -216,7 +218,7 @@ class _Data:
         match action:
             case actions.Tell(tell=effect):
                 yield from self._effect(effect, scope, (*path, "tell"))
-            case actions.Bind():  # see `_bindings`
+            case actions.Bind() | actions.Perform():  # see `_bindings` and `check_robot`
                 pass
             case actions.Assign(assign=values):
                 for name in values:
@@ -270,6 +272,9 @@ class _Data:
     def _variable(self, name: str, path: Path) -> Iterator[Finding]:
         if name in self._plot.parameters:
             message = f"'{name}' is a parameter, which the plot only reads; assign a variable"
+            yield self._subject.finding(path, "declared-variable", message, found=name)
+        elif self._plot.robot is not None and name in self._plot.robot.read_only:
+            message = f"'{name}' is a {self._plot.robot.read_only[name]}, which the plot only reads; assign a motor"
             yield self._subject.finding(path, "declared-variable", message, found=name)
         elif name not in self._assigned:
             message, called = f"there is no variable '{name}'", self._call_of(name)
@@ -330,9 +335,10 @@ class _Data:
     # -- the language ------------------------------------------------------------------------------------
 
     def _condition(
-        self, condition: Expression, scope: Types | None, path: Path, *, planned: bool = False
+        self, condition: Expression, scope: Types | None, path: Path, *, planned: bool = False, guard: bool = False
     ) -> Iterator[Finding]:
-        yield from self._language.condition(condition, self._scope(scope, condition), path, planned=planned)
+        names = self._scope(scope, condition)
+        yield from self._language.condition(condition, names, path, planned=planned, guard=guard)
 
     def _effect(self, effect: Effect, scope: Types | None, path: Path) -> Iterator[Finding]:
         yield from self._language.effect(effect, self._scope(scope, effect), path)
@@ -445,6 +451,9 @@ class _Data:
         if term is not None and is_literal(term):
             yield from self._literal(term, scope, path, wanted)
             return
+        if isinstance(term, Variable) and self._plot.robot is not None:
+            value = self._plot.robot.constants.get(term.name)
+            term = term if value is None else Constant(value)
         given = None if term is None or wanted is None or not self._subject.strict else self._kind(term, scope)
         if term is None or wanted is None or given is None:
             return

@@ -217,7 +217,7 @@ class _Traffic:
 
 
 def _traffic(subject: Subject) -> _Traffic:
-    anywhere = {*(RESERVED - TIMERS), *subject.plot.receives}
+    anywhere = {*(RESERVED - TIMERS), *subject.plot.all_receives}
     # A transition that fires its own event needs another source of it.
     anywhere.update(event for _, trigger, way in subject.ways() for event in way.emitted if event != trigger)
     inside: defaultdict[Path, set[str]] = defaultdict(set)

@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import TypeVar
 
 from dsc.data_types import DataType, data_type
-from dsc.engine.situation import asked_states, settle
+from dsc.engine.membership import asked_states, settle
 from dsc.errors import Finding
 from dsc.model.data_forms import DataReader, plain_condition, plain_effect, plain_term
 from dsc.model.plot import Path
@@ -49,14 +49,27 @@ class LanguageChecker:
         if subject.schema is not None and subject.objects is not None:
             self._objects = KnownObjects(subject.schema, subject.objects)
 
-    def condition(self, condition: Expression, names: Types, path: Path, *, planned: bool = False) -> Iterator[Finding]:
-        """Yield findings about a condition; `planned` is whether planning reads it, so that it may be recursive."""
-        for name in asked_states(condition):
+    def condition(
+        self, condition: Expression, names: Types, path: Path, *, planned: bool = False, guard: bool = False
+    ) -> Iterator[Finding]:
+        """Yield findings about a condition.
+
+        Args:
+            condition: the condition.
+            names: the types of readable names.
+            path: the path of the condition.
+            planned: whether planning reads the condition, so that it may be recursive.
+            guard: whether the condition is a guard; only guards of dialect `dsc` test active states.
+        """
+        asked = asked_states(condition)
+        if asked and self._subject.strict and not guard:
+            message = "only the `when` of a transition without `bind` tests active states"
+            yield self._subject.finding(path, "condition", message, "test the state there", found=asked[0])
+        for name in asked:
             if name not in self._subject.names:
                 message, valid = f"there is no state '{name}'", self._subject.names
                 yield self._subject.finding(path, "condition", message, found=name, valid=valid)
-        if not self._subject.strict:
-            condition = settle(condition, lambda _: True)
+        condition = settle(condition, lambda _: True)
         read = yield from self._plain(condition, names, path, "condition", plain_condition)
         if read is None:
             return

@@ -14,8 +14,14 @@ def review_names(subject: Subject) -> Iterator[Finding]:
     """Yield warnings about states, data and events of a plot, and about the plot and others of its library."""
     plot = subject.plot
     yield from _alike(subject, "states", ((name, path) for name, _, path in subject.states))
-    data = (("parameters", plot.parameters), ("variables", plot.variables), ("outputs", plot.outputs))
-    yield from _alike(subject, "variables", ((name, (group, name)) for group, names in data for name in names))
+    data: tuple[tuple[Path, Iterable[str]], ...] = (
+        (("parameters",), plot.parameters),
+        (("variables",), plot.variables),
+        (("outputs",), plot.outputs),
+    )
+    if plot.robot is not None:
+        data += tuple((("robot", group), getattr(plot.robot, group)) for group in ("sensors", "motors", "constants"))
+    yield from _alike(subject, "variables", ((name, (*group, name)) for group, names in data for name in names))
     events = (("emits", plot.emits), ("receives", plot.receives))
     yield from _alike(subject, "events", ((name, (group, name)) for group, names in events for name in names))
     others = [one.name for one in subject.library if one.name != plot.name]

@@ -16,7 +16,7 @@ from dsc.dynamic.steps import (
     outputs_of,
 )
 from dsc.errors import Finding
-from dsc.events import DONE
+from dsc.events import CYCLE, DONE
 from dsc.model.actions import Trigger
 from dsc.model.plot import Path
 from dsc.model.rules import ENTER, RESPONSES, RESUME, RETRY, STEP, Handler, Response, Rule
@@ -98,6 +98,8 @@ def attributes_of(subject: Subject, event: str, state: State) -> Types | None:
     declared = outcomes_of(state, subject.library)
     if event in declared:
         return declared[event] or {}
+    if event == CYCLE and subject.plot.robot is not None:
+        return {}  # the sensors are read as variables
     if event in subject.plot.receives:
         return subject.plot.receives[event] or {}
     if event in COMPONENT_EVENTS:

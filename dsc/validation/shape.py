@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from dsc.dynamic.steps import answerable, candidates_of
-from dsc.engine.situation import asked_states
 from dsc.engine.tables import compile_plot
 from dsc.errors import Finding
 from dsc.model.actions import (
@@ -34,6 +33,7 @@ from dsc.model.states import (
 )
 from dsc.model.transitions import Transition
 from dsc.validation.reach import check_connectors
+from dsc.validation.robot import check_robot, sets_motors
 from dsc.validation.rules import check_rules
 from dsc.validation.subject import Subject
 from knowledge_base.errors import SchemaError
@@ -74,6 +74,7 @@ def _shape(subject: Subject) -> Iterator[Finding]:
         if subject.strict and type(state) is State and not any(map(subject.leaving, subject.way_to(path))):
             fix = "wire its outcomes, or make it `final: true`"
             yield subject.finding(path, "no-dead-end", f"no transition leaves the state '{name}'", fix)
+    yield from check_robot(subject)
     yield from check_rules(subject)
 
 
@@ -225,7 +226,7 @@ def _foreign(subject: Subject) -> Iterator[tuple[Path, str]]:
         elif isinstance(state, OrthogonalState) and state.connectors:
             yield (*path, "connectors"), f"'{name}' has connectors"
         for key, actions in _blocks(state):
-            if any(isinstance(action, Internal) for action in actions):
+            if any(isinstance(action, Internal) and not sets_motors(subject, action) for action in actions):
                 yield (*path, key), f"'{name}' has an internal action outside its transitions"
         for here, _, transition in subject.leaving(path):
             yield from ((here + more, what) for more, what in _foreign_in(transition, name))
@@ -242,8 +243,6 @@ def _foreign_in(transition: Transition, name: str) -> Iterator[tuple[Path, str]]
         yield (), f"a transition of '{name}' is internal or has several targets"
     if transition.clear:
         yield ("clear",), f"a transition of '{name}' clears histories"
-    if transition.guard is not None and asked_states(transition.guard):
-        yield ("when",), f"a guard of '{name}' asks which states are active"
     if transition.do and any(map(_is_foreign, flat(transition.do))):
         yield (), f"a transition of '{name}' branches, logs or sends with a delay"
 

@@ -49,8 +49,8 @@ class Subject:
         steps: name, state and path of the states that contain another plot.
         names: paths of all states by name, in document order.
         planned: whether a dynamic state has a goal.
-        assigned: declared types of variables and outputs, by name.
-        types: declared types of variables, outputs and parameters, by name.
+        assigned: declared types of variables, outputs and motors, by name.
+        types: declared types of all readable names.
         interfaces: interfaces of the components by name; empty if unknown.
         records: the records of the library, of the skills and of messages.
     """
@@ -71,8 +71,10 @@ class Subject:
         self.steps = tuple((name, state, path) for name, state, path in self.states if isinstance(state, Step))
         self.names = {name: path for name, _, path in self.states}
         self.planned = any(is_planned(state) for _, state, _ in self.steps)
-        self.assigned = {name: one.type for name, one in (plot.variables | plot.outputs).items()}
-        self.types: Types = {**{name: one.type for name, one in plot.parameters.items()}, **self.assigned}
+        motors = {} if plot.robot is None else plot.robot.motors
+        self.assigned = {name: one.type for name, one in (plot.variables | plot.outputs | motors).items()}
+        readable = {**plot.parameters, **plot.all_variables}
+        self.types: Types = {**{name: one.type for name, one in readable.items()}, **self.assigned}
         self.records: dict[str, Mapping[str, str | None]] = dict(library.records)
         self.interfaces: Mapping[str, Interface] = components if isinstance(components, Mapping) else {}
         messages = [one for interface in self.interfaces.values() for one in (interface.messages or {}).values()]

@@ -33,6 +33,7 @@ FORMS = {
     "unwire": {"unwire": "map.scan"},
     "send": {"send": "arm.say", "with": {"text": "hello"}},
     "assign": {"assign": {"tries": 1}},
+    "perform": {"perform": "stop"},
     "tell": {"tell": "(dirty cup)"},
     "emit": {"emit": "full"},
     "withdraw": {"withdraw": "later"},
@@ -81,7 +82,7 @@ def test_each_action_has_a_caption_in_pictures(key):
 
 
 def test_each_action_is_exported_as_scxml_or_refused(key):
-    if key in {*EXTERNAL, "tell", "block"}:
+    if key in {*EXTERNAL, "tell", "block", "perform"}:
         with pytest.raises(NotExpressibleError, match=kind_of(key)):
             to_scxml(plot_with(key))
     else:
@@ -101,7 +102,7 @@ def test_random_charts_contain_each_internal_action_that_changes_the_chart():
     picks = [random.Random(seed).choice for seed in range(30)]  # noqa: S311
     plots = [plot for n, pick in enumerate(picks) for plot in Grower(pick, scxml=n % 2 == 0).library()]
     written = keys_in([plot if isinstance(plot, dict) else plot.to_form() for plot in plots])
-    assert written & set(FORMS) >= INTERNAL - {"log", "withdraw"}
+    assert written & set(FORMS) >= INTERNAL - {"log", "withdraw", "perform"}
 
 
 def test_each_output_that_a_restart_needs_is_read_back():

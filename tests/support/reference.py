@@ -41,6 +41,7 @@ from dsc.model.actions import (
     ExternalAction,
     Internal,
     Log,
+    Perform,
     Send,
     Switch,
     Tell,
@@ -520,6 +521,8 @@ class Reference:
                 self.report.modes.append(mode)
             case Assign(assign=terms):
                 instance.variables.update({name: self._value(instance, term) for name, term in terms.items()})
+            case Perform(perform=name):
+                self._act(instance, Assign(assign=instance.plot.operation(name)))
             case Tell(tell=effect):
                 for fact, is_added in told(effect):
                     (self.facts.add if is_added else self.facts.discard)(fact)

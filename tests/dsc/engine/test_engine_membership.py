@@ -2,7 +2,7 @@
 
 import pytest
 
-from dsc.engine.situation import FALSE, asked_states, settle
+from dsc.engine.membership import FALSE, asked_states, settle
 from knowledge_base.language.syntax.expression import TRUE
 from knowledge_base.language.syntax.text import parse_condition
 

@@ -301,12 +301,10 @@ def test_events_match_by_prefix(descriptors, event, matched):
 FOREIGN = [
     "a: {entry: {emit: e}, on: {e: b}}",
     "a: {on: {e: {to: b, internal: true}}}",
-    "a: {on: {e: {to: b, when: (in-state a)}}}",
     "a: {on: {e: {to: b, do: [{log: [x]}]}}}",
     "a: {on: {e: {to: b, do: [{emit: f, delay: 1}]}}}",
     "a: {states: {h: {history: deep, to: c}, c: {}}, on: {e: b}}",
     "a: {on_break: {emit: e}, on: {e: b}}",
-    "a: {choice: [{when: (in-state b), to: b}, b]}",
     "a: {on: {e: {to: b, do: [{block: [{emit: e}]}]}}}",
 ]
 

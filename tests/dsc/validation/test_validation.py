@@ -70,6 +70,7 @@ COMPONENTS = {
     "scale": Interface(pushes={"weight": Service("push", {}, {"kilograms": "number"})}),
 }
 HELPERS = [
+    plot("{plot: driver, robot: {}, states: {a: {on: {cycle: over}}, over: {final: true}}}"),
     plot("""
         plot: grasp
         parameters: {item: item, speed: {type: number, default: 1}}
@@ -115,6 +116,12 @@ def findings_of(text, schema=SCHEMA, skills=SKILLS):
 
 
 S = "plot: p\nstates:\n"
+ROBOT = """plot: p
+robot:
+  sensors: {s: number from 0 to 9}
+  motors: {m: number from -6 to 6}
+  constants: {fast: 9}
+"""
 E = "  e: {final: true}\n"
 ITEM = "plot: p\nparameters: {item: item}\nstates:\n"
 GRASP = "    use: grasp\n    with: {item: ?item}\n"
@@ -530,6 +537,17 @@ WRONG = [
     ("component-wire", S + "  a:\n    exit:\n      wire: lift.height\n      to: ruler.height\n    on: {done: e}\n" + E, 4, "stands in `entry`", ""),
     ("component-wire", S + "  a:\n    on_break: [{unwire: lift.height}]\n    on: {done: e}\n" + E, 4, "stands in `entry`", ""),
     ("component-message", S + "  a:\n    entry:\n      send: lift.lable\n    on: {done: e}\n" + E, 5, "takes no 'lable'", ""),
+    # -- robot sections
+    ("robot", ROBOT + "  operations:\n    go: {n: 1}\nstates: {a: {on: {cycle: a}}}\n", 7, "'n' is no motor, and an operation sets motors", "`motors`"),
+    ("robot", ROBOT + "states:\n  a:\n    entry:\n      - perform: go\n    on: {cycle: a}\n", 9, "no operation 'go'", "`operations`"),
+    ("robot", ROBOT + "receives:\n  cycle: \nstates: {a: {on: {cycle: a}}}\n", 7, "`robot` declares the event 'cycle'", "another name"),
+    ("robot", ROBOT + "states:\n  a:\n    on:\n      cycle: {emit: cycle}\n", 9, "fires 'cycle'", "another name"),
+    ("robot", "plot: p\nrobot:\n  motors:\n    m: {type: number to 1, initial: 2}\nstates: {a: {on: {cycle: a}}}\n", 4, "'m' is a number to 1, not 2", ""),
+    ("robot", S + "  a:\n    use: driver\n    on: {done: e}\n" + E, 4, "only the outermost plot drives a robot", "parameters"),
+    ("value-fits", ROBOT + "states:\n  a:\n    entry:\n      assign: {m: ?fast}\n    on: {cycle: a}\n", 9, "'m' is a number from -6 to 6, not 9", ""),
+    ("value-fits", ROBOT + "  operations:\n    go: {m: 7}\nstates: {a: {entry: {perform: go}, on: {cycle: a}}}\n", 7, "not 7", ""),
+    ("declared-variable", ROBOT + "states:\n  a:\n    on:\n      cycle: {assign: {s: 1}}\n", 9, "'s' is a sensor, which the plot only reads", ""),
+    ("dialect", ROBOT + "variables: {v: number}\nstates:\n  a:\n    entry: {assign: {v: 1}}\n    on: {cycle: a}\n", 9, "internal action", ""),
     # -- rules are transitions too
     (
         "no-border-crossing",

@@ -1,0 +1,54 @@
+"""Conditions on active states: the engine itself evaluates `(in-state NAME)`, as `In()` of SCXML (5.9.1).
+
+NAME is a state of the plot that contains the condition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from knowledge_base.language.syntax.expression import (
+    TRUE,
+    And,
+    Atom,
+    Constant,
+    Exists,
+    Expression,
+    Forall,
+    Imply,
+    Not,
+    Or,
+    parts_of,
+)
+
+IN_STATE = "in-state"
+"""Name of the predicate that tests whether a state is active."""
+FALSE = Or(())
+
+
+def asked_states(e: Expression) -> list[str]:
+    """Return the names of the states that the condition tests with `in-state`."""
+    if isinstance(e, Atom):
+        return [str(e.args[0].value)] if _asks(e) and isinstance(e.args[0], Constant) else []
+    inner = [part for part in parts_of(e) if isinstance(part, Expression)]
+    return [name for part in inner for name in asked_states(part)]
+
+
+def settle(e: Expression, active: Callable[[str], bool]) -> Expression:
+    """Return the condition with each `in-state` replaced by its truth value; the rest stays to be evaluated."""
+    match e:
+        case Atom(_, args) if _asks(e):
+            return TRUE if isinstance(args[0], Constant) and active(str(args[0].value)) else FALSE
+        case And(parts) | Or(parts):
+            return replace(e, parts=tuple(settle(part, active) for part in parts))
+        case Not(body) | Exists(_, body) | Forall(_, body):
+            return replace(e, body=settle(body, active))
+        case Imply(premise, conclusion):
+            return replace(e, premise=settle(premise, active), conclusion=settle(conclusion, active))
+        case _:
+            return e
+
+
+def _asks(e: Atom) -> bool:
+    return e.predicate == IN_STATE and len(e.args) == 1

@@ -1,0 +1,69 @@
+"""Checks of the robot section: operations set declared motors, and only the outermost plot drives a robot (S3.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dsc.errors import Finding
+from dsc.events import CYCLE
+from dsc.model.actions import Assign, Perform
+from dsc.model.robot import RobotSection
+from dsc.model.states import State
+from dsc.validation.subject import Subject
+from knowledge_base.errors import InputError
+
+
+def check_robot(subject: Subject) -> Iterator[Finding]:
+    """Yield findings about the robot section of a plot, about its use, and about robot sections of used plots."""
+    robot = subject.plot.robot
+    for path, name in subject.plot.references():
+        if name in subject.library and subject.library.plot(name).robot is not None:
+            message = f"the plot '{name}' has a robot section, and only the outermost plot drives a robot"
+            yield subject.finding(path, "robot", message, "give it values as parameters", found=name)
+    yield from _check_operations(subject)
+    if robot is None:
+        return
+    if CYCLE in subject.plot.receives:
+        message = "`robot` declares the event 'cycle'"
+        yield subject.finding(("receives", CYCLE), "robot", message, "give this event another name", found=CYCLE)
+    for path, _, way in subject.ways():
+        if CYCLE in way.emitted:
+            message = "only the program that drives the robot fires 'cycle'"
+            yield subject.finding((*path, "emit"), "robot", message, "give this event another name", found=CYCLE)
+    yield from _check_devices(subject, robot)
+
+
+def sets_motors(subject: Subject, action: object) -> bool:
+    """Return whether an action sets only motors; entry and exit may contain such an action."""
+    motors = {} if subject.plot.robot is None else subject.plot.robot.motors
+    return isinstance(action, Perform) or (isinstance(action, Assign) and action.assign.keys() <= motors.keys())
+
+
+def _check_operations(subject: Subject) -> Iterator[Finding]:
+    """Yield findings about actions that perform an unknown operation."""
+    states = [(state, path) for _, state, path in subject.states if isinstance(state, State)]
+    blocks = [((*path, key), block) for state, path in states for key, block in state.blocks()]
+    for path, actions in (*blocks, *(((*path, "do"), way.do) for path, _, way in subject.ways())):
+        for number, action in enumerate(actions):
+            if isinstance(action, Perform):
+                try:
+                    subject.plot.operation(action.perform)
+                except InputError as error:
+                    fix = "declare it under `operations` of `robot`"
+                    yield subject.caught(error, (*path, number, "perform"), "robot", fix)
+
+
+def _check_devices(subject: Subject, robot: RobotSection) -> Iterator[Finding]:
+    for group, devices in (("sensors", robot.sensors), ("motors", robot.motors)):
+        for name, device in devices.items():
+            try:
+                device.kind.check(f"'{name}'", device.start)
+            except InputError as error:
+                yield subject.caught(error, ("robot", group, name, "initial"), "robot")
+    for operation, values in robot.operations.items():
+        for name in values.keys() - robot.motors.keys():
+            message, path = (
+                f"'{name}' is no motor, and an operation sets motors",
+                ("robot", "operations", operation, name),
+            )
+            yield subject.finding(path, "robot", message, "declare it under `motors`", found=name, valid=robot.motors)

@@ -1,0 +1,166 @@
+"""Cycles: sensors in, motors out, timers between them, and the errors of the program that drives a robot."""
+
+from __future__ import annotations
+
+import pytest
+from dsc_charts import plot
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dsc import CycleController, Event, Machine
+from dsc.dynamic.knowledge_situation import KnowledgeSituation
+from dsc.dynamic.library import Library
+from knowledge_base import InputError, KnowledgeBase, Schema
+
+FOLLOWER = """
+plot: follower
+robot:
+  sensors: {left: number from 0 to 1023, right: {type: number from 0 to 1023, rate: 50}}
+  motors: {wheel: number from -6 to 6 in rad/s, lamp: boolean, gear: {type: integer from 1 to 5, initial: 2}}
+  constants: {speed: 1.5, white: 950}
+  operations: {straight: {wheel: ?speed, lamp: false}}
+states:
+  drive:
+    entry: {perform: straight}
+    on: {cycle: {to: turn, when: (> ?left ?white)}}
+  turn:
+    entry: {assign: {wheel: (* -1 ?speed)}}
+    exit: {assign: {lamp: true}}
+    on:
+      cycle:
+        - {to: drive, when: (<= ?left ?white), do: [{perform: straight}], assign: {gear: (+ ?gear 1)}}
+        - {assign: {wheel: (- ?wheel 2)}}
+    after: {seconds: 0.1, to: over}
+  over: {final: true}
+"""
+
+
+def follower():
+    return CycleController(plot(FOLLOWER))
+
+
+def test_sensors_in_and_motors_out():
+    robot = follower()
+    assert robot.motors == {"wheel": 1.5, "lamp": False, "gear": 2}
+    assert robot.step({"left": 900, "right": 0}, 0.0)["wheel"] == 1.5
+    assert robot.step({"left": 1000, "right": 0}, 0.02)["wheel"] == -1.5
+    assert robot.step({"left": 1000, "right": 0}, 0.04) == {"wheel": -3.5, "lamp": False, "gear": 2}
+    assert robot.step({"left": 0, "right": 0}, 0.06) == {"wheel": 1.5, "lamp": False, "gear": 3}
+    assert robot.active == ["drive"]
+
+
+def test_a_motor_beyond_its_range_has_the_bound():
+    robot = follower()
+    found = [robot.step({"left": 1000, "right": 0}, 0.01 * number)["wheel"] for number in range(5)]
+    assert found == [-1.5, -3.5, -5.5, -6, -6]
+
+
+def test_a_timer_between_cycles_and_the_end():
+    robot = follower()
+    robot.step({"left": 1000, "right": 0}, 1.0)
+    robot.step({"left": 1000, "right": 0}, 1.09)
+    assert not robot.ended
+    assert robot.step({"left": 0, "right": 0}, 1.11) == {"wheel": 0, "lamp": False, "gear": 2}
+    assert (robot.ended, robot.active) == (True, [])
+    assert robot.step({"left": 0, "right": 0}, 1.2)["gear"] == 2
+
+
+@pytest.mark.parametrize(
+    ("sensors", "now", "message"),
+    [
+        ({"left": 2000, "right": 0}, 1, "the sensor 'left' is a number from 0 to 1023, not 2000"),
+        ({"left": "x", "right": 0}, 1, "the sensor 'left' is a number"),
+        ({"left": True, "right": 0}, 1, "the sensor 'left' is a number"),
+        ({"lefft": 1, "right": 0}, 1, "no sensor 'lefft'; did you mean 'left'?"),
+        ({"right": 0}, 1, "the sensor 'left' has no value in this cycle; it is of type number from 0 to 1023"),
+        ({"left": 1}, 1, "the sensor 'right' has no value in this cycle; its last value is older than 0.02 s"),
+        ({"left": 1, "right": 0}, 0.5, "does not decrease: 0.5 s follows 0.9 s"),
+    ],
+)
+def test_wrong_values_of_sensors(sensors, now, message):
+    robot = follower()
+    robot.step({"left": 900, "right": 0}, 0.9)
+    with pytest.raises(InputError, match=message.replace("?", r"\?")):
+        robot.step(sensors, now)
+    assert robot.step({"left": 1000, "right": 0}, 1)["wheel"] == -1.5
+
+
+def test_a_sensor_with_a_rate_keeps_its_value_for_the_time_of_a_reading():
+    robot = follower()
+    robot.step({"left": 900, "right": 7}, 0.0)
+    assert robot.step({"left": 1000}, 0.02)["wheel"] == -1.5
+    with pytest.raises(InputError, match="'right' has no value"):
+        robot.step({"left": 1000}, 0.021)
+
+
+@given(st.lists(st.tuples(st.integers(0, 1023), st.integers(1, 40)), max_size=20))
+def test_an_event_driven_run_sets_the_same_motors(cycles):
+    """The engine alone, without timers: an event `cycle` for each step."""
+    chart = plot(FOLLOWER.replace("seconds: 0.1", "seconds: 1000"))
+    robot, library = CycleController(chart), Library([chart])
+    machine, knowledge = Machine(library), KnowledgeBase(Schema())
+    machine.start("follower", {}, KnowledgeSituation(knowledge, library))
+    now = 0.0
+    for left, passed in cycles:
+        now += passed / 1000
+        machine.send(Event("cycle", {"left": left, "right": 0}), KnowledgeSituation(knowledge, library))
+        motors = robot.step({"left": left, "right": 0}, now)
+        values = machine.state.root.variables
+        assert motors == {"wheel": max(-6, values["wheel"]), "lamp": values["lamp"], "gear": min(5, values["gear"])}
+
+
+def test_a_failed_evaluation_ends_the_cycles():
+    text = """
+    plot: p
+    robot: {sensors: {s: number}, motors: {m: {type: number, initial: 0.5}}}
+    states: {a: {on: {cycle: {assign: {m: (/ 1 ?s)}}}}}
+    """
+    robot = CycleController(plot(text))
+    assert robot.step({"s": 4}, 0) == {"m": 0.25}
+    with pytest.raises(InputError, match=r"a: .*division by zero"):
+        robot.step({"s": 0}, 1)
+    assert (robot.ended, robot.motors) == (True, {"m": 0.5})
+
+
+def test_emitted_outcomes_and_parameters():
+    text = """
+    plot: p
+    parameters: {limit: number}
+    robot: {sensors: {s: number}, motors: {m: number}}
+    emits: {high: {s: number}}
+    states: {a: {on: {cycle: {to: a, when: (> ?s ?limit), emit: high, with: {s: ?s}}}}}
+    """
+    robot = CycleController(plot(text), {"limit": 3})
+    robot.step({"s": 2}, 0)
+    robot.step({"s": 4}, 1)
+    assert [(one.name, dict(one.attributes)) for one in robot.emitted] == [("high", {"s": 4})]
+
+
+def test_plots_that_drive_nothing_in_cycles():
+    with pytest.raises(InputError, match="'p' has no robot section"):
+        CycleController(plot("{plot: p, states: {a: {after: {seconds: 1, to: a}}}}"))
+    text = "{plot: p, robot: {}, states: {a: {entry: {trigger: base.drive}, on: {arrived: a}}}}"
+    with pytest.raises(InputError, match="'p' uses the component 'base'"):
+        CycleController(plot(text))
+
+
+def test_the_time_since_the_last_event_of_a_name():
+    """Harel's timeout(event, n): a region with one state, which each event enters again."""
+    text = """
+    plot: p
+    robot: {sensors: {seen: boolean}, motors: {stop: boolean}}
+    states:
+      all:
+        regions:
+          drive: {states: {go: {on: {lost: halt}}, halt: {entry: {assign: {stop: true}}, on: {cycle: {}}}}}
+          watch:
+            states:
+              waiting:
+                on: {cycle: {to: waiting, when: (= ?seen true)}}
+                after: {seconds: 1, to: waiting, emit: lost}
+        on: {never: all}
+    receives: {never: }
+    """
+    robot = CycleController(plot(text))
+    found = {now: robot.step({"seen": now == 0.5}, now)["stop"] for now in (0.4, 0.5, 1.4, 1.5)}
+    assert found == {0.4: False, 0.5: False, 1.4: False, 1.5: True}
