@@ -31,6 +31,17 @@ TYPES: Mapping[Kind, str] = {"integer": "int64_t", "number": "double", "boolean"
 _SMALL = 2**31
 
 
+def constant_text(value: Fixed) -> str:
+    """Return a constant in C."""
+    if isinstance(value.value, bool):
+        return "true" if value.value else "false"
+    if isinstance(value.value, int):
+        if value.value == INT64_MIN:
+            return "INT64_MIN"
+        return str(value.value) if abs(value.value) < _SMALL else f"INT64_C({value.value})"
+    return repr(value.value)
+
+
 class _CExpressions(ExpressionText):
     words = ("&&", "||", "!")
 
@@ -38,13 +49,7 @@ class _CExpressions(ExpressionText):
         self._data, self._attributes = data, attributes
 
     def constant(self, value: Fixed) -> str:
-        if isinstance(value.value, bool):
-            return "true" if value.value else "false"
-        if isinstance(value.value, int):
-            if value.value == INT64_MIN:
-                return "INT64_MIN"
-            return str(value.value) if abs(value.value) < _SMALL else f"INT64_C({value.value})"
-        return repr(value.value)
+        return constant_text(value)
 
     def read(self, value: Read) -> str:
         if value.source == "data":

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.resources import files
 
+from dsc.controllers.c_cycles import declare_cycle, define_cycle
 from dsc.controllers.c_functions import TYPES, CFunctions
 from dsc.controllers.identifiers import identifier, identifiers
 from dsc.controllers.model import Controller, Kind
@@ -68,7 +69,10 @@ def _interface(one: Controller, queue: int) -> Iterator[str]:
     yield "/* The defaults of the parameters; 0 for a parameter without a default. */"
     yield "extern const struct chart_parameters chart_defaults;"
     yield ""
+    for name, devices in (("sensors", one.sensors), ("motors", one.motors)) if one.cycle else ():
+        yield from _struct(name, f"The {name} of the robot.", {word: device.kind for word, device in devices.items()})
     yield _runtime("interface")
+    yield from declare_cycle(one)
     yield "#endif"
     yield ""
 
@@ -101,6 +105,7 @@ def _implementation(one: Controller) -> Iterator[str]:
     yield _used_values(functions)
     yield functions
     yield _runtime("interpreter")
+    yield from define_cycle(one)
     yield from ("", "#endif")
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dsc.controllers.expressions import RefusedError, Typing, bound, kind_of
-from dsc.controllers.model import Combination, Comparison, Condition, Controller, Fixed, Kind, Parameter, Read
+from dsc.controllers.expressions import RefusedError, Typing, bound, kind_of, number_bounds, whole_bounds
+from dsc.controllers.model import Combination, Comparison, Condition, Controller, Device, Fixed, Kind, Parameter, Read
 from dsc.controllers.names import actions_of, arguments_of, declare_attributes, join_all
 from dsc.controllers.refusals import Refusals
 from dsc.data_types import data_type
 from dsc.engine.tables import CompiledPlot
+from dsc.events import CYCLE
+from dsc.model import robot
 from dsc.model.actions import Emit
 from dsc.model.declarations import PlotParameter, PlotVariable
 from dsc.model.language import TermField
@@ -21,10 +23,14 @@ def declare(controller: Controller, compiled: CompiledPlot, refusals: Refusals) 
         with refusals.at(("parameters", name)):
             controller.parameters[name] = _parameter(name, parameter, typing)
             controller.data[name] = controller.parameters[name].kind
-    for group, variables in (("variables", plot.variables), ("outputs", plot.outputs)):
+    for group, variables in (("variables", plot.all_variables), ("outputs", plot.outputs)):
         for name, variable in variables.items():
             with refusals.at((group, name)):
                 _declare_variable(controller, name, variable, typing)
+    if plot.robot is not None:
+        controller.cycle = controller.events.index(CYCLE)
+        controller.sensors = {name: _device(one) for name, one in plot.robot.sensors.items()}
+        controller.motors = {name: _device(one) for name, one in plot.robot.motors.items()}
     declare_attributes(compiled, controller.attributes, refusals)
     actions = [*actions_of(compiled)]
     fired = [one.arguments for one in actions if isinstance(one, Emit)]
@@ -41,6 +47,17 @@ def _declare_variable(controller: Controller, name: str, variable: PlotVariable,
         raise RefusedError(f"'{name}' has no `initial`; each variable of a controller has a value")
     controller.initial.append((name, typing.of_type(typing.value(variable.initial), wanted)))
     controller.data[name] = kind
+
+
+def _device(one: robot.Device) -> Device:
+    kind = kind_of(one.kind, "a device")
+    if kind == "boolean":
+        return Device(kind, Fixed(value=False, kind=kind), Fixed(value=True, kind=kind), Fixed(one.start, kind))
+    if kind == "integer":
+        least, most = whole_bounds(one.kind.least, one.kind.most)
+        return Device(kind, Fixed(least, kind), Fixed(most, kind), Fixed(one.start, kind))
+    low, high = number_bounds(one.kind.least, one.kind.most)
+    return Device(kind, Fixed(low, kind), Fixed(high, kind), Fixed(float(one.start), kind))
 
 
 def _parameter(name: str, parameter: PlotParameter, typing: Typing) -> Parameter:

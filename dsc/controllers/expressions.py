@@ -185,9 +185,18 @@ class Typing:
 def bound(value: Value, least: float | None, most: float | None) -> Value:
     """Return a value that fails outside its bounds."""
     if value.kind == "integer":
-        low = INT64_MIN if least is None else max(INT64_MIN, math.ceil(least))
-        high = INT64_MAX if most is None else min(INT64_MAX, math.floor(most))
+        low, high = whole_bounds(least, most)
         return Operation("between_int", (value, Fixed(low, "integer"), Fixed(high, "integer")), "integer")
-    low_num = -MOST_DOUBLE if least is None else float(least)
-    high_num = MOST_DOUBLE if most is None else float(most)
+    low_num, high_num = number_bounds(least, most)
     return Operation("between_num", (value, Fixed(low_num, "number"), Fixed(high_num, "number")), "number")
+
+
+def whole_bounds(least: float | None, most: float | None) -> tuple[int, int]:
+    """Return the bounds of an integer of 64 bits."""
+    low = INT64_MIN if least is None else max(INT64_MIN, math.ceil(least))
+    return low, INT64_MAX if most is None else min(INT64_MAX, math.floor(most))
+
+
+def number_bounds(least: float | None, most: float | None) -> tuple[float, float]:
+    """Return the bounds of a finite double."""
+    return -MOST_DOUBLE if least is None else float(least), MOST_DOUBLE if most is None else float(most)

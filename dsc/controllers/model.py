@@ -187,6 +187,16 @@ class Parameter:
     conditions: tuple[Condition, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Device:
+    """A sensor or motor with its range; `start` is the value of a motor after the end."""
+
+    kind: Kind
+    least: Fixed
+    most: Fixed
+    start: Fixed
+
+
 @dataclass(slots=True)
 class Controller:
     """A compiled plot.
@@ -202,6 +212,8 @@ class Controller:
         commands: texts of the commands by number.
         parameters: the parameters of the plot.
         data: kinds of parameters, variables and outputs.
+        sensors, motors: the devices of a plot with a robot section.
+        cycle: number of the event `cycle`; 0 without a robot section.
         initial: values of variables and outputs at the start, computed in this order.
         attributes: kinds of the attributes of events.
         arguments: kinds of the arguments of activities and commands.
@@ -225,6 +237,9 @@ class Controller:
     commands: list[str] = field(default_factory=list)
     parameters: dict[str, Parameter] = field(default_factory=dict)
     data: dict[str, Kind] = field(default_factory=dict)
+    sensors: dict[str, Device] = field(default_factory=dict)
+    motors: dict[str, Device] = field(default_factory=dict)
+    cycle: int = 0
     initial: list[tuple[str, Value]] = field(default_factory=list)
     attributes: dict[str, Kind] = field(default_factory=dict)
     arguments: dict[str, Kind] = field(default_factory=dict)

@@ -10,7 +10,7 @@ from dsc.controllers.refusals import Refusals
 from dsc.data_types import data_type
 from dsc.engine.tables import CompiledPlot
 from dsc.engine.transition_selection import matches
-from dsc.events import DONE, DONE_STATE, ERROR, ERRORS, EXECUTION_ERROR, TIMED_OUT
+from dsc.events import CYCLE, DONE, DONE_STATE, ERROR, ERRORS, EXECUTION_ERROR, TIMED_OUT
 from dsc.model.actions import Configure, Emit, ExternalAction, Internal, Send, Trigger, flat
 from dsc.model.language import TermField
 from dsc.model.states import CompositeState, FinalState, HistoryState, OrthogonalState, State
@@ -44,6 +44,7 @@ def event_names(compiled: CompiledPlot) -> tuple[list[str], int]:
     plot, actions = compiled.plot, [*actions_of(compiled)]
     inner = ["", DONE, EXECUTION_ERROR if compiled.scxml else ERROR]
     inner += completed_events(compiled).values() if compiled.scxml else ()
+    inner += [CYCLE] if plot.robot is not None else []
     labels = [label for node in compiled.nodes if isinstance(node.state, State) for label in node.state.on]
     if compiled.scxml:
         words = (word.removesuffix(".*").removesuffix(".") for label in labels for word in label.split())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.resources import files
 
 from dsc.controllers.expression_text import ExpressionText
@@ -16,6 +16,7 @@ from dsc.controllers.model import (
     Command,
     Condition,
     Controller,
+    Device,
     Fire,
     Fixed,
     Group,
@@ -33,14 +34,15 @@ _LONGEST = 110
 
 def python_text(controller: Controller, queue: int) -> str:
     """Return the Python module of a controller with a queue of that capacity."""
-    return "\n".join([*_runtime(controller.name), *_Writer(controller, queue).lines(), ""])
+    modules = [*_MODULES, *(["cycles"] if controller.cycle else [])]
+    return "\n".join([*_runtime(controller.name, modules), *_Writer(controller, queue).lines(), ""])
 
 
-def _runtime(name: str) -> list[str]:
+def _runtime(name: str, modules: Iterable[str]) -> list[str]:
     """Return the modules of the runtime as one, with the imports of the standard library first."""
     imports: dict[str, None] = {}
     bodies = []
-    for module in _MODULES:
+    for module in modules:
         text = files("dsc.controllers.runtime").joinpath(f"{module}.py").read_text(encoding="utf-8")
         first, *others = ast.parse(text).body
         begin = first.end_lineno or 0
@@ -94,10 +96,15 @@ class _Writer:
         yield from self._names("Commands", "The commands by their numbers.", [*enumerate(controller.commands)])
         yield from ("", "", "class Data:", '    """The parameters, variables and outputs of the plot."""', "")
         yield from [f"    {self.data[name]}: {_TYPES[kind]}" for name, kind in controller.data.items()]
-        yield from ("", "", "class Controller(Interpreter):")
+        base = "CycleInterpreter" if controller.cycle else "Interpreter"
+        yield from ("", "", f"class Controller({base}):")
         yield f'    """Controller of the plot \'{controller.name}\'; `data` has its variables."""'
         yield ""
         yield from self._tables()
+        if controller.cycle:
+            yield from self._devices("sensors", controller.sensors)
+            yield from self._devices("motors", controller.motors)
+            yield f"    cycle_event = {controller.cycle}"
         yield from self._fill()
         yield from self._functions()
 
@@ -126,6 +133,13 @@ class _Writer:
         yield f"    attributes = {{{', '.join(kinds)}}}"
         yield f"    scxml = {one.scxml}"
         yield f"    queue_capacity = {self.queue}"
+
+    def _devices(self, group: str, devices: Mapping[str, Device]) -> Iterator[str]:
+        yield f"    {group} = {{"
+        for name, one in devices.items():
+            values = ", ".join(repr(value.value) for value in (one.least, one.most, one.start))
+            yield f'        {name!r}: Device("{self.data[name]}", {_TYPES[one.kind]}, {values}),'
+        yield "    }"
 
     def _node(self, number: int) -> str:
         node = self.controller.nodes[number]
