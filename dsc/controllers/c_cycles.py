@@ -15,8 +15,8 @@ _HEAD = """int chart_cycle(struct chart *c, const struct chart_sensors *sensors,
 def declare_cycle(controller: Controller) -> Iterator[str]:
     """Yield the declaration of the function `cycle`."""
     if controller.cycle:
-        yield "/* Execute `step`, store the values of the sensors, fire the event `cycle`, and write the values of the"
-        yield "   motors. CHART_UNKNOWN: a sensor is out of range, and nothing happens. CHART_BUSY: there was no cycle. */"
+        yield "/* Execute `step`, store the values of the sensors, fire `cycle`, and write the values of the motors."
+        yield "   CHART_UNKNOWN: a sensor is out of range, and nothing happens. CHART_BUSY: there was no cycle. */"
         yield f"{_HEAD};"
 
 

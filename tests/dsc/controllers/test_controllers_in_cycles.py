@@ -49,7 +49,7 @@ int main(void)
 
 def grow(seed: int) -> ActionPlot:
     """A random chart of two regions, whose states form rings."""
-    pick = random.Random(seed).choice
+    pick = random.Random(seed).choice  # noqa: S311
 
     def acts() -> dict[str, Any]:
         motor = pick(("wheel", "gear", "lamp"))
@@ -86,7 +86,7 @@ def grow(seed: int) -> ActionPlot:
 
 def draw(seed: int) -> list[tuple[int, dict[str, Any]]]:
     """Times in nanoseconds and values of sensors."""
-    chance, now, drawn = random.Random(seed), 0, []
+    chance, now, drawn = random.Random(seed), 0, []  # noqa: S311
     for _ in range(CYCLES):
         now += chance.choice((5, 16, 32, 32, 100)) * 1_000_000
         steps = 99 if chance.random() < 0.005 else chance.randrange(9)
