@@ -50,6 +50,7 @@ WHY = {
     "kairos-planner": ("the engine `kairos`", APART),
     "py-trees": ("behaviour trees as skills", "imported by `dsc.components.behaviour_trees`"),
     "eclipse-zenoh": ("robots in several processes", "imported by `dsc.wire.zenoh_transport`"),
+    "mujoco": ("robots that plots drive in cycles", "imported by `domains.robots_in_cycles.rover`"),
     "pygls": ("the language server `dsc lsp`", "imported by `dsc.editing.server`"),
     "starlette": ("the page's requests", "imported where a page is served"),
     "uvicorn": ("the page's server", "imported where a page is served"),
@@ -92,7 +93,7 @@ LICENCES = {
 SPELT = {"GPL3+": "GPL-3.0-or-later", "APACHE": "Apache-2.0", "BSD 2-Clause License": "BSD-2-Clause"}
 """Licences as packages say them, and as SPDX does."""
 TITLES = {
-    "core": "Core", "viewer": "Extra `viewer`", "bt": "Extra `bt`", "edit": "Extra `edit`", "zenoh": "Extra `zenoh`", "fast": "Extra `fast`", "numeric": "Extra `numeric`",
+    "core": "Core", "viewer": "Extra `viewer`", "bt": "Extra `bt`", "edit": "Extra `edit`", "physics": "Extra `physics`", "zenoh": "Extra `zenoh`", "fast": "Extra `fast`", "numeric": "Extra `numeric`",
     "durations": "Extra `durations`", "numbers": "Extra `numbers`", "test": "Extra `test`", "check": "Extra `check`", "docs": "Extra `docs`", "bench": "Extra `bench`",
     "mutation": "Extra `mutation`",
     "build": "To build the package",

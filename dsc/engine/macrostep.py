@@ -14,7 +14,7 @@ from dsc.engine.machine_state import FrameState, MachineState, configuration_of,
 from dsc.engine.performing import Performer
 from dsc.engine.plot_changes import ActivePlots, replace_plots
 from dsc.engine.reaction import CompiledReaction, ReactionPart, reaction_of, report
-from dsc.engine.reaction_choice import Question, choice_of, settled
+from dsc.engine.reaction_choice import Question, choice_of, settle_guard
 from dsc.engine.situation import Chart, Situation
 from dsc.engine.steps import Note, SendMessage, Step
 from dsc.engine.tables import TransitionEdge
@@ -247,7 +247,7 @@ class Macrostep:
     def _guard(self, frame: Frame, edge: TransitionEdge) -> bool:
         if edge.guard is None:
             return True
-        return self._holds(frame, edge, settled(edge, edge.guard, frame.configuration))
+        return self._holds(frame, edge, settle_guard(edge, edge.guard, frame.configuration))
 
     def _holds(self, frame: Frame, edge: TransitionEdge, condition: Expression) -> bool:
         try:

@@ -61,7 +61,7 @@ def choice_of(plot: Frame | FrameState, trigger: Trigger) -> Choice | None:
     return found  # type: ignore[no-any-return]
 
 
-def settled(edge: TransitionEdge, guard: Expression, configuration: Configuration) -> Expression:
+def settle_guard(edge: TransitionEdge, guard: Expression, configuration: Configuration) -> Expression:
     """Return the guard of a transition with each `in-state` replaced by its truth value."""
     return settle(guard, configuration.is_active) if edge.asks else guard
 
@@ -76,7 +76,7 @@ def _compute(configuration: Configuration, trigger: Trigger, answers: Mapping[Tr
     def guard(_frame: Frame, edge: TransitionEdge) -> bool:
         if edge.guard is None:
             return True
-        condition = settled(edge, edge.guard, configuration)
+        condition = settle_guard(edge, edge.guard, configuration)
         if condition in (TRUE, FALSE):
             return condition == TRUE
         if edge not in answers:
