@@ -12,6 +12,7 @@ from knowledge_base.language.syntax.expression import (
     TRUE,
     And,
     Atom,
+    Comparison,
     Constant,
     Exists,
     Expression,
@@ -29,8 +30,11 @@ FALSE = Or(())
 
 def asked_states(e: Expression) -> list[str]:
     """Return the names of the states that the condition tests with `in-state`."""
+    if isinstance(e, Comparison):
+        return []
     if isinstance(e, Atom):
-        return [str(e.args[0].value)] if _asks(e) and isinstance(e.args[0], Constant) else []
+        asks = e.predicate == IN_STATE and len(e.args) == 1
+        return [str(e.args[0].value)] if asks and isinstance(e.args[0], Constant) else []
     inner = [part for part in parts_of(e) if isinstance(part, Expression)]
     return [name for part in inner for name in asked_states(part)]
 

@@ -298,7 +298,8 @@ def fill_parameters(compiled: CompiledPlot, arguments: Mapping[str, Any], situat
         InputError: a parameter is missing, out of its range or of another type, or an argument names no parameter.
     """
     plot = compiled.plot
-    if not (arguments or plot.parameters or plot.all_variables or plot.outputs):
+    declared = plot.variables if plot.robot is None else plot.all_variables  # most plots have no robot section
+    if not (arguments or plot.parameters or declared or plot.outputs):
         return NOTHING
     for given in arguments:
         if given not in plot.parameters:
@@ -316,7 +317,7 @@ def fill_parameters(compiled: CompiledPlot, arguments: Mapping[str, Any], situat
         variables[name] = value
         if parameter.bounded and value is not None:
             variables[name] = parameter.range.check(f"{plot.name}.{name}", value)
-    for name, variable in (*plot.all_variables.items(), *plot.outputs.items()):
+    for name, variable in (*declared.items(), *plot.outputs.items()):
         variables[name] = (
             None if variable.initial is None else evaluate(variable.initial, variables, situation, compiled)
         )

@@ -242,7 +242,8 @@ def compile_plot(
         SchemaError: targets of a transition cannot be active together, or a history's default is outside its scope.
     """
     scxml = plot.dialect == "scxml"
-    declared = {} if scxml else {**plot.parameters, **plot.all_variables, **plot.outputs}
+    variables = plot.variables if plot.robot is None else plot.all_variables  # most plots have no robot section
+    declared = {} if scxml else {**plot.parameters, **variables, **plot.outputs}
     types = {name: one.type for name, one in declared.items()}
     layout = _Layout(plot, types, records)
     for node in layout.nodes:

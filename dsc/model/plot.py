@@ -139,22 +139,18 @@ class ActionPlot(Written):
 
     @model_validator(mode="after")
     def _names_are_valid(self) -> ActionPlot:
-        check_states((name, path) for name, _, path in self.walk())
-        data = [*self._data_paths()]
-        groups = (("emits", self.emits), ("receives", self.receives))
-        attributes = (
-            (group, event, name) for group, many in groups for event, one in many.items() for name in one or ()
-        )
-        check_variables((*data, *attributes))
-        check_declarations(data)
-        return self
-
-    def _data_paths(self) -> Iterator[Path]:
-        """Yield the path of each declared name of data."""
+        check_states(self.walk())
+        paths: list[Path] = []
         for group in ("parameters", "variables", "outputs"):
-            yield from ((group, name) for name in getattr(self, group))
+            paths += [(group, name) for name in getattr(self, group)]
         for group in ("sensors", "motors", "constants") if self.robot is not None else ():
-            yield from (("robot", group, name) for name in getattr(self.robot, group))
+            paths += [("robot", group, name) for name in getattr(self.robot, group)]
+        check_declarations(paths)
+        for group, events in (("emits", self.emits), ("receives", self.receives)):
+            for event, attributes in events.items():
+                paths += [(group, event, name) for name in attributes or ()]
+        check_variables(paths)
+        return self
 
     @model_validator(mode="after")
     def _robot_is_of_dialect_dsc(self) -> ActionPlot:
@@ -197,7 +193,7 @@ class ActionPlot(Written):
         """Return the names of the events that the plot declares under `receives`, or for which it has a reaction."""
         ways = (event for _, state, _ in self.walk() if isinstance(state, State) for event in state.on)
         rules, handlers = (rule.on for rule in self.rules if rule.on), (handler.on for handler in self.handlers)
-        return frozenset((*self.all_receives, *ways, *rules, *handlers))
+        return frozenset((*self.receives, *ways, *rules, *handlers))
 
     def scopes(self) -> Iterator[Scope]:
         """Yield the scopes: the plot, then each composite state and region. A transition must not leave its scope."""

@@ -14,10 +14,10 @@ _STATE_NAME = re.compile(r"[^/#][^/]*")
 # Slashes separate state names in paths. In a stored state, a name that begins with # identifies a region.
 
 
-def check_states(states: Iterable[tuple[str, FormPath]]) -> None:
+def check_states(states: Iterable[tuple[str, object, FormPath]]) -> None:
     """Raise `PydanticCustomError` for a name that is not valid for a state, or that two states have."""
     seen: set[str] = set()
-    for name, path in states:
+    for name, _, path in states:
         if _STATE_NAME.fullmatch(name) is None:
             wrong = "'{name}' is not a name for a state: it has a slash, begins with # or is empty"
             raise PydanticCustomError(LOCATED, wrong, {"name": name, "path": path})

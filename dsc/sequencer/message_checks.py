@@ -281,7 +281,7 @@ def checked_event(said: object, plots: Library, knowledge: KnowledgeBase) -> Eve
     attributes = {} if plain else dict(said.attributes)
     errors = []
     for plot in plots:
-        declared = plot.all_receives.get(said.name)
+        declared = (plot.receives if plot.robot is None else plot.all_receives).get(said.name)
         if declared is not None:
             try:
                 checked = _plain(said.name, attributes, declared, plots.records, "event")
