@@ -7,7 +7,7 @@ from dsc_charts import plot
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dsc import CycleController, Event, Machine
+from dsc import CycleController, Event, LoopClock, Machine, Sequencer, run_simulated
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from knowledge_base import InputError, KnowledgeBase, Schema
@@ -164,3 +164,26 @@ def test_the_time_since_the_last_event_of_a_name():
     robot = CycleController(plot(text))
     found = {now: robot.step({"seen": now == 0.5}, now)["stop"] for now in (0.4, 0.5, 1.4, 1.5)}
     assert found == {0.4: False, 0.5: False, 1.4: False, 1.5: True}
+
+
+def test_an_event_cycle_from_outside_in_a_run():
+    """The sequencer checks the values of an event-driven cycle, and the run ends by the plot."""
+
+    async def run():
+        sequencer = Sequencer(Library([chart]), KnowledgeBase(Schema()), [], LoopClock(), open_ended=True)
+        with pytest.raises(InputError, match=r"'s' .*number from 0 to 5"):
+            sequencer.post(Event("cycle", {"s": 7}))
+        sequencer.post(Event("cycle", {"s": 2}), after=1)
+        sequencer.post(Event("cycle", {"s": 4}), after=2)
+        return await sequencer.run("p")
+
+    chart = plot("""
+        plot: p
+        robot: {sensors: {s: number from 0 to 5}, motors: {m: number}}
+        emits: {high: {m: number}}
+        states:
+          a: {on: {cycle: {to: over, when: (> ?s 3), assign: {m: (* 2 ?s)}}}}
+          over: {final: true, emit: high, with: {m: ?m}}
+    """)
+    end = run_simulated(run())
+    assert [(one.name, dict(one.attributes)) for one in end.emitted] == [("high", {"m": 8})]
