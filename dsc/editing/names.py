@@ -79,7 +79,11 @@ def plot_names(document: Document, spans: Spans, text: str) -> Iterator[Occurren
     """Yield the names in the document of a plot."""
     data = document.data if isinstance(document.data, dict) else {}
     plot = str(data.get("plot", ""))
-    own = {name for group in ("parameters", "variables", "outputs") for name in data.get(group) or {}}
+    robot: Any = data.get("robot")
+    robot = robot if isinstance(robot, dict) else {}
+    groups = [data.get(group) for group in ("parameters", "variables", "outputs")]
+    groups += [robot.get(group) for group in ("sensors", "motors", "constants")]
+    own = {name for group in groups for name in group or {}}
     states = {path[-1] for path in spans.keys if role_of(PLOT, path[:-1]) == "states"}
     yield from _key_names(data, spans, plot, own)
     yield from event_names(data, spans, text)

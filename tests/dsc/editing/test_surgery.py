@@ -105,3 +105,18 @@ def test_a_state_moved_into_another_with_its_comments():
 def test_a_refused_edit(edit, said):
     with pytest.raises(InputError, match=said):
         apply(TEXT, edit)
+
+
+def test_a_motor_and_a_sensor_renamed_in_operations_and_transitions():
+    text = """\
+plot: p
+robot:
+  sensors: {light: number}
+  motors: {wheel: number}
+  operations: {go: {wheel: ?light}}
+states:
+  a: {entry: {assign: {wheel: 1}}, on: {cycle: {when: (> ?light 1), do: [{perform: go}]}}}
+"""
+    renamed = apply(text, RenameVariable(("robot", "motors", "wheel"), "left"))
+    renamed = apply(renamed, RenameVariable(("robot", "sensors", "light"), "lux"))
+    assert renamed == text.replace("wheel", "left").replace("light", "lux")
