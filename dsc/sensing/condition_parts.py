@@ -14,6 +14,7 @@ from typing import Any
 from dsc.components.checks import LIBRARY
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
+from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
@@ -27,6 +28,7 @@ from knowledge_base.language.syntax.expression import (
     Or,
     Term,
     Variable,
+    free_variables,
     substitute,
 )
 from knowledge_base.language.syntax.rewriting import inside, with_terms
@@ -71,10 +73,9 @@ def split(condition: Expression, values: Mapping[str, Any], functions: Collectio
         functions: the names of the functions of the knowledge base.
 
     Raises:
-        InputError: a quantifier contains a value of a component.
+        InputError: a quantifier contains a value of a component, or the knowledge cannot contain a variable's value.
     """
-    known = {name: value for name, value in values.items() if isinstance(value, Value)}
-    return _Splitter(known, functions).split(_with_inner_negations(condition, negated=False))
+    return _Splitter(values, functions).split(_with_inner_negations(condition, negated=False))
 
 
 def parts_in(structure: Structure) -> Iterator[Part]:
@@ -133,8 +134,8 @@ def _operands(e: Expression, kind: type[And | Or]) -> tuple[Expression, ...]:
 class _Splitter:
     """One split; see `split` for the arguments."""
 
-    def __init__(self, known: Mapping[str, Value], functions: Collection[str]) -> None:
-        self._known, self._functions = known, functions
+    def __init__(self, values: Mapping[str, Any], functions: Collection[str]) -> None:
+        self._values, self._functions = values, functions
 
     def split(self, e: Expression) -> Structure:
         """Return a condition with inner negations as parts."""
@@ -151,7 +152,7 @@ class _Splitter:
     def _part(self, e: Expression) -> Part:
         components = components_in(e)
         if not components:
-            return Part(substitute(e, self._known), to_text(e))
+            return Part(substitute(e, self._known(e)), to_text(e))
         for one in inside(e):
             if isinstance(one, Exists | Forall):
                 message = f"a condition on values of components has no quantifiers: {to_text(one)}"
@@ -160,6 +161,15 @@ class _Splitter:
         prefix = f"{components[0]}." if len(components) == 1 else ""
         return Part(with_terms(e, lambda term: self._read(term, prefix, live)), to_text(e), components, live)
 
+    def _known(self, form: Expression | Term) -> dict[str, Value]:
+        """Return the values of the variables in a form of the knowledge; a query finds the other variables."""
+        values = {name: self._values[name] for name in free_variables(form) if name in self._values}
+        for name, value in values.items():
+            if not isinstance(value, Value):
+                message = f"'?{name}' is {shown(value)}, which the knowledge cannot contain: {to_text(form)}"
+                raise InputError(message, place=form.place, found=name)
+        return values
+
     def _read(self, term: Term, prefix: str, live: dict[str, Term]) -> Term:
         """Return a term without the component's name, and with variables for the terms that `live` receives."""
         match term:
@@ -167,7 +177,7 @@ class _Splitter:
                 return replace(term, value=name.removeprefix(prefix))
             case Call(function) if function in self._functions and function not in LIBRARY and not components_in(term):
                 variable = Variable(f"live.{len(live)}", place=term.place)
-                live[variable.name] = substitute(term, self._known)
+                live[variable.name] = substitute(term, self._known(term))
                 return variable
             case Call(_, args) | Arithmetic(_, args):
                 return replace(term, args=tuple(self._read(arg, prefix, live) for arg in args))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncGenerator, Mapping
 from contextlib import ExitStack
 from typing import Any
 
@@ -14,7 +14,9 @@ from knowledge_base.language.syntax.expression import Term
 from knowledge_base.store import KnowledgeBase
 
 
-async def live_values(knowledge: KnowledgeBase, terms: Mapping[str, Term]) -> AsyncIterator[dict[str, Any] | None]:
+async def live_values(
+    knowledge: KnowledgeBase, terms: Mapping[str, Term]
+) -> AsyncGenerator[dict[str, Any] | None, None]:
     """Yield the present values of terms by name, and again after each change; `None` while a value is unknown.
 
     Changes that come faster than the reader reads are merged. Values are plain data, a geometry is a list of numbers.

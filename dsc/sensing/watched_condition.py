@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from contextlib import suppress
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
+from contextlib import aclosing, suppress
 from dataclasses import replace
 from typing import Any, Never, Protocol, TypeVar
 
@@ -104,12 +104,12 @@ class WatchedCondition:
         if not part.components:
             await self._watch_knowledge(part)
             return
-        live = live_values(self._knowledge, part.live)
-        first = await self._await_known(live) if part.live else {}
-        if len(part.components) == 1:
-            await self._watch_at_source(part, number, first, live)
-        else:
-            await self._watch_here(part, first, live)
+        async with aclosing(live_values(self._knowledge, part.live)) as live:
+            first = await self._await_known(live) if part.live else {}
+            if len(part.components) == 1:
+                await self._watch_at_source(part, number, first, live)
+            else:
+                await self._watch_here(part, first, live)
 
     async def _watch_knowledge(self, part: Part) -> None:
         calls = LoopCalls()
@@ -120,7 +120,7 @@ class WatchedCondition:
             await _wait()
 
     async def _watch_at_source(
-        self, part: Part, number: int, first: Mapping[str, Any], live: AsyncIterator[dict[str, Any] | None]
+        self, part: Part, number: int, first: Mapping[str, Any], live: AsyncGenerator[dict[str, Any] | None, None]
     ) -> None:
         (name,) = part.components
 
@@ -145,7 +145,7 @@ class WatchedCondition:
         await self._work(name, at_source)
 
     async def _watch_here(
-        self, part: Part, first: Mapping[str, Any], live: AsyncIterator[dict[str, Any] | None]
+        self, part: Part, first: Mapping[str, Any], live: AsyncGenerator[dict[str, Any] | None, None]
     ) -> None:
         """Evaluate a part with the values of several components in this program, to which the values travel."""
         ports = {f"{name}.{port}": one for name in part.components
@@ -170,7 +170,7 @@ class WatchedCondition:
             condition.end()
 
     @staticmethod
-    async def _await_known(live: AsyncIterator[dict[str, Any] | None]) -> dict[str, Any]:
+    async def _await_known(live: AsyncGenerator[dict[str, Any] | None, None]) -> dict[str, Any]:
         """Return the live values of a part as soon as all are known."""
         async for values in live:
             if values is not None:
@@ -180,7 +180,7 @@ class WatchedCondition:
     async def _follow(
         self,
         part: Part,
-        live: AsyncIterator[dict[str, Any] | None],
+        live: AsyncGenerator[dict[str, Any] | None, None],
         use: Callable[[dict[str, Any]], Awaitable[None]],
     ) -> None:
         """Use each change of the live values; while a value is unknown, the part is unknown."""

@@ -61,29 +61,28 @@ def denied(e: Expression | Term, *, wanted: bool) -> Iterator[Atom]:
 
 def with_atoms(e: Expression, instead: Callable[[Atom], Expression]) -> Expression:
     """Return the condition in which `instead` has replaced each atom."""
-    match e:
-        case Atom():
-            return instead(e)
-        case ex.Not(body) | ex.Exists(_, body) | ex.Forall(_, body):
-            return replace(e, body=with_atoms(body, instead))
-        case ex.And(parts) | ex.Or(parts):
-            return replace(e, parts=tuple(with_atoms(part, instead) for part in parts))
-        case ex.Imply(premise, conclusion):
-            return replace(e, premise=with_atoms(premise, instead), conclusion=with_atoms(conclusion, instead))
-        case ex.Comparison():
-            return e
+    return _with_leaves(e, lambda leaf: instead(leaf) if isinstance(leaf, Atom) else leaf)
 
 
 def with_terms(e: Expression, instead: Callable[[Term], Term]) -> Expression:
     """Return the condition in which `instead` has replaced each argument of an atom and each side of a comparison."""
+
+    def rewrite(leaf: Atom | ex.Comparison) -> Expression:
+        if isinstance(leaf, Atom):
+            return replace(leaf, args=tuple(map(instead, leaf.args)))
+        return replace(leaf, left=instead(leaf.left), right=instead(leaf.right))
+
+    return _with_leaves(e, rewrite)
+
+
+def _with_leaves(e: Expression, instead: Callable[[Atom | ex.Comparison], Expression]) -> Expression:
+    """Return the condition in which `instead` has replaced each atom and each comparison."""
     match e:
-        case Atom(_, args):
-            return replace(e, args=tuple(map(instead, args)))
-        case ex.Comparison(_, left, right):
-            return replace(e, left=instead(left), right=instead(right))
         case ex.Not(body) | ex.Exists(_, body) | ex.Forall(_, body):
-            return replace(e, body=with_terms(body, instead))
+            return replace(e, body=_with_leaves(body, instead))
         case ex.And(parts) | ex.Or(parts):
-            return replace(e, parts=tuple(with_terms(part, instead) for part in parts))
+            return replace(e, parts=tuple(_with_leaves(part, instead) for part in parts))
         case ex.Imply(premise, conclusion):
-            return replace(e, premise=with_terms(premise, instead), conclusion=with_terms(conclusion, instead))
+            return replace(e, premise=_with_leaves(premise, instead), conclusion=_with_leaves(conclusion, instead))
+        case _:
+            return instead(e)

@@ -224,10 +224,12 @@ def test_a_lost_source_ends_the_watch_with_its_name():
         ("(exists (?c - cup) (> hand.pose.x 1))", "no quantifiers"),
         ("(and (wanted) (> hand.pose.x ?limt))", "limt"),
         ("(and (wanted) (> hand.pose.x 1)", "never closed"),
+        ("(and (held ?list) (> hand.pose.x 1))", "'?list' is [1], which the knowledge cannot contain"),
+        ("(< (distance hand.pose.position (pose ?list)) 1)", "'?list' is [1], which the knowledge cannot contain"),
     ],
 )
 def test_mistakes_end_the_watch_with_their_reason(condition, why):
-    _, emitted, _ = run(condition, [(0, "knowledge", "(wanted)"), (1, "hand", 3)], values="{limit: 3}")
+    _, emitted, _ = run(condition, [(0, "knowledge", "(wanted)"), (1, "hand", 3)], values="{limit: 3, list: (list 1)}")
     assert emitted[-1].name == "broken"
     assert why in emitted[-1].attributes["why"]
 
@@ -320,6 +322,49 @@ def test_split_evaluation_equals_central_evaluation(text, changes, far):
         latest = [flip for when, flip in flips if when < at + 0.9]
         assert latest[-1] is truth, (at, truth, flips)
     assert all(first[1] is not second[1] for first, second in pairwise(flips))
+
+
+class Listened(KnowledgeBase):
+    """A knowledge base that counts its listeners."""
+
+    def __init__(self, schema):
+        super().__init__(schema)
+        self.listeners = 0
+
+    def subscribe(self, listener):
+        self.listeners += 1
+        end = super().subscribe(listener)
+
+        def unsubscribe():
+            self.listeners -= 1
+            end()
+
+        return unsubscribe
+
+
+def test_a_left_state_leaves_no_listener():
+    async def main():
+        clock, knowledge = LoopClock(), Listened(SCHEMA)
+        player = Player([(2, "hand", 1)], {"hand": (hand := Hand())}, knowledge)
+        text = PLOT.replace("played: e", "played: f").replace(
+            "      e: {final: true}", "      f: {after: {seconds: 5, to: e}}\n      e: {final: true}"
+        )
+        condition = "(and (wanted) (< hand.pose.x (limit)) (< (distance hand.pose.position (pose cup1)) 1))"
+        sequencer = Sequencer(
+            Library([plot(text % f"{{condition: '\"{condition}\"'}}")]), knowledge, [hand, player], clock
+        )
+        running = asyncio.ensure_future(sequencer.run("p"))
+        await clock.sleep(2.5)
+        during = knowledge.listeners
+        await clock.sleep(3)
+        after = knowledge.listeners
+        await running
+        return during, after, knowledge.listeners
+
+    during, after, end = run_simulated(main())
+    assert during > after
+    assert end == 0
+    assert after == 2  # the run's own
 
 
 def test_the_watched_parts_of_the_knowledge_are_listed_with_their_truth():
