@@ -199,7 +199,7 @@ def _text(file: Path) -> str | InputError:
         return error
 
 
-_BY_NAME = frozenset({"Transition", "PlotParameter", "PlotVariable"})
+_BY_NAME = frozenset({"Transition", "PlotParameter", "PlotVariable", "Sensor", "Device"})
 """Classes of values whose short form is only the target or the type."""
 
 
