@@ -152,7 +152,7 @@ class _Splitter:
     def _part(self, e: Expression) -> Part:
         components = components_in(e)
         if not components:
-            return Part(substitute(e, self._known(e)), to_text(e))
+            return Part(substitute(e, self._values_for(e)), to_text(e))
         for one in inside(e):
             if isinstance(one, Exists | Forall):
                 message = f"a condition on values of components has no quantifiers: {to_text(one)}"
@@ -161,7 +161,7 @@ class _Splitter:
         prefix = f"{components[0]}." if len(components) == 1 else ""
         return Part(with_terms(e, lambda term: self._read(term, prefix, live)), to_text(e), components, live)
 
-    def _known(self, form: Expression | Term) -> dict[str, Value]:
+    def _values_for(self, form: Expression | Term) -> dict[str, Value]:
         """Return the values of the variables in a form of the knowledge; a query finds the other variables."""
         values = {name: self._values[name] for name in free_variables(form) if name in self._values}
         for name, value in values.items():
@@ -177,7 +177,7 @@ class _Splitter:
                 return replace(term, value=name.removeprefix(prefix))
             case Call(function) if function in self._functions and function not in LIBRARY and not components_in(term):
                 variable = Variable(f"live.{len(live)}", place=term.place)
-                live[variable.name] = substitute(term, self._known(term))
+                live[variable.name] = substitute(term, self._values_for(term))
                 return variable
             case Call(_, args) | Arithmetic(_, args):
                 return replace(term, args=tuple(self._read(arg, prefix, live) for arg in args))
