@@ -211,7 +211,7 @@ def test_the_command_ends_an_unfinished_run(whole, tmp_path):
     [
         (
             ["run"],
-            "a run needs a robot, or a store to --resume; valid: arm-skills, attention, butler, clean-up-table, dialogue, elevator, fetch-skills, waving",
+            "a run needs a robot, or a store to --resume; valid: arm-skills, attention, butler, clean-up-table, dialogue, elevator, fetch-skills, line-follower, …",
         ),
         (
             ["run", "--resume", "x.kb", "--seed", "1"],
