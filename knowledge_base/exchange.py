@@ -99,7 +99,7 @@ def schema_form(schema: Schema) -> Form:
 
 def _kinds(schema: Schema) -> Form:
     """Return the kinds of arcs, unless all are of one kind."""
-    kinds = {one.name: one.kind for one in (*schema.predicates.values(), *schema.functions.values()) if one.kind}
+    kinds = {name: kind for name, kind in schema.kinds.items() if kind}
     return {"kinds": kinds} if len(set(kinds.values())) > 1 else {}
 
 

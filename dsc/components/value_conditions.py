@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from dsc.calls import SkillCall
@@ -208,6 +208,11 @@ def port_of(name: str) -> str:
     return name.rpartition(".")[0]
 
 
+def checks_of(ports: Iterable[Push]) -> dict[str, Check]:
+    """Return the checks that conditions on values of these ports may use, by name."""
+    return {**LIBRARY, **by_name(*(check for port in ports for check in port.checks))}
+
+
 class BecameTrue(Outcome):
     """The condition has become true, or is true at the beginning."""
 
@@ -224,8 +229,8 @@ async def watch(component: Any, _: SkillBody, call: SkillCall[Any], arguments: M
     """Report each change of a condition's truth until the action is cancelled, or an evaluation fails."""
     failed: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
     options = {name: value for name, value in arguments.items() if name not in {"condition", "values"}}
-    checks = {**LIBRARY, **by_name(*(check for port in component.pushes.values() for check in port.checks))}
-    condition = ValueCondition(arguments["condition"], component.pushes, checks, arguments.get("values", {}), **options)
+    ports, values = component.pushes, arguments.get("values", {})
+    condition = ValueCondition(arguments["condition"], ports, checks_of(ports.values()), values, **options)
     component.activations.conditions[call.key] = condition
     condition.listen(
         lambda truth, values: call.report(BecameTrue(values=values) if truth else BecameFalse(values=values)),

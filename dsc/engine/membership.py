@@ -6,22 +6,9 @@ NAME is a state of the plot that contains the condition.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
-from knowledge_base.language.syntax.expression import (
-    TRUE,
-    And,
-    Atom,
-    Comparison,
-    Constant,
-    Exists,
-    Expression,
-    Forall,
-    Imply,
-    Not,
-    Or,
-    parts_of,
-)
+from knowledge_base.language.syntax.expression import TRUE, Atom, Comparison, Constant, Expression, Or, parts_of
+from knowledge_base.language.syntax.rewriting import with_atoms
 
 IN_STATE = "in-state"
 """Name of the predicate that tests whether a state is active."""
@@ -41,17 +28,14 @@ def asked_states(e: Expression) -> list[str]:
 
 def settle(e: Expression, active: Callable[[str], bool]) -> Expression:
     """Return the condition with each `in-state` replaced by its truth value; the rest stays to be evaluated."""
-    match e:
-        case Atom(_, args) if _asks(e):
-            return TRUE if isinstance(args[0], Constant) and active(str(args[0].value)) else FALSE
-        case And(parts) | Or(parts):
-            return replace(e, parts=tuple(settle(part, active) for part in parts))
-        case Not(body) | Exists(_, body) | Forall(_, body):
-            return replace(e, body=settle(body, active))
-        case Imply(premise, conclusion):
-            return replace(e, premise=settle(premise, active), conclusion=settle(conclusion, active))
-        case _:
-            return e
+
+    def truth(atom: Atom) -> Expression:
+        if not _asks(atom):
+            return atom
+        name = atom.args[0]
+        return TRUE if isinstance(name, Constant) and active(str(name.value)) else FALSE
+
+    return with_atoms(e, truth)
 
 
 def _asks(e: Atom) -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dsc.components.checks import LIBRARY
-from knowledge_base.errors import InputError
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Value
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.expression import (
@@ -105,6 +105,20 @@ def components_in(form: Expression | Term) -> tuple[str, ...]:
 def value_names(form: Expression | Term) -> Iterator[Constant]:
     """Yield the names of values in a form, e.g. `hand.pose.position`, and of ports, e.g. `hand.pose`."""
     return (one for one in inside(form) if isinstance(one, Constant) and _is_value_name(one))
+
+
+def require_values(condition: Expression, pushed: Mapping[str, Collection[str]], who: str) -> None:
+    """Raise `UnknownNameError` for a name of a value or port that is not among the ports with their values.
+
+    Args:
+        condition: the condition.
+        pushed: the values of each port, by its name in the condition.
+        who: the beginning of the message, e.g. `no component pushes a`.
+    """
+    valid = [f"{port}.{value}" for port, values in pushed.items() for value in values]
+    for name in value_names(condition):
+        if name.value not in pushed and name.value not in valid:
+            raise UnknownNameError(f"{who} value '{name.value}'", place=name.place, found=str(name.value), valid=valid)
 
 
 def _is_value_name(term: Constant) -> bool:

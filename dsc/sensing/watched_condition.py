@@ -9,17 +9,15 @@ from dataclasses import replace
 from typing import Any, Never, Protocol, TypeVar
 
 from dsc.calls import SkillCall
-from dsc.components.checks import LIBRARY, by_name
 from dsc.components.component import Component
-from dsc.components.value_conditions import WATCH, BecameFalse, BecameTrue, ValueCondition
+from dsc.components.value_conditions import WATCH, BecameFalse, BecameTrue, ValueCondition, checks_of
 from dsc.errors import NoAnswerError, RefusedError
 from dsc.loop_calls import LoopCalls
 from dsc.outcomes import Outcome
-from dsc.sensing.condition_parts import Part, parts_in, split, truth_of, value_names
+from dsc.sensing.condition_parts import Part, parts_in, require_values, split, truth_of
 from dsc.sensing.live_values import live_values
 from knowledge_base.conditions.damping import relaxed
-from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.syntax.expression import Expression
+from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.text import parse_condition, to_text
 from knowledge_base.store import KnowledgeBase
 
@@ -72,7 +70,8 @@ class WatchedCondition:
             relaxed(whole, hysteresis)  # refuses a condition without bounds
         self._hysteresis = hysteresis
         self._structure = split(whole, values, knowledge.schema.functions)
-        self._require_values(whole)
+        pushes = {f"{name}.{port}": one.values for name in components for port, one in components[name].pushes.items()}
+        require_values(whole, pushes, "no component pushes a")
         self._truths: dict[Part, bool] = {}
         self._unknown: set[Part] = set()  # parts with a live value that is unknown at present
         self._read: dict[str, Any] = {}  # the values that the parts have reported
@@ -86,17 +85,6 @@ class WatchedCondition:
             raise AssertionError("no part ends")
         finally:
             self._stop_hold()
-
-    def _require_values(self, whole: Expression) -> None:
-        """Raise `UnknownNameError` for a value of a component that does not exist."""
-        pushed = {
-            f"{name}.{port}": push.values for name, one in self._components.items() for port, push in one.pushes.items()
-        }
-        valid = [f"{port}.{value}" for port, values in pushed.items() for value in values]
-        for found in value_names(whole):
-            if found.value not in pushed and found.value not in valid:
-                message = f"no component pushes a value '{found.value}'"
-                raise UnknownNameError(message, place=found.place, found=str(found.value), valid=valid)
 
     # -- parts -------------------------------------------------------------------------------------------
 
@@ -150,9 +138,10 @@ class WatchedCondition:
         """Evaluate a part with the values of several components in this program, to which the values travel."""
         ports = {f"{name}.{port}": one for name in part.components
                  for port, one in self._components[name].pushes.items()}  # fmt: skip
-        checks = {**LIBRARY, **by_name(*(check for port in ports.values() for check in port.checks))}
         given = {**self._given, **first}
-        condition = ValueCondition(part.condition, ports, checks, given, hysteresis=self._margin(part))
+        condition = ValueCondition(
+            part.condition, ports, checks_of(ports.values()), given, hysteresis=self._margin(part)
+        )
         failed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
         async def replace_values(values: dict[str, Any]) -> None:

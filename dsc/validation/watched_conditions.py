@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from dsc.components.value_conditions import WATCH
 from dsc.errors import Finding
 from dsc.model.actions import Trigger
-from dsc.sensing.condition_parts import parts_in, split, value_names
+from dsc.sensing.condition_parts import parts_in, require_values, split
 from dsc.validation.subject import Subject
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError
 from knowledge_base.language.checking.check import check, check_term
 from knowledge_base.language.syntax.expression import Constant, Expression, free_variables
 from knowledge_base.language.syntax.text import parse_condition
@@ -37,24 +37,22 @@ def _check(subject: Subject, trigger: str, text: str) -> None:
     own = "" if trigger == SEVERAL else f"{component}."
     if own and component not in subject.interfaces:
         return
-    _require_values(subject, condition, own)
+    if subject.interfaces:
+        require_values(
+            condition, _ports(subject, own), f"component '{component}' pushes no" if own else "no component pushes a"
+        )
     if not own and subject.schema is not None:
         _require_knowledge(subject, condition)
 
 
-def _require_values(subject: Subject, condition: Expression, own: str) -> None:
-    """Raise `UnknownNameError` for a value or port that no component, or the `own` one, pushes."""
-    ports = {
+def _ports(subject: Subject, own: str) -> dict[str, Collection[str]]:
+    """Return the values of the ports of all components; with `own`, those of one, without its name."""
+    return {
         f"{name}.{port}".removeprefix(own): service.gives
         for name, interface in subject.interfaces.items()
         for port, service in interface.pushes.items()
         if f"{name}.".startswith(own)
     }
-    valid = [f"{port}.{value}" for port, values in ports.items() for value in values]
-    for name in value_names(condition) if subject.interfaces else ():
-        if name.value not in valid and name.value not in ports:
-            who = f"component '{own[:-1]}' pushes no" if own else "no component pushes a"
-            raise UnknownNameError(f"{who} value '{name.value}'", found=str(name.value), valid=valid)
 
 
 def _require_knowledge(subject: Subject, condition: Expression) -> None:

@@ -79,7 +79,7 @@ def picture_of(world: View, thing: str | None, hops: int, most: int) -> Picture:
         UnknownNameError: the object is unknown.
     """
     types = world.nodes()
-    kinds = {one.name: one.kind for one in (*world.schema.predicates.values(), *world.schema.functions.values())}
+    kinds = world.schema.kinds
     said = [_said(fact, types, kinds) for fact in world.facts()]
     said += [_said(fluent, types, kinds, f"= {_content(content)}") for fluent, content in world.values().items()]
     if thing is None:

@@ -28,7 +28,7 @@ class WorldGraph:
     def __init__(self, state: WorldState) -> None:
         declared = {**state.schema.predicates, **state.schema.functions}
         self._arcs = frozenset(name for name, signature in declared.items() if _is_arc(signature))
-        self._kinds = {name: {"kind": one.kind} if one.kind else {} for name, one in declared.items()}
+        self._kinds = {name: {"kind": kind} if kind else {} for name, kind in state.schema.kinds.items()}
         self._things = {name: _thing_positions(signature) for name, signature in declared.items()}
         self._graph: Graph = nx.MultiDiGraph()
         self.view: Graph = self._graph.copy(as_view=True)

@@ -150,6 +150,11 @@ class Schema:
         """
         return replace(self, functional=self.functional.union(predicates))
 
+    @property
+    def kinds(self) -> dict[str, str]:
+        """The kinds of arcs by predicate and function; empty for a declaration without a kind."""
+        return {one.name: one.kind for one in (*self.predicates.values(), *self.functions.values())}
+
     def merged(self, other: Schema) -> Schema:
         """Return a schema with the declarations of both schemas.
 

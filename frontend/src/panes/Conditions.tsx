@@ -3,9 +3,8 @@
 import type { Condition } from "../core/conditions";
 import { session } from "../session";
 import { useMoment } from "../turn";
+import { TRUTH } from "./parts";
 import { seconds } from "./Timeline";
-
-const SIGNS = new Map<unknown, [string, string]>([[true, ["✓", "true"]], [false, ["✕", "false"]]]);
 
 export function Conditions() {
   const { conditions } = useMoment();
@@ -40,7 +39,7 @@ function One({ seq, one }: { seq: number; one: Condition }) {
 }
 
 function Term({ text, truth }: { text: string; truth: unknown }) {
-  const [sign, said] = SIGNS.get(truth) ?? ["?", "unknown"];
+  const [sign, said] = TRUTH.get(truth) ?? ["?", "unknown"];
   return (
     <div className={`leaf ${said}`} aria-label={`${text} is ${said}`}>
       <span className="sign" aria-hidden="true">{sign}</span>

@@ -1,9 +1,9 @@
 /** What is known: facts with a filter in the one language, what changed, what is said of a thing. */
 
-import { useEffect, useMemo, useState } from "react";
+import { useMemo, useState } from "react";
 import { deciding } from "../core/explanations";
 import { written, type Fact, type KnowledgeRec, type Value } from "../core/records";
-import { query, type Answer } from "../link/requests";
+import { useAnswer } from "../link/useAnswer";
 import { session, useKind, useSelection } from "../session";
 import { useMoment } from "../turn";
 import { Neighbourhood, SMALL } from "./Neighbourhood";
@@ -11,6 +11,7 @@ import { changed, RecordLink, Tree } from "./parts";
 
 const MOST = 300;
 const CHANGES = 25;
+const NO_PARAMS = {};
 const VIEWS = ["facts", "changes"] as const;
 
 export function Knowledge() {
@@ -92,20 +93,7 @@ function Feed() {
 
 /** What the program answers, asked anew for each moment. */
 function Answers({ seq, text }: { seq: number; text: string }) {
-  const [said, setSaid] = useState<{ answer?: Answer; wrong?: string } | null>(null);
-  useEffect(() => {
-    let wanted = true;
-    const timer = setTimeout(() => {
-      query(seq, text).then(
-        (answer) => wanted && setSaid({ answer }),
-        (error: Error) => wanted && setSaid({ wrong: error.message }),
-      );
-    }, 150);
-    return () => {
-      wanted = false;
-      clearTimeout(timer);
-    };
-  }, [seq, text]);
+  const said = useAnswer(seq, text, NO_PARAMS);
   if (said === null) return null;
   if (said.answer === undefined) return <p className="bad note" role="alert">{said.wrong}</p>;
   const { answer } = said;

@@ -123,7 +123,7 @@ export function Causes({ seq }: { seq: number }) {
   );
 }
 
-const TRUTH = new Map<unknown, [string, string]>([[true, ["✓", "true"]], [false, ["✕", "false"]]]);
+export const TRUTH = new Map<unknown, [string, string]>([[true, ["✓", "true"]], [false, ["✕", "false"]]]);
 
 /** A condition as a tree: each part with its truth, the one that decided marked. */
 export function Tree({ why, decider }: { why: Explanation; decider: Explanation }) {

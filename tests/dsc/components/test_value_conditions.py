@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
+from counting_transport import CountingTransport
 from dsc_charts import plot
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,7 +21,6 @@ from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
-from dsc.wire.endpoint import LocalTransport
 from dsc.wire.host import Host
 from dsc.wire.remote import RemoteComponent
 from knowledge_base.errors import InputError, UnknownNameError
@@ -75,16 +75,6 @@ PLOT = """
 """
 
 
-class Counting(LocalTransport):
-    def __init__(self):
-        super().__init__()
-        self.frames = 0
-
-    def deliver(self, sender, to, frame):
-        self.frames += 1
-        super().deliver(sender, to, frame)
-
-
 def ran(condition, script, *, far=False, **options):
     """The flips as times and truths, the last values, and the frames; the sensor is here or hosted elsewhere."""
     written = {"condition": f'"{condition}"', **options}
@@ -96,7 +86,7 @@ def ran(condition, script, *, far=False, **options):
     text = text.replace("on: {played: f}", "on: {played: {emit: played}}").replace(", f: {final: true}", "")
 
     async def main():
-        clock, transport, hand = LoopClock(), Counting(), Hand(script)
+        clock, transport, hand = LoopClock(), CountingTransport(), Hand(script)
         host: Host | None = None
         component: Component = hand
         if far:

@@ -6,6 +6,7 @@ import asyncio
 from itertools import pairwise
 
 import pytest
+from counting_transport import CountingTransport
 from dsc_charts import plot
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -19,7 +20,6 @@ from dsc.outcomes import Outcome
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.sequencer.sequencer import Sequencer
 from dsc.skills import skill
-from dsc.wire.endpoint import LocalTransport
 from dsc.wire.host import Host
 from dsc.wire.remote import RemoteComponent
 from knowledge_base.language.syntax.text import parse_condition
@@ -97,23 +97,13 @@ PLOT = """
 """
 
 
-class Counting(LocalTransport):
-    def __init__(self):
-        super().__init__()
-        self.frames = 0
-
-    def deliver(self, sender, to, frame):
-        self.frames += 1
-        super().deliver(sender, to, frame)
-
-
 def run(condition, script, *, far=False, **options):
     """Return the flips as times and truths, the emitted events, and the number of frames; sources may be remote."""
     written = [f"condition: '\"{condition}\"'", *(f"{key}: {value}" for key, value in options.items())]
     text = PLOT % ("{" + ", ".join(written) + "}")
 
     async def main():
-        clock, transport, knowledge = LoopClock(), Counting(), KnowledgeBase(SCHEMA)
+        clock, transport, knowledge = LoopClock(), CountingTransport(), KnowledgeBase(SCHEMA)
         devices: dict[str, Component] = {"hand": Hand(), "wrist": Wrist()}
         hosts = [Host(one, transport, clock) for one in devices.values()] if far else []
         sources = [await RemoteComponent.connect(name, transport) for name in devices] if far else devices.values()
