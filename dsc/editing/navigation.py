@@ -60,8 +60,7 @@ def references(view: View, offset: int) -> list[Range]:
 
 def hover(view: View, offset: int) -> str:
     """Return the text about the name or key at an offset, in Markdown; empty without any."""
-    names = view.index.around(view.page.file, offset)
-    if names and (text := _about(view, names)):
+    if text := about_name(view, offset):
         return text
     key = next((path for path, (begin, end) in view.page.spans.keys.items() if begin <= offset <= end), None)
     if key is None or not view.page.fresh:
@@ -72,7 +71,11 @@ def hover(view: View, offset: int) -> str:
     return f"`{key[-1]}`: {about}" if about else ""
 
 
-def _about(view: View, names: list[Occurrence]) -> str:
+def about_name(view: View, offset: int) -> str:
+    """Return the text about the name at an offset, in Markdown; empty without any."""
+    names = view.index.around(view.page.file, offset)
+    if not names:
+        return ""
     name = names[0]
     if name.kind == "skill":
         skill = view.facts.skill(name.name)

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
-import json
 import os
-import signal
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from dsc.editing.diagnostics import FileFinding
+from dsc.editing.project_command import ProjectCommand
 from dsc.editing.project_facts import ProjectFacts
-from knowledge_base.errors import InputError
 
 PATIENCE_S = 120.0
-"""Maximum time of an examination, in seconds; user code may not end."""
+"""Maximum time of an examination, in seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,14 +47,12 @@ class Examiner:
     """A command that examines projects, each in a new process, so that it reads the present Python code.
 
     Args:
-        command: the command, to which the target of the project is added. It reads unsaved texts and writes JSON, as
-            `planning.cli.examination` does.
+        command: the command, see `dsc.editing.project_command`.
         seconds: time limit of an examination.
     """
 
     def __init__(self, command: Sequence[str], seconds: float = PATIENCE_S) -> None:
-        self._command = tuple(command)
-        self._seconds = seconds
+        self._command = ProjectCommand(command, seconds, "the check of the project")
 
     async def examine(self, project: Project, texts: Mapping[Path, str]) -> Examined:
         """Return the findings and facts of a project; a cancelled call ends the process.
@@ -70,28 +64,6 @@ class Examiner:
         Raises:
             InputError: the process failed, or exceeded the time limit.
         """
-        process = await asyncio.create_subprocess_exec(
-            *self._command, project.target, cwd=project.root, start_new_session=True,
-            stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-        )  # fmt: skip
-        given = json.dumps({str(file): text for file, text in texts.items()}).encode()
-        try:
-            async with asyncio.timeout(self._seconds):
-                out, problem = await process.communicate(given)
-        except TimeoutError:
-            raise InputError(f"the check of the project took longer than {self._seconds:g} s") from None
-        finally:
-            if process.returncode is None:
-                with suppress(ProcessLookupError):
-                    os.killpg(process.pid, signal.SIGKILL)
-                await process.wait()
-        if process.returncode:
-            raise InputError(f"the check of the project failed: {_last_line(problem)}")
-        form = json.loads(out)
+        form = await self._command.run(project.root, texts, project.target)
         findings = tuple(FileFinding.read(one, project.root) for one in form["findings"])
         return Examined(findings, ProjectFacts.read(form["facts"]))
-
-
-def _last_line(text: bytes) -> str:
-    lines = text.decode("utf-8", "replace").strip().splitlines()
-    return lines[-1] if lines else "no reason was written"

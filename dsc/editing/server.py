@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcInvalidParams
@@ -15,7 +16,9 @@ from dsc.editing import navigation
 from dsc.editing.checks import Checks
 from dsc.editing.completion import Proposal, complete, word_before
 from dsc.editing.diagnostics import Diagnostic
+from dsc.editing.goals import goal_at, goals_of
 from dsc.editing.lines import Lines, Spot
+from dsc.editing.plans import Plans
 from dsc.editing.projects import Examiner, Project
 from dsc.editing.renaming import rename_at
 from dsc.editing.surgery.text_edits import TextEdit
@@ -23,6 +26,8 @@ from dsc.editing.view import View
 from dsc.editing.workspace import Workspace, text_of
 from knowledge_base.errors import InputError
 
+PLAN_COMMAND = "dsc.plan"
+"""The command that plans the goal at a position: its arguments are a URI and a position."""
 _SOURCE = "dsc"
 _LEVELS = {"error": lsp.DiagnosticSeverity.Error, "warning": lsp.DiagnosticSeverity.Warning}
 
@@ -45,18 +50,25 @@ class Server(LanguageServer):
     Args:
         find: returns the project around a file.
         examiner: examines projects in other processes.
+        plans: plans goals in other processes.
         findings_page: the page with a section for each code of findings, to which diagnostics refer.
     """
 
     def __init__(
-        self, find: Callable[[Path], Project | None], examiner: Examiner, findings_page: Path | None = None
+        self,
+        find: Callable[[Path], Project | None],
+        examiner: Examiner,
+        plans: Plans,
+        findings_page: Path | None = None,
     ) -> None:
         super().__init__("dsc", version("dynamic-state-charts"))
         self.checks = Checks(find, examiner.examine, self._publish, self._report)
+        self.plans = plans
         self.findings_page = findings_page
         self._workspace = Workspace()
         add_text_features(self)
         add_answers(self)
+        add_plan_view(self)
 
     def view(self, file: Path) -> View:
         """Return the page of a file, with the pages and facts of its project."""
@@ -65,6 +77,13 @@ class Server(LanguageServer):
         root = file.parent if project is None else project.root
         pages = [page] if project is None else self._workspace.pages(root, texts)
         return View(page, tuple(pages), self.checks.facts(file), root)
+
+    async def plan_at(self, view: View, offset: int) -> dict[str, Any] | None:
+        """Return the plan of the goal around an offset, see `Plans.plan`; `None` without a goal."""
+        goal, file = goal_at(view.page, offset), view.page.file
+        if goal is None:
+            return None
+        return await self.plans.plan(file, goal, self.checks.project(file), self.checks.texts)
 
     def _publish(self, file: Path, version: int | None, found: list[Diagnostic]) -> None:
         items = [_diagnostic(one, self._page(file)) for one in found]
@@ -105,14 +124,14 @@ def add_text_features(server: Server) -> None:
     @server.feature(lsp.SHUTDOWN)
     async def stop(_: None) -> None:
         await server.checks.stop()
+        await server.plans.stop()
 
 
 def add_answers(server: Server) -> None:
     """Let the server answer questions about positions in the editor's texts."""
 
     def question(given: _Asking) -> tuple[View, int]:
-        view = server.view(path_of(given.text_document.uri))
-        return view, Lines(view.page.text).offset(Spot(given.position.line, given.position.character))
+        return _material(server, given.text_document.uri, given.position)
 
     @server.feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=[" ", "(", "?", "{", "."]))
     def answer_completion(given: lsp.CompletionParams) -> lsp.CompletionList:
@@ -120,8 +139,10 @@ def add_answers(server: Server) -> None:
         return lsp.CompletionList(is_incomplete=False, items=_items(complete(view, offset), view.page.text, offset))
 
     @server.feature(lsp.TEXT_DOCUMENT_HOVER)
-    def answer_hover(given: lsp.HoverParams) -> lsp.Hover | None:
-        text = navigation.hover(*question(given))
+    async def answer_hover(given: lsp.HoverParams) -> lsp.Hover | None:
+        view, offset = question(given)
+        plan = None if navigation.about_name(view, offset) else await server.plan_at(view, offset)
+        text = navigation.hover(view, offset) if plan is None else f"**Plan**\n\n```text\n{plan['text']}\n```"
         return lsp.Hover(lsp.MarkupContent(lsp.MarkupKind.Markdown, text)) if text else None
 
     @server.feature(lsp.TEXT_DOCUMENT_DEFINITION)
@@ -155,6 +176,32 @@ def add_answers(server: Server) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions([lsp.CodeActionKind.QuickFix]))
     def answer_fixes(given: lsp.CodeActionParams) -> list[lsp.CodeAction]:
         return [fix for one in given.context.diagnostics for fix in _fixes(given.text_document.uri, one)]
+
+
+def add_plan_view(server: Server) -> None:
+    """Let the server plan goals: the command `dsc.plan`, and a code lens above each goal that executes the command."""
+
+    @server.feature(lsp.TEXT_DOCUMENT_CODE_LENS)
+    def answer_lenses(given: lsp.CodeLensParams) -> list[lsp.CodeLens]:
+        uri = given.text_document.uri
+        page = server.view(path_of(uri)).page
+        spots = [_position(Lines(page.text).spot(goal.begin)) for goal in goals_of(page)]
+        return [lsp.CodeLens(lsp.Range(at, at), lsp.Command("Plan", PLAN_COMMAND, arguments=[uri, at])) for at in spots]
+
+    @server.command(PLAN_COMMAND)
+    async def answer_plan(uri: str, position: lsp.Position) -> dict[str, Any]:
+        view, offset = _material(server, uri, position)
+        plan = await server.plan_at(view, offset)
+        if plan is None:
+            raise JsonRpcInvalidParams(f"there is no goal in line {position.line + 1} of {view.page.file}")
+        server.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Info, plan["text"]))
+        return plan
+
+
+def _material(server: Server, uri: str, position: lsp.Position) -> tuple[View, int]:
+    """Return the material of an answer, and the offset of a position."""
+    view = server.view(path_of(uri))
+    return view, Lines(view.page.text).offset(Spot(position.line, position.character))
 
 
 def _fixes(uri: str, found: lsp.Diagnostic) -> Iterator[lsp.CodeAction]:

@@ -97,7 +97,7 @@ def text_of(file: Path, texts: Mapping[Path, str]) -> str:
 def lines_in_python(root: Path, pattern: str) -> Iterator[tuple[Path, int]]:
     """Yield file and line, from 1, of each line of a folder's Python code that has a pattern."""
     found = re.compile(pattern)
-    for file in sorted(_walk(root, {".py"})):
+    for file in sorted(files_in(root, {".py"})):
         for number, line in enumerate(readable_text(file).splitlines(), 1):
             if found.search(line):
                 yield file, number
@@ -105,10 +105,11 @@ def lines_in_python(root: Path, pattern: str) -> Iterator[tuple[Path, int]]:
 
 def _files(root: Path, texts: Mapping[Path, str]) -> set[Path]:
     opened = {file for file in texts if file.suffix in _ENDINGS and root in file.parents}
-    return opened | set(_walk(root, _ENDINGS))
+    return opened | set(files_in(root, _ENDINGS))
 
 
-def _walk(root: Path, endings: set[str] | frozenset[str]) -> Iterator[Path]:
+def files_in(root: Path, endings: set[str] | frozenset[str]) -> Iterator[Path]:
+    """Yield the files with these endings in a folder, without those of hidden folders and of builds."""
     for folder, folders, files in os.walk(root):
         folders[:] = [one for one in folders if not one.startswith(".") and one not in _SKIPPED]
         yield from (Path(folder) / one for one in files if Path(one).suffix in endings)

@@ -7,9 +7,6 @@ process for each examination executes the present Python code of the project.
 
 from __future__ import annotations
 
-import json
-import logging
-import os
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
@@ -22,8 +19,8 @@ from dsc.skills import SkillSignature
 from knowledge_base.errors import DscError, collecting, tolerated
 from knowledge_base.exchange import schema_form
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
-from knowledge_base.pddl.unsaved_texts import unsaved_texts
 from knowledge_base.store import KnowledgeBase
+from planning.cli.editor_process import answer_editor
 from planning.robot.bringup import begin, simulated
 from planning.robot.bundles import Bundle, components_of, gathered
 from planning.robot.checking import check_project
@@ -127,14 +124,7 @@ def _problems(target: str) -> Iterable[Path]:
 
 def main() -> None:
     """Examine the target of the command line, with the texts on standard input."""
-    answers = os.dup(1)
-    os.dup2(2, 1)  # the project's code may print
-    logging.disable()  # each programming error is a finding
-    texts = {Path(file): text for file, text in json.load(sys.stdin).items()}
-    with unsaved_texts(texts):
-        answer = json.dumps(examination(sys.argv[1]))
-    with os.fdopen(answers, "w", encoding="utf-8") as out:
-        out.write(answer)
+    answer_editor(lambda: examination(sys.argv[1]))
 
 
 if __name__ == "__main__":

@@ -20,9 +20,11 @@ def lsp_command() -> None:
             raise
         message = "dsc lsp needs pygls: pip install 'dynamic-state-charts[edit]'"
         raise InputError(message, found=error.name) from None
+    from dsc.editing.plans import Plans
     from dsc.editing.projects import Examiner
     from planning.robot.project_search import project_around
 
     page = Path(__file__).parents[2] / "docs" / "findings.md"
     examiner = Examiner([sys.executable, "-m", "planning.cli.examination"])
-    Server(project_around, examiner, page if page.is_file() else None).start_io()
+    plans = Plans([sys.executable, "-m", "planning.cli.goal_planning"])
+    Server(project_around, examiner, plans, page if page.is_file() else None).start_io()

@@ -45,7 +45,9 @@ def end(status: int, answer: dict[str, Any], notes: list[str], *, as_json: bool)
     """Print the answer, print the notes on standard error, and exit with `status`."""
     for note in () if as_json else notes:
         typer.echo(f"note: {note}", err=True)
-    typer.echo(json.dumps(answer | {"notes": notes}) if as_json else _text(answer), err=status != FOUND and not as_json)
+    typer.echo(
+        json.dumps(answer | {"notes": notes}) if as_json else describe(answer), err=status != FOUND and not as_json
+    )
     raise typer.Exit(status)
 
 
@@ -87,7 +89,8 @@ def purposes(order: PartialOrder) -> dict[str, Any]:
     return {"purposes": purposes}
 
 
-def _text(answer: Mapping[str, Any]) -> str:
+def describe(answer: Mapping[str, Any]) -> str:
+    """Return an answer as text for users."""
     match answer["outcome"]:
         case "plan":
             return _plan_text(answer) if answer["steps"] else "nothing to do: the goal already holds"

@@ -53,14 +53,9 @@ def plan(
     try:
         problem, outcome = solved(domain, read, world, seconds, engine)
     except WorkLimitError as error:
-        late: dict[str, Any] = {"outcome": "timed_out", "steps": [], "engine": None, "seconds": seconds}
-        end(TIMED_OUT, late | {"while": error.doing}, notes, as_json=as_json)
+        end(TIMED_OUT, late(error, seconds), notes, as_json=as_json)
     notes += problem.notes
-    status, answer = answer_of(outcome)
-    if isinstance(outcome, Unsupported):
-        answer["reason"] = why_no_engine(domain, read.goal, outcome)
-    if isinstance(outcome, ProvenUnsolvable) and explain:
-        answer["why"] = why_none(domain, read, world, seconds)
+    status, answer = reason_of(outcome, domain, read, world, seconds if explain else None)
     if isinstance(outcome, PlanFound):
         plan = outcome.plan
         notes += valueless(plan, domain, read)
@@ -71,6 +66,23 @@ def plan(
         if output is not None:
             output.write(_plot_text(outcome.plan, domain, order if parallel else None))
     end(status, answer, notes, as_json=as_json)
+
+
+def late(error: WorkLimitError, seconds: float) -> dict[str, Any]:
+    """Return the answer after the time limit has ended the construction of the problem."""
+    return {"outcome": "timed_out", "steps": [], "engine": None, "seconds": seconds, "while": error.doing}
+
+
+def reason_of(
+    outcome: PlanningOutcome, domain: PlanningDomain, read: ProblemText, world: KnowledgeBase, seconds: float | None
+) -> tuple[int, dict[str, Any]]:
+    """Return exit status and answer for an outcome; `seconds` limits the search for the reasons why no plan exists."""
+    status, answer = answer_of(outcome)
+    if isinstance(outcome, Unsupported):
+        answer["reason"] = why_no_engine(domain, read.goal, outcome)
+    if isinstance(outcome, ProvenUnsolvable) and seconds is not None:
+        answer["why"] = why_none(domain, read, world, seconds)
+    return status, answer
 
 
 def _order(plan: Plan, domain: PlanningDomain, world: KnowledgeBase, goal: Expression) -> PartialOrder:
@@ -104,12 +116,22 @@ def read_files(files: list[Path]) -> tuple[PlanningDomain, ProblemText, Knowledg
         raise InputError(f"dsc plan takes a domain and a problem, there is only '{files[0]}'")
     *fragments, file = files
     domain = PlanningDomain.from_fragments(fragments)
+    read, world = read_world(file, domain)
+    return domain, read, world
+
+
+def read_world(file: Path, domain: PlanningDomain) -> tuple[ProblemText, KnowledgeBase]:
+    """Return the problem of a file, and the world of its initial state.
+
+    Raises:
+        InputError: the file cannot be read or contains an error, or the problem has no goal.
+    """
     read = without_derived(read_problem(file, domain.schema, domain=domain.name), domain, file)
     if not read.has_goal:
         raise InputError("the problem has no goal: (:goal CONDITION)", place=Place(str(file), 1))
     world = KnowledgeBase(domain.schema)
     world.apply(read.delta(), author=str(file))
-    return domain, read, world
+    return read, world
 
 
 def solved(
