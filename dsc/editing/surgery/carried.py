@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from dsc.editing.surgery.sheet import Sheet
@@ -21,6 +21,7 @@ class Carried:
         column: the column of the key or dash; of a mapping or list in lines, the column of its first part.
         in_lines: whether the value is a mapping or list without brackets.
         flow: the text of the value for a place inside brackets; `None` if its comments have no place there.
+        above: the comments directly above the entry, each without indentation and line break.
     """
 
     head: str
@@ -28,6 +29,7 @@ class Carried:
     column: int
     in_lines: bool
     flow: str | None
+    above: tuple[str, ...] = ()
 
     @classmethod
     def of_data(cls, value: Any) -> Carried:
@@ -61,6 +63,16 @@ class Carried:
         head, *lines = text.splitlines(keepends=True)
         return cls(head.rstrip(), tuple(lines), sheet.column(begin), in_lines=True, flow=kept)
 
+    @classmethod
+    def of_part(cls, sheet: Sheet, path: FormPath) -> Carried:
+        """Return an entry of a text with the comments that move with it."""
+        carried = cls.of_entry(sheet, path)
+        if sheet.in_brackets(path[:-1]):
+            return carried
+        above = sheet.text[sheet.lead(path) : sheet.begin(path)].splitlines()
+        comments = tuple(one.strip() for one in above if one.strip())
+        return replace(carried, above=comments, flow=None) if comments else carried
+
     def inside(self, key: str | int, *, is_item: bool) -> Carried:
         """Return a mapping or list whose only entry is this value."""
         flow = None
@@ -74,7 +86,8 @@ class Carried:
 
     def entry(self, key: str | int, *, is_item: bool, column: int) -> str:
         """Return the lines of an entry at a column, without the indentation of the first line and the last break."""
-        return ("-" if is_item else f"{inline(key)}:") + self.value(is_item=is_item, column=column)
+        above = "".join(f"{one}\n{' ' * column}" for one in self.above)
+        return above + ("-" if is_item else f"{inline(key)}:") + self.value(is_item=is_item, column=column)
 
     def value(self, *, is_item: bool, column: int) -> str:
         """Return the text after the colon or dash of an entry at a column, without the last break."""

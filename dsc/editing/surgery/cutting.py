@@ -11,7 +11,7 @@ from dsc.model.reading import FormPath
 
 
 def cut(sheet: Sheet, path: FormPath) -> str:
-    """Return the text without an entry; comments above the entry stay."""
+    """Return the text without an entry; in lines, the comments directly above are a part of it."""
     if len(part(sheet.data, path[:-1])) == 1:
         return _empty(sheet, path)
     return _cut_in_brackets(sheet, path) if sheet.in_brackets(path[:-1]) else _cut_in_lines(sheet, path)
@@ -20,7 +20,7 @@ def cut(sheet: Sheet, path: FormPath) -> str:
 def _cut_in_lines(sheet: Sheet, path: FormPath) -> str:
     begin = sheet.begin(path)
     if sheet.owns_line(path):
-        return _without(sheet.text, sheet.line_start(begin), sheet.stop(path))
+        return _without(sheet.text, sheet.lead(path), sheet.stop(path))
     _, after = sheet.siblings(path)  # the first part of a mapping or list behind a dash
     end = sheet.end(path)
     to = end if after is None or sheet.has_comment(end, sheet.begin(after)) else sheet.begin(after)
@@ -51,7 +51,7 @@ def _empty(sheet: Sheet, path: FormPath) -> str:
         return _without(sheet.text, begin, sheet.text.index(",", end) + 1 if comma else end)
     if not sheet.owns_line(path):
         return sheet.text[:begin] + empty + sheet.text[end:]
-    begin, stop, anchor = sheet.line_start(begin), sheet.stop(path), sheet.value_begin(around)
+    begin, stop, anchor = sheet.lead(path), sheet.stop(path), sheet.value_begin(around)
     return f"{sheet.text[:anchor]} {empty}{sheet.text[anchor:begin]}{sheet.text[stop:]}"
 
 
@@ -75,15 +75,15 @@ def put(sheet: Sheet, around: FormPath, key: str | int, at: int, carried: Carrie
         if at == 0:
             return _with(sheet.text, sheet.begin((*around, keys[0])), f"{entry}, ")
         return _with(sheet.text, _after_entry(sheet, (*around, keys[at - 1])), f", {entry}")
-    first = sheet.begin((*around, keys[0]))
-    column = sheet.column(first)
+    first = (*around, keys[0])
+    column = sheet.column(sheet.begin(first))
     lines = carried.entry(key, is_item=is_item, column=column)
-    if at == 0:
-        return _with(sheet.text, first, f"{lines}\n{' ' * column}")
-    stop = sheet.stop((*around, keys[at - 1]))
-    if sheet.text[:stop].endswith("\n"):
-        return _with(sheet.text, stop, f"{' ' * column}{lines}\n")
-    return _with(sheet.text, stop, f"\n{' ' * column}{lines}")
+    if at == 0 and not sheet.owns_line(first):
+        return _with(sheet.text, sheet.begin(first), f"{lines}\n{' ' * column}")
+    place = sheet.lead(first) if at == 0 else sheet.stop((*around, keys[at - 1]))
+    if at == 0 or sheet.text[:place].endswith("\n"):
+        return _with(sheet.text, place, f"{' ' * column}{lines}\n")
+    return _with(sheet.text, place, f"\n{' ' * column}{lines}")
 
 
 def _fill(sheet: Sheet, around: FormPath, key: str | int, carried: Carried, *, is_item: bool) -> str:
@@ -93,7 +93,7 @@ def _fill(sheet: Sheet, around: FormPath, key: str | int, carried: Carried, *, i
         begin = end = sheet.end(around)
     after = sheet.rest_of_line(end)
     parent = around[:-1]
-    if carried.in_lines and around and not after.strip() and not sheet.in_brackets(parent):
+    if (carried.in_lines or carried.above) and around and not after.strip() and not sheet.in_brackets(parent):
         column = sheet.column(sheet.begin(around)) + 2
         lines = carried.entry(key, is_item=is_item, column=column)
         return f"{sheet.text[:begin].rstrip(' ')}\n{' ' * column}{lines}{sheet.text[end:]}"

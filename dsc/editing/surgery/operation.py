@@ -65,7 +65,7 @@ def _operate(sheet: Sheet, edit: Add | Remove | Replace | Move) -> str:
             return _replace(sheet, real_path(sheet.data, path), value)
         case Move(path, to, before):
             real = real_path(sheet.data, path)
-            return _insert(Sheet(cut(sheet, real)), to, Carried.of_entry(sheet, real), before)
+            return _insert(Sheet(cut(sheet, real)), to, Carried.of_part(sheet, real), before)
 
 
 def _insert(sheet: Sheet, path: FormPath, carried: Carried, before: str | int | None) -> str:

@@ -74,6 +74,19 @@ class Sheet:
             stop = found.end()
         return stop
 
+    def lead(self, path: FormPath) -> int:
+        """Return where an entry in lines begins with its comments: those directly above, at its column."""
+        begin = self.begin(path)
+        if not self.owns_line(path):
+            return begin
+        column, lead = self.column(begin), self.line_start(begin)
+        while lead and (found := _OWN_COMMENT.fullmatch(self.text, self.line_start(lead - 1), lead)):
+            at = found.end(1)
+            if len(found[1]) != column or not self.has_comment(at, at + 1):
+                break
+            lead = found.start()
+        return lead
+
     def column(self, offset: int) -> int:
         """Return the number of characters before an offset in its line."""
         return offset - self.line_start(offset)

@@ -88,6 +88,47 @@ def test_a_state_moved_into_another_with_its_comments():
     )
 
 
+COMMENTED = """\
+plot: tour
+states:
+  # Apart.
+
+  # The way,
+  # in two lines.
+  go:   # by day
+    # Inside.
+    on: {arrived: over}   # at last
+    # The end of the way.
+  # No state is below.
+
+  # The end.
+  over: {final: true}
+"""
+WAY = COMMENTED[COMMENTED.index("  # The way,") : COMMENTED.index("  # No state")]
+
+
+def test_a_removed_state_takes_the_comments_directly_above_and_at_its_lines():
+    text = apply(COMMENTED, Add(("states", "stay"), {"final": True}, before="go"))
+    assert text == COMMENTED.replace(WAY, "  stay: {final: true}\n" + WAY)
+    assert apply(text, Remove(("states", "go"))) == text.replace(WAY, "")
+
+
+def test_a_moved_state_takes_the_comments_directly_above_and_at_its_lines():
+    text = apply(COMMENTED, Move(("states", "over"), ("states", "over"), before="go"))
+    end = "  # The end.\n  over: {final: true}\n"
+    assert text == COMMENTED.replace(end, "").replace(WAY, end + WAY)
+    text = apply(COMMENTED, Add(("states", "work"), {"entry": {"send": "a.b"}, "states": {"idle": {"final": True}}}))
+    inner = apply(text, Move(("states", "go"), ("states", "work", "states", "go")))
+    assert "".join(f"    {line}" for line in WAY.splitlines(keepends=True)) in inner
+
+
+def test_the_only_part_of_a_mapping_with_its_comments():
+    text = "plot: a\nemits:\n  # Apart.\n\n  # Gone.\n  gone: {}   # too\nstates: {b: {final: true}}\n"
+    assert apply(text, Remove(("emits", "gone"))) == text.replace("emits:", "emits: {}").replace(
+        "  # Gone.\n  gone: {}   # too\n", ""
+    )
+
+
 @pytest.mark.parametrize(
     ("edit", "said"),
     [
@@ -100,6 +141,7 @@ def test_a_state_moved_into_another_with_its_comments():
         (Replace(("states", "take", "entry", 0), {"sett": "arm.approach"}), "sett"),
         (Remove(("plot",)), "plot"),
         (Move(("states", "take", "entry", 0), ("states", "go", "entry", 0)), "no place inside brackets"),
+        (Move(("states", "go"), ("states", "over", "states", "go")), "no place inside brackets"),
     ],
 )
 def test_a_refused_edit(edit, said):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from meant_models import form_of, meant
 from random_plot_edits import Drawing
 
 from dsc.editing.surgery import Add, Move, Remove, Replace, apply, differences, patch
-from dsc.editing.surgery.edits import real_path, split
+from dsc.editing.surgery.edits import part, real_path, split
 from dsc.editing.surgery.sheet import Sheet
 from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
@@ -26,6 +27,7 @@ FILES = [
     if file.read_text("utf-8").startswith(("plot:", "#")) and "\nplot:" in "\n" + file.read_text("utf-8")
 ]
 EDITS = 30
+MARK = re.compile(r"# (apart|above|end) (\S+)$")
 
 
 def comments(sheet, lines=None):
@@ -50,7 +52,7 @@ def lines_at(sheet, path):
     """Return the lines of an entry; in brackets those of all entries, else the line above, which names the parts."""
     around = path[:-1]
     if sheet.in_lines(around):
-        own = lines_of(sheet, sheet.begin(path), sheet.stop(path))
+        own = lines_of(sheet, sheet.lead(path), sheet.stop(path))
         before, after = sheet.siblings(path)
         if before is None and after is None:
             return own | lines_of(sheet, sheet.begin(around), sheet.begin(path))
@@ -90,6 +92,45 @@ def check_comments(sheet, after, edit):
         assert lost <= comments(sheet, lines_at(sheet, real_path(sheet.data, edit.path)))
     else:
         assert not lost
+
+
+def commented(text):
+    """Return a plot with three comments for each part that has its own lines: apart, directly above, and at the end."""
+    sheet, lines = Sheet(text), text.splitlines()
+    for path in sorted({*sheet.spans.values} - {()}, key=sheet.begin, reverse=True):
+        if sheet.in_brackets(path[:-1]) or not sheet.owns_line(path):
+            continue
+        name = "/".join(map(str, path))
+        number = text.count("\n", 0, sheet.begin(path))
+        if lines[number].endswith(":"):
+            lines[number] += f"   # end {name}"
+        indentation = " " * sheet.column(sheet.begin(path))
+        lines[number:number] = [f"{indentation}# apart {name}", "", f"{indentation}# above {name}"]
+    return "\n".join(lines) + "\n"
+
+
+def marks(text, path):
+    """Return the lines with comments of `commented`: those that go with a part, and all others."""
+    name = "/".join(map(str, path))
+    found = [(line, match) for line in text.splitlines() if (match := MARK.search(line))]
+    own = [line for line, match in found if f"{match[2]}/".startswith(f"{name}/") and match[0] != f"# apart {name}"]
+    return own, [line for line, _ in found if line not in own]
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: f"{file.parts[-3]}-{file.stem}")
+@given(data=st.data())
+@settings(max_examples=3)
+def test_the_comments_of_a_removed_or_moved_state_and_of_all_others(file, data):
+    text = commented(file.read_text("utf-8"))
+    sheet = Sheet(text)
+    paths = [path for _, _, path in parse_plot(text).walk() if not sheet.in_brackets(path[:-1])]
+    path = data.draw(st.sampled_from([path for path in paths if sheet.siblings(path) != (None, None)]))
+    own, others = marks(text, path)
+    assert marks(apply(text, Remove(path)), path) == ([], others)
+    before = data.draw(st.sampled_from([one for one in part(sheet.data, path[:-1]) if one != path[-1]]))
+    moved = apply(text, Move(path, path, before))
+    assert marks(moved, path) == (own, others)
+    assert text[sheet.lead(path) : sheet.stop(path)] in moved
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: f"{file.parts[-3]}-{file.stem}")
