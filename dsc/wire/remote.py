@@ -253,7 +253,7 @@ class RemoteComponent(Component):
                 lost = "is gone: its program has ended, or cannot be reached"
                 self.life.become(
                     Life.FATAL_ERROR,
-                    f"'{self.name}' {lost if self._is_gone else f'has not answered for {SILENCE:g} s'}",
+                    f"'{self.name}' {lost if self._is_gone else _silent_for(SILENCE)}",
                 )
             await self._wait_for_presence(AGAIN)
 
@@ -437,9 +437,14 @@ class RemoteComponent(Component):
         try:
             return await self._endpoint.call(self.name, kind, said, within)
         except NoAnswerError as error:
+            reason = f"'{self.name}' {_silent_for(within)}"
             if self.life.state is Life.ALIVE:
-                self.life.become(Life.FATAL_ERROR, str(error))
-            raise
+                self.life.become(Life.FATAL_ERROR, reason)
+            raise NoAnswerError(reason) from error
+
+
+def _silent_for(seconds: float) -> str:
+    return f"has not answered for {seconds:g} s"
 
 
 def _do_nothing() -> None:
