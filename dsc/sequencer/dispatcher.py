@@ -174,9 +174,9 @@ class Dispatcher:
         )
 
     @property
-    def watching(self) -> bool:
-        """Whether a skill without a time limit is running, which may answer at any time, or never."""
-        return any(one.signature.unlimited for one in self._running.values())
+    def watching(self) -> Iterator[RunningSkill]:
+        """The skills and activated events without a time limit, which may answer at any time, or never."""
+        return (one for one in self._running.values() if math.isinf(one.due))
 
     def dispatch_all(self, outputs: Iterable[steps.Output]) -> None:
         """Execute the outputs of a macrostep."""

@@ -320,14 +320,15 @@ class Sequencer(OutsideInput):
     async def _news(self) -> None:
         """Wait for the next message, or for the end of the run; a deadlock is the problem of the run.
 
-        A skill that only watches, such as the monitor of a plan, ends in a deadlock if nothing else can happen.
+        A skill that only watches, such as the monitor of a plan, ends in a deadlock if nothing else can happen in
+        simulated time.
         """
         if self._is_deadlock():
             if not await self._delivers():
                 self._reactor.problem = self._deadlock()
             return
         arrival = self._inbox.arrival()
-        if self._open_ended or self.dispatcher.waiting or not self.dispatcher.watching:
+        if self._open_ended or self.dispatcher.waiting or not any(self.dispatcher.watching):
             await arrival
             return
         idle = self.clock.idle(self._until)
@@ -554,13 +555,14 @@ class Sequencer(OutsideInput):
         return True
 
     def _deadlock(self) -> str:
-        return "; ".join(["deadlock: no skill, timer or event is pending", *self.dispatcher.waits])
+        watching = (f"{one.describe()} waits for the outside (open_ended)" for one in self.dispatcher.watching)
+        return "; ".join(["deadlock: no skill, timer or event is pending", *self.dispatcher.waits, *watching])
 
     def _is_deadlock(self) -> bool:
         """Return whether no further message can arrive.
 
         Periods that have all changed nothing will never change anything.
         """
-        if self._open_ended or self.dispatcher.waiting or self.dispatcher.watching:
+        if self._open_ended or self.dispatcher.waiting or any(self.dispatcher.watching):
             return False
         return self.dispatcher.timers.periods <= self._reactor.in_vain

@@ -88,3 +88,66 @@ def test_the_name_of_the_handler_is_taken():
 def test_a_misspelt_skill_of_the_handler_is_a_finding():
     with pytest.raises(PlotError, match=r"did you mean 'conditions\.watch_truth'"):
         Robot(DOMAIN, [parse_plot(PLOT.replace("watch_truth", "watch_thruth"))], [Hand(), Wrist()])
+
+
+class Thermometer(Component):
+    name = "thermometer"
+    air = Push({"celsius": "number"})
+
+    async def start(self) -> None:
+        self.air.put(celsius=24)
+
+
+class WarmingThermometer(Component):
+    name = "thermometer"
+    air = Push({"celsius": "number"})
+    period = 1.0
+    celsius = 24
+
+    async def step(self) -> None:
+        self.celsius += 1
+        self.air.put(celsius=self.celsius)
+
+
+ALONE = """
+plot: p
+states:
+  w: {entry: {trigger: %s, with: %s}, on: {became_true: over, became_false: {}}}
+  over: {final: true}
+"""
+
+
+@pytest.mark.parametrize("source", [Thermometer, WarmingThermometer])
+@pytest.mark.parametrize("more", ["", ", hold: 3"])
+@pytest.mark.parametrize(
+    ("skill_name", "condition"),
+    [
+        ("conditions.watch_truth", "(> thermometer.air.celsius 20)"),
+        ("conditions.watch_truth", "(or (wanted) (silent thermometer.air 0.5))"),
+        ("thermometer.watch_values", "(> air.celsius 20)"),
+        ("thermometer.watch_values", "(silent air 0.5)"),
+    ],
+)
+def test_a_run_with_nothing_but_a_watched_condition(skill_name, condition, more, source):
+    if "silent" in condition and more and source is WarmingThermometer:
+        pytest.skip("this thermometer is never silent for three seconds")
+    text = ALONE % (skill_name, "{condition: '\"" + condition + "\"'" + more + "}")
+    with Robot(DOMAIN, [parse_plot(text)], [source()], clock="simulated") as it:
+        end = it.run("p", until=100)
+    assert end.reached, end
+
+
+def test_a_run_with_a_periodic_source_that_becomes_true_later():
+    text = ALONE % ("conditions.watch_truth", "{condition: '\"(> thermometer.air.celsius 30)\"'}")
+    with Robot(DOMAIN, [parse_plot(text)], [WarmingThermometer()], clock="simulated") as it:
+        assert it.run("p", until=100).reached
+
+
+def test_the_message_of_a_condition_that_nothing_can_make_true():
+    text = ALONE % ("conditions.watch_truth", "{condition: '\"(> thermometer.air.celsius 30)\"'}")
+    with Robot(DOMAIN, [parse_plot(text)], [Thermometer()], clock="simulated") as it:
+        end = it.run("p")
+    assert end.problem == (
+        "deadlock: no skill, timer or event is pending; "
+        "conditions.watch_truth of state 'w' waits for the outside (open_ended)"
+    )
