@@ -56,6 +56,8 @@ class Series:
         return at, _number(self.name, value)
 
 
+Point = Series | Sequence[float]
+"""A point: the newest value of a series, or a list."""
 Check = Callable[..., Any]
 """Function of series and constants that returns a number or a truth value."""
 
@@ -102,12 +104,16 @@ def magnitude(value: Series) -> float:
     return math.hypot(*value.numbers)
 
 
-def distance(value: Series, target: Series | Sequence[float]) -> float:
-    """Return the distance between two points: two values, or a value and a list."""
-    other = target.numbers if isinstance(target, Series) else [_number("the target", one) for one in target]
-    if len(other) != len(value.numbers):
-        raise InputError(f"'{value.name}' has {len(value.numbers)} numbers, and the target {len(other)}")
-    return math.dist(value.numbers, other)
+def distance(value: Point, target: Point) -> float:
+    """Return the distance between two points, each a value or a list."""
+    first, second = _point(value), _point(target)
+    if len(first) != len(second):
+        raise InputError(f"a distance is between points of equal size, not {len(first)} and {len(second)} numbers")
+    return math.dist(first, second)
+
+
+def _point(given: Point) -> list[float]:
+    return given.numbers if isinstance(given, Series) else [_number("a point", one) for one in given]
 
 
 def _number(name: str, value: Any) -> float:
@@ -123,3 +129,8 @@ def by_name(*checks: Check) -> Mapping[str, Check]:
 
 LIBRARY = by_name(change, rate, differs, approaches, in_range, mean, magnitude, distance)
 """The checks of all components by name; `(silent port seconds)` is a further one, which depends on time."""
+ARGUMENT_KINDS: Mapping[Check, str] = {
+    **dict.fromkeys((change, rate, approaches, in_range, mean), "number"),
+    **dict.fromkeys((magnitude, distance), "list"),
+}
+"""The kind of all arguments of a check; the arguments of other checks may have any kind."""

@@ -22,7 +22,7 @@ from dsc.components.requirement import Requirement
 from dsc.components.services import Service
 from dsc.components.streams import Push
 from dsc.components.turns import Turns
-from dsc.components.value_conditions import WATCH, declare_watch
+from dsc.components.value_conditions import WATCH, declare_watch, own_checks
 from dsc.data_types import check_all, data_type
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
@@ -364,7 +364,10 @@ class Component(ComponentHooks, RestartHooks):
         own = type(self).receive is Component.receive
         methods = plain_methods(type(self)) - plain_methods(Component)
         messages = self._taken() if own else None
-        return Interface(self.parameters.declared, self.modes, messages, methods, self._required, self._push_services())
+        checks = None if self.is_remote else own_checks(self.pushes.values())
+        return Interface(
+            self.parameters.declared, self.modes, messages, methods, self._required, self._push_services(), checks
+        )
 
     def _push_services(self) -> Mapping[str, Service]:
         if self.pushes.keys() == self._offered.keys():

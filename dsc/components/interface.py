@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
+from dsc.components.checks import Check
 from dsc.components.declarations import Parameter
 from dsc.components.life_cycle import NEUTRAL, Life
 from dsc.components.services import Pattern, Service
@@ -23,6 +24,7 @@ class Interface:
         methods: the public methods that charts cannot use, as they have no decorator.
         requires: the services of the required ports, by port.
         pushes: the services of the push ports, by port.
+        checks: the own checks of the push ports, by name; `None` if a component of another program has them.
     """
 
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
@@ -31,6 +33,7 @@ class Interface:
     methods: Collection[str] = ()
     requires: Mapping[str, Service] = field(default_factory=dict)
     pushes: Mapping[str, Service] = field(default_factory=dict)
+    checks: Mapping[str, Check] | None = field(default_factory=dict)
 
     def require_mode(self, component: str, mode: str) -> None:
         """Raise `UnknownNameError` for a mode, or state of the life cycle, that charts cannot switch to."""

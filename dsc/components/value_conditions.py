@@ -8,20 +8,22 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from dsc.calls import SkillCall
 from dsc.components.checks import LIBRARY, Check, Series, by_name
 from dsc.components.hooks import contained
 from dsc.components.streams import Push
-from dsc.components.value_evaluation import SILENT, ValueEvaluation
+from dsc.components.value_evaluation import ValueEvaluation
+from dsc.components.value_vocabulary import ValueVocabulary
 from dsc.outcomes import Outcome
 from dsc.skills import Declared, SkillBody
 from knowledge_base.conditions.damping import relaxed
-from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.syntax.expression import Atom, Call, Constant, Expression, Term, parts_of
-from knowledge_base.language.syntax.text import parse_condition, to_text
+from knowledge_base.errors import InputError
+from knowledge_base.language.syntax.expression import Atom, Constant, Expression
+from knowledge_base.language.syntax.rewriting import inside
+from knowledge_base.language.syntax.text import parse_condition
 
 WATCH = "watch_values"
 """Name of the skill by which charts watch a condition on the values of a component with push ports."""
@@ -68,6 +70,8 @@ class ValueCondition:
     ) -> None:
         self._ports, self._checks = ports, checks
         rise = parse_condition(condition) if isinstance(condition, str) else condition
+        pushed = {name: port.values for name, port in ports.items()}
+        ValueVocabulary(pushed, checks, values, "the component pushes no").check(rise)
         self._rise, self._stay = rise, relaxed(rise, hysteresis) if hysteresis else rise
         if not 1 <= times <= out_of:
             raise InputError(f"`times` is from 1 to `out_of`, not {times} of {out_of}")
@@ -76,12 +80,14 @@ class ValueCondition:
         self._hold, self._times, self._last = hold, times, deque[bool](maxlen=out_of)
         self._series: dict[str, Series] = {}
         self._silences: dict[tuple[str, float], float] = {}  # loop times of the end of silence that counts
-        for name in self._names(rise):
-            self._require(name, port_of(name))
-            self._series[name] = Series(name)
-        for port, seconds in self._silent(rise):
-            self._require(port, port)
-            self._silences[port, seconds] = 0.0
+        for form in inside(rise):
+            match form:
+                case Constant(str(name), False) if port_of(name) in ports:
+                    self._series[name] = Series(name)
+                case Atom("silent", (Constant(port), Constant(seconds))):
+                    self._silences[str(port), float(seconds)] = 0.0
+                case _:
+                    pass
         self._read = dict.fromkeys([*map(port_of, self._series), *(p for p, _ in self._silences)])
         self._values = dict(values)
         self._evaluation = ValueEvaluation(self._series, checks, self._values, self._is_silent)
@@ -170,47 +176,20 @@ class ValueCondition:
     def _is_silent(self, port: str, seconds: float) -> bool:
         return asyncio.get_running_loop().time() >= self._silences[port, seconds]
 
-    # -- names -------------------------------------------------------------------------------------------
-
-    def _names(self, form: Expression | Term) -> Iterator[str]:
-        """Yield the values of ports that a condition reads; raise `UnknownNameError` for an unknown check."""
-        if isinstance(form, Constant) and not form.quoted and isinstance(form.value, str) and "." in form.value:
-            yield form.value
-        if isinstance(form, Atom | Call):
-            name = form.predicate if isinstance(form, Atom) else form.function
-            if name not in self._checks and name not in {SILENT, "list"}:
-                valid = (SILENT, *self._checks)
-                raise UnknownNameError(f"there is no check '{name}'", place=form.place, found=name, valid=valid)
-        for part in parts_of(form):
-            yield from self._names(part)
-
-    def _silent(self, form: Expression | Term) -> Iterator[tuple[str, float]]:
-        match form:
-            case Atom("silent", (Constant(str(port)), Constant(int() | float() as seconds))) if seconds > 0:
-                yield port, float(seconds)
-            case Atom("silent"):
-                message = f"{to_text(form)} is not of the form (silent port seconds)"
-                raise InputError(message, place=form.place)
-            case _:
-                for part in parts_of(form):
-                    yield from self._silent(part)
-
-    def _require(self, name: str, port: str) -> None:
-        if port not in self._ports or (name != port and name.rpartition(".")[2] not in self._ports[port].values):
-            valid = [f"{port}.{value}" for port, push in self._ports.items() for value in push.values]
-            if name == port:
-                valid = list(self._ports)
-            raise UnknownNameError(f"the component pushes no '{name}'", found=name, valid=valid)
-
 
 def port_of(name: str) -> str:
     """Return the port of a value's name: `scan` of `scan.metres`."""
     return name.rpartition(".")[0]
 
 
+def own_checks(ports: Iterable[Push]) -> Mapping[str, Check]:
+    """Return the checks that the ports add to the library, by name."""
+    return by_name(*(check for port in ports for check in port.checks))
+
+
 def checks_of(ports: Iterable[Push]) -> dict[str, Check]:
     """Return the checks that conditions on values of these ports may use, by name."""
-    return {**LIBRARY, **by_name(*(check for port in ports for check in port.checks))}
+    return {**LIBRARY, **own_checks(ports)}
 
 
 class BecameTrue(Outcome):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsc.components.checks import Check, Series
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError
 from knowledge_base.language.evaluation.terms import FOLD, ORDER, same
 from knowledge_base.language.syntax.expression import (
     And,
@@ -24,12 +24,9 @@ from knowledge_base.language.syntax.expression import (
 )
 from knowledge_base.language.syntax.text import to_text
 
-SILENT = "silent"
-"""Name of the check `(silent port seconds)`: nothing has come from a port for that time."""
-
 
 class ValueEvaluation:
-    """Evaluation of conditions and terms.
+    """Evaluation of conditions and terms that `ValueVocabulary.check` accepts.
 
     Args:
         series: the newest values, by names such as `scan.metres`.
@@ -51,8 +48,7 @@ class ValueEvaluation:
         """Return whether a condition is true.
 
         Raises:
-            InputError: a part cannot be computed, or has another form.
-            UnknownNameError: there is no such check or variable.
+            InputError: a part cannot be computed.
         """
         match e:
             case And(parts):
@@ -70,7 +66,7 @@ class ValueEvaluation:
             case Atom(name, args):
                 return bool(self._call_check(name, args, e))
             case _:
-                raise InputError(f"a condition on values has no quantifiers: {to_text(e)}", place=e.place)
+                raise AssertionError(f"a quantifier was checked: {to_text(e)}")
 
     def _compares(self, compare: str, left: Any, right: Any, e: Comparison) -> bool:
         if compare in {"=", "!="}:
@@ -87,7 +83,7 @@ class ValueEvaluation:
             case Constant(value):
                 return value
             case Variable(name):
-                return self._variable(name, term)
+                return self._values[name]
             case Call("list", args) | Arithmetic("geometry", args):
                 return [self._value(arg) for arg in args]
             case Call(name, args):
@@ -95,20 +91,11 @@ class ValueEvaluation:
             case Arithmetic(sign, args):
                 return _compute(sign, [self._value(arg) for arg in args], term)
 
-    def _variable(self, name: str, term: Term) -> Any:
-        if name not in self._values:
-            raise UnknownNameError(f"there is no value for '?{name}'", place=term.place, found=name, valid=self._values)
-        return self._values[name]
-
     def _call_check(self, name: str, args: tuple[Term, ...], form: Expression | Term) -> Any:
-        check = self._checks.get(name)
-        if check is None:
-            valid = (SILENT, *self._checks)
-            raise UnknownNameError(f"there is no check '{name}'", place=form.place, found=name, valid=valid)
         given = [self._argument(arg) for arg in args]
         try:
-            return check(*given)
-        except TypeError as error:
+            return self._checks[name](*given)
+        except TypeError as error:  # a variable has a value of another type
             raise InputError(f"{to_text(form)}: {error}", place=form.place) from error
 
     def _argument(self, term: Term) -> Any:

@@ -7,12 +7,12 @@ such a value is a condition or a term of the knowledge base.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from dsc.components.checks import LIBRARY
-from knowledge_base.errors import InputError, UnknownNameError
+from dsc.components.value_vocabulary import ValueVocabulary
+from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
 from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.expression import (
@@ -20,9 +20,7 @@ from knowledge_base.language.syntax.expression import (
     Arithmetic,
     Call,
     Constant,
-    Exists,
     Expression,
-    Forall,
     Imply,
     Not,
     Or,
@@ -64,18 +62,19 @@ Structure = Junction | Part
 """A condition as parts without negations above them."""
 
 
-def split(condition: Expression, values: Mapping[str, Any], functions: Collection[str]) -> Structure:
+def split(condition: Expression, values: Mapping[str, Any], vocabulary: ValueVocabulary) -> Structure:
     """Return a condition as the largest parts that one source each can evaluate.
 
     Args:
         condition: the condition.
         values: the values of its variables.
-        functions: the names of the functions of the knowledge base.
+        vocabulary: the names that parts on values may use.
 
     Raises:
-        InputError: a quantifier contains a value of a component, or the knowledge cannot contain a variable's value.
+        InputError: a part on values cannot be evaluated, or the knowledge cannot contain a variable's value.
+        UnknownNameError: a part on values uses an unknown name, or a variable has no value.
     """
-    return _Splitter(values, functions).split(_with_inner_negations(condition, negated=False))
+    return _Splitter(values, vocabulary).split(_with_inner_negations(condition, negated=False))
 
 
 def parts_in(structure: Structure) -> Iterator[Part]:
@@ -107,20 +106,6 @@ def value_names(form: Expression | Term) -> Iterator[Constant]:
     return (one for one in inside(form) if isinstance(one, Constant) and _is_value_name(one))
 
 
-def require_values(condition: Expression, pushed: Mapping[str, Collection[str]], who: str) -> None:
-    """Raise `UnknownNameError` for a name of a value or port that is not among the ports with their values.
-
-    Args:
-        condition: the condition.
-        pushed: the values of each port, by its name in the condition.
-        who: the beginning of the message, e.g. `no component pushes a`.
-    """
-    valid = [f"{port}.{value}" for port, values in pushed.items() for value in values]
-    for name in value_names(condition):
-        if name.value not in pushed and name.value not in valid:
-            raise UnknownNameError(f"{who} value '{name.value}'", place=name.place, found=str(name.value), valid=valid)
-
-
 def _is_value_name(term: Constant) -> bool:
     return isinstance(term.value, str) and not term.quoted and "." in term.value
 
@@ -148,8 +133,8 @@ def _operands(e: Expression, kind: type[And | Or]) -> tuple[Expression, ...]:
 class _Splitter:
     """One split; see `split` for the arguments."""
 
-    def __init__(self, values: Mapping[str, Any], functions: Collection[str]) -> None:
-        self._values, self._functions = values, functions
+    def __init__(self, values: Mapping[str, Any], vocabulary: ValueVocabulary) -> None:
+        self._values, self._vocabulary = values, vocabulary
 
     def split(self, e: Expression) -> Structure:
         """Return a condition with inner negations as parts."""
@@ -166,17 +151,15 @@ class _Splitter:
     def _part(self, e: Expression) -> Part:
         components = components_in(e)
         if not components:
+            self._vocabulary.require_variables(e)
             return Part(substitute(e, self._values_for(e)), to_text(e))
-        for one in inside(e):
-            if isinstance(one, Exists | Forall):
-                message = f"a condition on values of components has no quantifiers: {to_text(one)}"
-                raise InputError(message, place=one.place)
+        self._vocabulary.check(e)
         live: dict[str, Term] = {}
         prefix = f"{components[0]}." if len(components) == 1 else ""
         return Part(with_terms(e, lambda term: self._read(term, prefix, live)), to_text(e), components, live)
 
     def _values_for(self, form: Expression | Term) -> dict[str, Value]:
-        """Return the values of the variables in a form of the knowledge; a query finds the other variables."""
+        """Return the values of the variables in a form of the knowledge."""
         values = {name: self._values[name] for name in free_variables(form) if name in self._values}
         for name, value in values.items():
             if not isinstance(value, Value):
@@ -189,7 +172,7 @@ class _Splitter:
         match term:
             case Constant(str(name)) if _is_value_name(term):
                 return replace(term, value=name.removeprefix(prefix))
-            case Call(function) if function in self._functions and function not in LIBRARY and not components_in(term):
+            case Call(function) if self._vocabulary.is_of_knowledge(function):
                 variable = Variable(f"live.{len(live)}", place=term.place)
                 live[variable.name] = substitute(term, self._values_for(term))
                 return variable

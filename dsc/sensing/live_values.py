@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncGenerator, Mapping
+from collections.abc import AsyncGenerator, Iterable, Mapping
 from contextlib import ExitStack
 from typing import Any
 
 from dsc.dynamic.knowledge_situation import plain
 from dsc.loop_calls import LoopCalls
 from knowledge_base.language.evaluation.evaluator import evaluate_term
-from knowledge_base.language.syntax.expression import Term
+from knowledge_base.language.syntax.expression import Comparison, Term
 from knowledge_base.store import KnowledgeBase
 
 
@@ -41,6 +41,16 @@ async def live_values(
                 yield found
                 last = found
             await changed.wait()
+
+
+def require_evaluable(terms: Iterable[Term], knowledge: KnowledgeBase) -> None:
+    """Raise an error for a term that uses a name, number of arguments or object that the knowledge does not have.
+
+    Raises:
+        UnknownNameError, SchemaError: as for `KnowledgeBase.ask`.
+    """
+    for term in terms:
+        knowledge.ask(Comparison("=", term, term, place=term.place))
 
 
 def _read(knowledge: KnowledgeBase, terms: Mapping[str, Term]) -> dict[str, Any] | None:

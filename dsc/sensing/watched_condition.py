@@ -14,8 +14,9 @@ from dsc.components.value_conditions import WATCH, BecameFalse, BecameTrue, Valu
 from dsc.errors import NoAnswerError, RefusedError
 from dsc.loop_calls import LoopCalls
 from dsc.outcomes import Outcome
-from dsc.sensing.condition_parts import Part, parts_in, require_values, split, truth_of
-from dsc.sensing.live_values import live_values
+from dsc.sensing.condition_parts import Part, parts_in, split, truth_of
+from dsc.sensing.live_values import live_values, require_evaluable
+from dsc.sensing.vocabulary import vocabulary_of
 from knowledge_base.conditions.damping import relaxed
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.text import parse_condition, to_text
@@ -69,9 +70,10 @@ class WatchedCondition:
         if hysteresis:
             relaxed(whole, hysteresis)  # refuses a condition without bounds
         self._hysteresis = hysteresis
-        self._structure = split(whole, values, knowledge.schema.functions)
-        pushes = {f"{name}.{port}": one.values for name in components for port, one in components[name].pushes.items()}
-        require_values(whole, pushes, "no component pushes a")
+        interfaces = {name: component.interface() for name, component in components.items()}
+        self._structure = split(whole, values, vocabulary_of(interfaces, values, knowledge.schema.functions))
+        for part in parts_in(self._structure):
+            require_evaluable(part.live.values(), knowledge)
         self._truths: dict[Part, bool] = {}
         self._unknown: set[Part] = set()  # parts with a live value that is unknown at present
         self._read: dict[str, Any] = {}  # the values that the parts have reported

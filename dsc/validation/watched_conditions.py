@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 
+from dsc.components.checks import LIBRARY
 from dsc.components.value_conditions import WATCH
+from dsc.components.value_vocabulary import ValueVocabulary
 from dsc.errors import Finding
 from dsc.model.actions import Trigger
-from dsc.sensing.condition_parts import parts_in, require_values, split
+from dsc.model.data_forms import literal_parts
+from dsc.sensing.condition_parts import parts_in, split
+from dsc.sensing.vocabulary import vocabulary_of
+from dsc.validation.objects import KnownObjects
 from dsc.validation.subject import Subject
 from knowledge_base.errors import InputError
 from knowledge_base.language.checking.check import check, check_term
-from knowledge_base.language.syntax.expression import Constant, Expression, free_variables
+from knowledge_base.language.syntax.expression import Constant, Expression, Term, free_variables
 from knowledge_base.language.syntax.text import parse_condition
 
 SEVERAL = "conditions.watch_truth"
@@ -24,44 +29,45 @@ def check_watched_conditions(subject: Subject) -> Iterator[Finding]:
         if isinstance(action, Trigger) and (action.trigger == SEVERAL or action.trigger.endswith(f".{WATCH}")):
             text = action.arguments.get("condition")
             if isinstance(text, Constant) and isinstance(text.value, str):
+                variables = _variables(action.arguments.get("values"))
                 try:
-                    _check(subject, action.trigger, text.value)
+                    _check(subject, action.trigger, parse_condition(text.value), variables)
                 except InputError as error:
                     yield subject.caught(error, (*path, "with", "condition"), "condition")
 
 
-def _check(subject: Subject, trigger: str, text: str) -> None:
+def _variables(values: Term | None) -> Collection[str] | None:
+    """Return the names of the variables that an argument gives values; `None` if a run decides them."""
+    return () if values is None else literal_parts(values)
+
+
+def _check(subject: Subject, trigger: str, condition: Expression, variables: Collection[str] | None) -> None:
     """Raise `InputError` for a condition that cannot be evaluated."""
-    condition = parse_condition(text)
-    component = trigger.partition(".")[0]
-    own = "" if trigger == SEVERAL else f"{component}."
-    if own and component not in subject.interfaces:
-        return
-    if subject.interfaces:
-        require_values(
-            condition, _ports(subject, own), f"component '{component}' pushes no" if own else "no component pushes a"
-        )
-    if not own and subject.schema is not None:
-        _require_knowledge(subject, condition)
+    name = trigger.partition(".")[0]
+    if trigger == SEVERAL and subject.interfaces and subject.schema is not None:
+        vocabulary = vocabulary_of(subject.interfaces, variables, subject.schema.functions)
+        _check_parts(subject, condition, vocabulary)
+    elif name in subject.interfaces:
+        interface = subject.interfaces[name]
+        ports = {port: service.gives for port, service in interface.pushes.items()}
+        checks = {**(interface.checks or {}), **LIBRARY}
+        who, any_check = f"component '{name}' pushes no value", interface.checks is None
+        ValueVocabulary(ports, checks, variables, who, any_check=any_check).check(condition)
 
 
-def _ports(subject: Subject, own: str) -> dict[str, Collection[str]]:
-    """Return the values of the ports of all components; with `own`, those of one, without its name."""
-    return {
-        f"{name}.{port}".removeprefix(own): service.gives
-        for name, interface in subject.interfaces.items()
-        for port, service in interface.pushes.items()
-        if f"{name}.".startswith(own)
-    }
-
-
-def _require_knowledge(subject: Subject, condition: Expression) -> None:
-    """Raise an error for a part of the knowledge that the schema does not declare."""
+def _check_parts(subject: Subject, condition: Expression, vocabulary: ValueVocabulary) -> None:
+    """Raise an error for a part that its source cannot evaluate: a component, or the knowledge."""
     schema = subject.schema
     assert schema is not None  # noqa: S101
-    for part in parts_in(split(condition, {}, schema.functions)):
-        types = dict.fromkeys(free_variables(part.condition))
+    known = None if subject.objects is None else KnownObjects(schema, subject.objects)
+    types: Mapping[str, str | None] = dict.fromkeys(free_variables(condition))
+    for part in parts_in(split(condition, {}, vocabulary)):
+        read: list[Expression | Term] = [*part.live.values()]
         if not part.components:
             check(part.condition, schema, types)
+            read.append(part.condition)
         for term in part.live.values():
-            check_term(term, schema, dict.fromkeys(free_variables(term)))
+            check_term(term, schema, types)
+        for form in read:
+            for mistake in () if known is None else known.mistakes(form, types):
+                raise mistake

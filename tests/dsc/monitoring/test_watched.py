@@ -20,7 +20,7 @@ states:
       - {trigger: conditions.watch_truth, with: {condition: '"(and (wanted) (< hand.way.left 4))"'}}
     on: {near: {}, far: {}, became_true: {}, became_false: {}, gone: rest}
   rest:
-    entry: {trigger: hand.watch_values, with: {condition: '"(> way.left ?absent)"'}}
+    entry: {trigger: hand.watch_values, with: {condition: '"(> way.left (/ 1 0))"'}}
     on: {programming_error: end, became_true: end, became_false: end}
   end: {final: true}
 """

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from dsc import Component, Push, parse_plot
+from dsc import Component, Library, Push, parse_plot
+from dsc.components.checks import Series
+from dsc.components.interface import Interface
 from dsc.errors import PlotError
+from dsc.sensing.condition_handler import ConditionHandler
+from dsc.skills import signatures
+from dsc.validation import validate_plot
+from knowledge_base import Schema
 from planning import Robot
 
-DOMAIN = "(define (domain d) (:types cup) (:predicates (held ?c - cup)) (:functions (limit ?c - cup)))"
+DOMAIN = """
+(define (domain d) (:types cup) (:constants cup1 - cup)
+  (:predicates (held ?c - cup)) (:functions (limit ?c - cup) (pose ?c - cup) - geometry))
+"""
 PLOT = """
 plot: main
 parameters: {cup: {type: cup}}
@@ -24,9 +33,13 @@ states:
 """
 
 
+def near_edge(value: Series) -> bool:
+    return value.number < 0.1
+
+
 class Hand(Component):
     name = "hand"
-    pose = Push({"x": "number"})
+    pose = Push({"x": "number", "place": "list of number", "name": "text"}, checks=(near_edge,))
 
 
 class Wrist(Component):
@@ -50,6 +63,17 @@ def check(skill, condition):
         ("conditions.watch_truth", "(or (held ?cup cup1) (< hand.pose.x 1))", "held"),
         ("conditions.watch_truth", "(< hand.pose.x (limit))", "limit"),
         ("conditions.watch_truth", "(exists (?c - cup) (< hand.pose.x 1))", "no quantifiers"),
+        ("conditions.watch_truth", "(< hand.pose.x (limt cup1))", "no check or function 'limt'; did you mean 'limit'?"),
+        ("conditions.watch_truth", "(< hand.pose.x (limit ?cpu))", "no value for '?cpu' in `values`; did you mean 'cup'?"),
+        ("conditions.watch_truth", "(or (held ?cpu) (silent hand.pose 1))", "no value for '?cpu' in `values`"),
+        ("conditions.watch_truth", "(< hand.pose.x (limit cup1 3))", "'limit' takes 1 arguments"),
+        ("conditions.watch_truth", "(< hand.pose 1)", "a port, whose values are hand.pose.x, hand.pose.place"),
+        ("conditions.watch_truth", "(< hand.pose.name 1)", "needs numbers, and hand.pose.name is of type text"),
+        ("conditions.watch_truth", "(< (distance hand.pose.x (pose cup1)) 1)", "a list of numbers"),
+        ("conditions.watch_truth", "(near-edges hand.pose.x)", "did you mean 'near-edge'?"),
+        ("hand.watch_values", "(in-range pose.x 1)", "as in (in-range value least most)"),
+        ("hand.watch_values", "(near-edge 3)", "'value' is a value of a port, not 3"),
+        ("hand.watch_values", "(< pose.x ?cpu)", "no value for '?cpu' in `values`; did you mean 'cup'?"),
     ],
 )
 def test_a_mistake_has_its_place_and_its_remedy(skill, condition, said):
@@ -63,9 +87,27 @@ def test_a_mistake_has_its_place_and_its_remedy(skill, condition, said):
     ("skill", "condition"),
     [
         ("hand.watch_values", "(and (< pose.x 1) (not (silent pose 2)) (> (rate pose.x) ?cup))"),
-        ("conditions.watch_truth", "(imply (held ?cup) (< (distance hand.pose.x (limit ?cup)) wrist.force.x))"),
+        ("conditions.watch_truth", "(imply (held ?cup) (< (distance (pose ?cup) hand.pose.place) wrist.force.x))"),
         ("conditions.watch_truth", "(or (exists (?c - cup) (held ?c)) (silent wrist.force 2) (near-edge hand.pose.x))"),
     ],
 )
 def test_conditions_without_mistakes(skill, condition):
     check(skill, condition)
+
+
+@pytest.mark.parametrize("condition", ["(< hand.pose.x (limit cpu1))", "(or (silent hand.pose 1) (held cpu1))"])
+def test_unknown_objects(condition):
+    plot, hand = parse_plot(PLOT % ("conditions.watch_truth", condition)), Hand()
+    skills = [*hand.skills().values(), *signatures(ConditionHandler, "conditions").values()]
+    interfaces = {"hand": hand.interface(), "conditions": Interface()}
+    (found,) = validate_plot(plot, Library([plot]), Schema.parse(DOMAIN), skills, interfaces, objects={})
+    assert "there is no object 'cpu1' of type cup; did you mean 'cup1'?" in str(found.error)
+
+
+@pytest.mark.parametrize("condition", ["(< hand.pose.x (limit cpu1))", "(or (silent hand.pose 1) (held cpu1))"])
+def test_unknown_objects_in_a_run(condition):
+    text = PLOT % ("conditions.watch_truth", condition)
+    with Robot(DOMAIN, [parse_plot(text)], [Hand(), Wrist()], clock="simulated") as robot:
+        end = robot.run("main", {"cup": "cup1"})
+    assert "there is no object 'cpu1'" in (end.programming_error or "")
+    assert "did you mean 'cup1'?" in (end.programming_error or "")
