@@ -18,11 +18,14 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dsc.errors import LostDataError
 from knowledge_base.errors import InputError, StoreError
 from knowledge_base.language.checking.inputs import shown
 
 SCHEME = "data:"
 """Beginning of each reference."""
+JSON = ".json"
+"""Suffix of plain data."""
 _NAME = re.compile(r"[0-9a-f]{16}\.[a-z0-9]{1,8}")
 _SUFFIX = re.compile(r"\.[a-z0-9]{1,8}")
 _MILLION = 1_000_000
@@ -66,28 +69,28 @@ class DataFolder:
         self._kept = {name: _Kept(file.st_size, file.st_mtime) for name, file in found}  # the oldest first
         self._size = sum(kept.size for kept in self._kept.values())
 
-    def keep(self, data: Any, suffix: str = ".json") -> str:
-        """Store data, and return their reference; equal data become new again.
+    def keep(self, data: Any, suffix: str = "") -> str:
+        """Store data, and return their reference; equal data become new again, and damaged data whole.
 
         Args:
-            data: bytes, or with the suffix `.json` plain data such as a list of numbers.
-            suffix: the suffix of the file, e.g. `.png`.
+            data: bytes, or plain data such as a list of numbers.
+            suffix: the suffix of the file, e.g. `.png`. Without it, bytes have `.bin`, and plain data `.json`.
 
         Raises:
             InputError: the data or the suffix have another form, or the data exceed the bound of the folder.
             StoreError: the file cannot be written.
         """
-        content = _content_of(data, suffix)
+        is_bytes = isinstance(data, bytes | bytearray | memoryview)
+        suffix = suffix or (".bin" if is_bytes else JSON)
+        _require_suffix(suffix, is_bytes=is_bytes)
+        content = bytes(data) if is_bytes else _json(data)
         if len(content) > self._most:
             message = f"data of {len(content) / _MILLION:,.1f} MB exceed the bound of {self.folder}"
             raise InputError(f"{message}, {self._most / _MILLION:,g} MB; give `megabytes=`")
-        name = sha256(content).hexdigest()[:16] + suffix
+        name = _digest(content) + suffix
         at = self._now()
         with self._guard:
-            if (self.folder / name).exists():
-                os.utime(self.folder / name, (at, at))
-            else:
-                self._write(name, content, at)
+            self._write(name, content, at)
             if self._kept.pop(name, None) is None:
                 self._size += len(content)
             self._kept[name] = _Kept(len(content), at)  # the newest
@@ -98,14 +101,19 @@ class DataFolder:
         """Return the bytes of a reference, or for `.json` the plain data.
 
         Raises:
-            InputError: the text is not a reference, or the data were deleted.
+            InputError: the value is not a reference.
+            LostDataError: the data were deleted, or the file was changed or cannot be read.
         """
         file = self.file(reference)
         try:
             content = file.read_bytes()
         except FileNotFoundError:
             raise self._absent(reference) from None
-        return json.loads(content) if file.suffix == ".json" else content
+        except OSError as error:
+            raise LostDataError(f"'{file}' cannot be read: {error.strerror or error}") from error
+        if _digest(content) != file.stem:
+            raise LostDataError(f"'{file}' was changed after it was written: its content has another digest")
+        return json.loads(content) if file.suffix == JSON else content
 
     def file(self, reference: str) -> Path:
         """Return the file of a reference; raise as `read`."""
@@ -164,10 +172,10 @@ class DataFolder:
         self._size -= kept.size if kept is not None else 0
         (self.folder / name).unlink(missing_ok=True)
 
-    def _absent(self, reference: str) -> InputError:
+    def _absent(self, reference: str) -> LostDataError:
         bounds = f"{self._most / _MILLION:,g} MB" + ("" if self._seconds == math.inf else f" and {self._seconds:g} s")
         message = f"there are no data '{reference}' in {self.folder}: they were released, or exceeded its bounds"
-        return InputError(f"{message} ({bounds})", found=reference)
+        return LostDataError(f"{message} ({bounds})")
 
 
 def name_in(reference: object) -> str | None:
@@ -178,14 +186,31 @@ def name_in(reference: object) -> str | None:
     return name if _NAME.fullmatch(name) else None
 
 
-def _content_of(data: Any, suffix: str) -> bytes:
+def _digest(content: bytes) -> str:
+    return sha256(content).hexdigest()[:16]
+
+
+def _require_suffix(suffix: object, *, is_bytes: bool) -> None:
     if not isinstance(suffix, str) or not _SUFFIX.fullmatch(suffix):
         raise InputError(f"a suffix has up to eight small letters and digits, e.g. '.png', not {shown(suffix)}")
-    if isinstance(data, bytes | bytearray | memoryview):
-        return bytes(data)
-    if suffix != ".json":
-        raise InputError(f"data with the suffix '{suffix}' are bytes, not {shown(data)}")
+    if is_bytes is (suffix == JSON):
+        kinds = "plain data have the suffix '.json', and bytes another one"
+        raise InputError(f"{kinds}, not {shown(suffix)}")
+
+
+def _json(data: Any) -> bytes:
+    """Return plain data as JSON; equal data give equal bytes."""
     try:
-        return json.dumps(data, separators=(",", ":"), allow_nan=False).encode()
-    except (TypeError, ValueError) as error:
-        raise InputError(f"data without a suffix are plain data such as a list of numbers: {error}") from error
+        _require_text_keys(data)
+        return json.dumps(data, separators=(",", ":"), allow_nan=False, sort_keys=True).encode()
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"data are bytes, or plain data such as a list of numbers: {error}") from error
+
+
+def _require_text_keys(data: Any) -> None:
+    if isinstance(data, dict):
+        for key in data:
+            if not isinstance(key, str):
+                raise TypeError(f"a key is a text, not {shown(key)}")
+    for part in data.values() if isinstance(data, dict) else data if isinstance(data, list | tuple) else ():
+        _require_text_keys(part)

@@ -87,6 +87,10 @@ class RefusedError(SkillError):
     """The other endpoint could not execute a call; the message has its reason."""
 
 
+class LostDataError(SkillError):
+    """Data by reference cannot be read: they were deleted, or their file was changed."""
+
+
 class PreemptedError(SkillError):
     """A skill with a higher priority, which `by` names, has taken the component at its host."""
 

@@ -8,10 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dsc import DataFolder
+from dsc import Component, DataFolder, Outcome, SkillCall, parse_plot, skill
+from dsc.errors import LostDataError
 from knowledge_base.errors import InputError, StoreError
+from planning import Robot
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(100)
+
+
+class Measured(Outcome):
+    nearest: float
 
 
 class Time:
@@ -55,7 +61,7 @@ def test_released_data_are_gone(tmp_path):
     data.release(reference)
     assert list(tmp_path.iterdir()) == []
     for use in (data.read, data.file, data.age, data.release):
-        with pytest.raises(InputError, match="released"):
+        with pytest.raises(LostDataError, match="released"):
             use(reference)
 
 
@@ -67,7 +73,7 @@ def test_old_data_are_deleted(tmp_path):
     second = data.keep(b"2", ".bin")
     time.now += 6
     assert data.references() == [second]
-    with pytest.raises(InputError, match="10 s"):
+    with pytest.raises(LostDataError, match="10 s"):
         data.read(first)
 
 
@@ -109,7 +115,6 @@ def test_the_folder_stays_within_its_bounds(tmp_path_factory, steps):
         ("data:9f86d081884c7d65.png/..", "is not a reference"),
         ("9f86d081884c7d65.png", "is not a reference"),
         (5, "is not a reference"),
-        ("data:9f86d081884c7d65.png", "no data"),
     ],
 )
 def test_wrong_references_are_refused(reference, said, tmp_path):
@@ -122,7 +127,12 @@ def test_wrong_references_are_refused(reference, said, tmp_path):
     [
         ([float("nan")], ".json", "plain data"),
         (object(), ".json", "plain data"),
-        ([1], ".png", "are bytes"),
+        (object(), "", "plain data"),
+        ([1], ".png", "bytes another one, not '.png'"),
+        (b"[1", ".json", "bytes another one, not '.json'"),
+        ({None: 1}, "", "a key is a text, not None"),
+        ([{1: 2}], "", "a key is a text, not 1"),
+        ({"a": 1, 2: 3}, "", "a key is a text, not 2"),
         (b"", "png", "suffix"),
         (b"", ".p/g", "suffix"),
         (bytes(2000), ".bin", "exceed the bound"),
@@ -131,6 +141,55 @@ def test_wrong_references_are_refused(reference, said, tmp_path):
 def test_wrong_data_are_refused(data, suffix, said, tmp_path):
     with pytest.raises(InputError, match=said):
         DataFolder(tmp_path, megabytes=0.001).keep(data, suffix)
+
+
+def test_data_that_are_nested_too_deep(tmp_path):
+    deep: list[object] = []
+    for _ in range(100_000):
+        deep = [deep]
+    with pytest.raises(InputError, match="plain data"):
+        DataFolder(tmp_path).keep(deep)
+
+
+def test_the_usual_suffixes(tmp_path):
+    data = DataFolder(tmp_path)
+    raw = data.keep(b"\xff")
+    assert raw.endswith(".bin")
+    assert data.read(raw) == b"\xff"
+    assert data.keep({"a": 1, "b": 2}) == data.keep({"b": 2, "a": 1})
+    assert data.read(data.keep({"b": 2, "a": (1, None)})) == {"a": [1, None], "b": 2}
+
+
+@pytest.mark.parametrize("suffix", [".png", ""])
+def test_a_changed_file(suffix, tmp_path):
+    data = DataFolder(tmp_path)
+    given = PNG if suffix else [1, 2, 3]
+    reference = data.keep(given, suffix)
+    for damage in (b"[1,2,", b"", b"[1,2,4]"):
+        data.file(reference).write_bytes(damage)
+        with pytest.raises(LostDataError, match="was changed"):
+            data.read(reference)
+        assert data.keep(given, suffix) == reference
+        assert data.read(reference) == given
+
+
+def test_a_skill_that_reads_released_data_ends_with_a_skill_error(tmp_path):
+    data = DataFolder(tmp_path)
+
+    class Map(Component):
+        name = "map"
+
+        @skill
+        async def measure(self, call: SkillCall) -> Measured:
+            reference = data.keep([1, 2])
+            data.release(reference)
+            return Measured(nearest=min(data.read(reference)))
+
+    text = (
+        "{plot: p, states: {a: {entry: {trigger: map.measure}, on: {measured: {}, skill_error: e}}, e: {final: true}}}"
+    )
+    with Robot("(define (domain d) (:predicates (p)))", [parse_plot(text)], [Map()], clock="simulated") as robot:
+        assert robot.run("p").reached
 
 
 @pytest.mark.parametrize("bounds", [{"megabytes": 0}, {"seconds": -1}, {"megabytes": "many"}])

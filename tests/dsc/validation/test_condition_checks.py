@@ -64,7 +64,11 @@ def check(skill, condition):
         ("conditions.watch_truth", "(< hand.pose.x (limit))", "limit"),
         ("conditions.watch_truth", "(exists (?c - cup) (< hand.pose.x 1))", "no quantifiers"),
         ("conditions.watch_truth", "(< hand.pose.x (limt cup1))", "no check or function 'limt'; did you mean 'limit'?"),
-        ("conditions.watch_truth", "(< hand.pose.x (limit ?cpu))", "no value for '?cpu' in `values`; did you mean 'cup'?"),
+        (
+            "conditions.watch_truth",
+            "(< hand.pose.x (limit ?cpu))",
+            "no value for '?cpu' in `values`; did you mean 'cup'?",
+        ),
         ("conditions.watch_truth", "(or (held ?cpu) (silent hand.pose 1))", "no value for '?cpu' in `values`"),
         ("conditions.watch_truth", "(< hand.pose.x (limit cup1 3))", "'limit' takes 1 arguments"),
         ("conditions.watch_truth", "(< hand.pose 1)", "a port, whose values are hand.pose.x, hand.pose.place"),
