@@ -555,7 +555,8 @@ class Sequencer(OutsideInput):
         return True
 
     def _deadlock(self) -> str:
-        watching = (f"{one.describe()} waits for the outside (open_ended)" for one in self.dispatcher.watching)
+        events = (one for one in self.dispatcher.watching if one.signature.pattern == "event")
+        watching = (f"{one.describe()} waits for the outside (open_ended)" for one in events)
         return "; ".join(["deadlock: no skill, timer or event is pending", *self.dispatcher.waits, *watching])
 
     def _is_deadlock(self) -> bool:

@@ -37,11 +37,15 @@ class Validation:
         valid: whether every step is applicable at its time and the goal holds at the end.
         failing_step: the index of the first inapplicable step; `None` if all steps are applicable.
         why: the violated condition, in PDDL; empty if the plan is valid.
+        cost: the cost of a valid plan as a foresight knows it, e.g. seconds or a risk; a robot prefers the lowest.
+        costliest_step: the index of the step with the largest part of the cost; alternative plans omit the step.
     """
 
     valid: bool
     failing_step: int | None = None
     why: str = ""
+    cost: float | None = None
+    costliest_step: int | None = None
 
 
 def validate(plan: Plan, domain: PlanningDomain, world: World, goal: Expression) -> Validation:

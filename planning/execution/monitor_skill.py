@@ -16,7 +16,7 @@ from planning.execution.link_monitor import OVERTAKING, OWN_STEPS, Broken, GoalR
 from planning.execution.outcomes import GoalHolds, Monitored, PlanInvalid
 from planning.execution.plan_ends import shortest_end
 from planning.execution.plan_run import Better, PlanNews, PlanRun, PlanState, Successor
-from planning.execution.search import Found, NotFound
+from planning.execution.search_results import Found, NotFound
 from planning.model.plan import PlanFound
 
 if TYPE_CHECKING:

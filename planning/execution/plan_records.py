@@ -120,6 +120,10 @@ class PlanRecords:
         """Record that the simulation predicts the failure of a plan at a step, or at the goal if `step` is `None`."""
         self._trace.record("plan.rejected", step=None if step is None else str(step), reason=reason, engine=engine)
 
+    def comparison(self, best: float, cost: float, without: PlanStep, engine: str) -> None:
+        """Record an alternative plan without a step, and its cost in the simulation."""
+        self._trace.record("plan.compared", best=best, cost=cost, without=str(without), engine=engine)
+
     def wrong(self, step: PlanStep | None, reason: str, engine: str) -> None:
         """Record a plan that fails at a step, or at the goal if `step` is `None`, in an unchanged world."""
         self._trace.record("plan.wrong", step=None if step is None else str(step), reason=reason, engine=engine)

@@ -13,7 +13,7 @@ from knowledge_base.language.syntax.text import parse_condition, to_text
 from planning.execution.link_monitor import Broken, GoalReached, News, Shorter, news_form, news_from
 from planning.execution.outcomes import Withdrawn
 from planning.execution.plan_progress import PlanProgress
-from planning.execution.search import Found, NotFound
+from planning.execution.search_results import Found, NotFound
 from planning.model.plan import PlanStep
 
 if TYPE_CHECKING:

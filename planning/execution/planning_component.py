@@ -41,7 +41,8 @@ from planning.execution.plan_records import PlanRecords
 from planning.execution.plan_run import PlanRun, task_of
 from planning.execution.plan_runs import PlanRuns
 from planning.execution.plotting import Plotting
-from planning.execution.search import NotFound, Search
+from planning.execution.search import Search
+from planning.execution.search_results import NotFound
 from planning.execution.step_costs import StepCosts
 from planning.problem.construction import check_goal
 from planning.problem.derived import derivation
@@ -56,7 +57,8 @@ if TYPE_CHECKING:
     from knowledge_base.store import KnowledgeBase
     from planning.engines.planner import Planner
     from planning.execution.goals import GoalQueue
-    from planning.execution.search import Foresight, Found
+    from planning.execution.search import Foresight
+    from planning.execution.search_results import Found
     from planning.model.domain import PlanningDomain
 
 

@@ -8,20 +8,22 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 from collections import deque
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from knowledge_base.errors import InputError
+from knowledge_base.language.checking.inputs import require, shown
 from knowledge_base.world.overlay import Overlay
 from planning.analysis.explanation import why_unsolvable
 from planning.analysis.validation import Validation, validate
 from planning.engines.registry import timing
-from planning.execution.outcomes import NoPlanKind
 from planning.execution.plan_ends import leads_to
 from planning.execution.plan_progress import PlanProgress, local_repair
-from planning.execution.planner_call import Answer, Improvements, PlannerCalls
+from planning.execution.planner_call import Answer, PlannerCalls
+from planning.execution.search_results import Found, NotFound
 from planning.model.cancellable_work import WorkLimit, WorkLimitError, aside
 from planning.model.plan import (
     EngineFailed,
@@ -35,7 +37,7 @@ from planning.model.plan import (
 )
 from planning.model.problem import WrongPlan
 from planning.ordering.causal_tracing import deordered
-from planning.ordering.partial_order import PartialOrder, in_sequence
+from planning.ordering.partial_order import in_sequence
 from planning.problem.construction import build_problem
 from planning.problem.derived import derivation
 from planning.problem.relevance import why_no_engine
@@ -86,65 +88,6 @@ A robot with a short plan then begins sooner; a long plan would block the event 
 """
 LOCAL_REPAIR_SECONDS = 2.0
 """The limit of real time for a local repair, in seconds."""
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """A plan that leads from the present world to the goal.
-
-    Attributes:
-        answer: the outcome of the planner, with the plan.
-        kept: the number of last steps that the plan shares with the replaced plan.
-        better: the better plans of the planner; the caller must close them.
-        order: the partial order of the plan, computed by the validation; `None` for a plan with a schedule.
-        progress: the progress of the plan before its first step; `None` before the validation.
-        version: the version of the knowledge base on which the plan was validated.
-        overtaken: whether the plan can be executed, but does not lead to the goal, since the world has changed during
-            the search. A new plan is then made while the first step runs.
-    """
-
-    answer: PlanFound
-    kept: int = 0
-    better: Improvements | None = None
-    order: PartialOrder | None = None
-    progress: PlanProgress | None = None
-    version: int = -1
-    overtaken: bool = False
-
-    @property
-    def steps(self) -> tuple[PlanStep, ...]:
-        """The steps of the plan."""
-        return self.answer.plan.steps
-
-    def known_order(self, steps: tuple[PlanStep, ...], version: int) -> PartialOrder | None:
-        """Return the partial order if the plan has these steps and was validated on this version; otherwise `None`."""
-        return self.order if self.version == version and self.steps == steps else None
-
-    def known_progress(self, steps: tuple[PlanStep, ...], version: int) -> PlanProgress | None:
-        """Return the progress if the plan has these steps and was validated on this version; otherwise `None`."""
-        return self.progress if self.version == version and self.steps == steps else None
-
-    def with_steps(self, steps: tuple[PlanStep, ...]) -> Found:
-        """Return the result with other steps of the plan."""
-        return replace(self, answer=replace(self.answer, plan=Plan(steps)), order=None, progress=None)
-
-    async def close(self) -> None:
-        """Close the generator of better plans."""
-        if self.better is not None:
-            await self.better.aclose()
-
-
-@dataclass(frozen=True, slots=True)
-class NotFound:
-    """Result of a search without a plan.
-
-    Attributes:
-        kind: the `kind` of the outcome `no_plan`.
-        reason: the explanation, as text.
-    """
-
-    kind: NoPlanKind
-    reason: str
 
 
 @dataclass(slots=True)
@@ -249,9 +192,8 @@ class Search:
     ) -> Found | NotFound:
         """Return a plan that is valid in the world at the end of the search.
 
-        A search during which the world changed is repeated; then a local repair may keep steps of the plan found. After
-        `MAX_ATTEMPTS` such searches, a robot without running steps begins with the last plan that can be executed.
-        After a wrong plan the planner is asked again, with the reason in `Problem.wrong`, while time is left.
+        If the simulation tells the cost of a plan, plans without the costliest steps are compared while time is left
+        (S1.20).
 
         Args:
             goal: the condition to reach.
@@ -264,6 +206,45 @@ class Search:
             InputError: the goal contains a missing object, or needs a feature that no engine supports.
         """
         refused, limit = _Refused(), WorkLimit(seconds)
+        best = latest = await self._valid_plan(goal, seconds, before, sleep, running, refused)
+        while (
+            isinstance(best, Found) and isinstance(latest, Found) and len(refused.steps) < MAX_REJECTED and limit.left
+        ):
+            step = latest.costliest_step
+            if step is None or step in running:
+                break
+            refused.steps[step] = f"the plan costs {latest.cost:g}"
+            latest = await self._valid_plan(goal, limit.left, None, sleep, running, refused)
+            best = await self._compare(best, latest, step)
+        if isinstance(best, Found) and refused.steps and best.version != self._knowledge.version:
+            return await self._valid_plan(goal, seconds, best.progress, sleep, running, _Refused())
+        return best
+
+    async def _compare(self, best: Found, other: Found | NotFound, without: PlanStep) -> Found:
+        """Return the plan of the lower cost, and close the other one."""
+        if isinstance(other, NotFound):
+            return best
+        self._records.comparison(best.cost, other.cost, without, other.answer.engine)
+        dearer, cheaper = (best, other) if other.cost < best.cost else (other, best)
+        await dearer.close()
+        return cheaper
+
+    async def _valid_plan(
+        self,
+        goal: Expression,
+        seconds: float,
+        before: PlanProgress | None,
+        sleep: Callable[[float], Awaitable[None]],
+        running: tuple[PlanStep, ...],
+        refused: _Refused,
+    ) -> Found | NotFound:
+        """Return a plan that is valid in the world at the end of the search, and that the simulation accepts.
+
+        A search during which the world changed is repeated; then a local repair may keep steps of the plan found. After
+        `MAX_ATTEMPTS` such searches, a robot without running steps begins with the last plan that can be executed.
+        After a wrong plan the planner is asked again, with the reason in `Problem.wrong`, while time is left.
+        """
+        limit = WorkLimit(seconds)
         changed, begun = 0, self._clock.now()
         overtaken: deque[Found] = deque(maxlen=MAX_ATTEMPTS)
         while True:
@@ -343,7 +324,10 @@ class Search:
                 return NotFound("failed", f"{_IN_CONCERT}: {alone.why} ({found.answer.engine})")
         verdict = await self._foreseen(found)
         if verdict.valid:
-            return found
+            if verdict.cost is not None:  # a better plan of the engine may be a worse one for the simulation
+                await found.close()
+                found = replace(found, better=None)
+            return replace(found, foreseen=verdict)
         await found.close()
         if verdict.failing_step is None or len(rejected) == MAX_REJECTED:
             return NotFound("failed", f"the simulation foresees that it fails: {verdict.why}")
@@ -471,10 +455,23 @@ class Search:
             return Validation(valid=True)
         world, plan = self._knowledge.snapshot(), found.answer.plan
         verdict = await self.aside(lambda: foresight.foresee(plan, world))
+        _require_verdict(verdict, len(plan.steps))
         if not verdict.valid:
             step = None if verdict.failing_step is None else plan.steps[verdict.failing_step]
             self._records.rejected(step, verdict.why, found.answer.engine)
         return verdict
+
+
+def _require_verdict(verdict: object, steps: int) -> None:
+    """Raise `InputError` unless a foresight has returned a `Validation` about a plan with that number of steps."""
+    require(verdict, Validation, "a foresight returns a Validation")
+    for name in ("failing_step", "costliest_step"):
+        number = getattr(verdict, name)
+        if number is not None and not (isinstance(number, int) and 0 <= number < steps):
+            raise InputError(f"a foresight names a step by its number from 0 to {steps - 1}: `{name}={shown(number)}`")
+    cost = getattr(verdict, "cost", None)
+    if cost is not None and (isinstance(cost, bool) or not isinstance(cost, int | float) or not math.isfinite(cost)):
+        raise InputError(f"the cost of a plan is a finite number, not {shown(cost)}")
 
 
 def _only_wrong(plans: Sequence[WrongPlan], found: Found) -> NotFound:

@@ -27,6 +27,7 @@ _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
     "plan.excluded": lambda data: f"{data['step']} is excluded for {data['seconds']:g} s: {data['why']}",
     "plan.readmitted": lambda data: f"{', '.join(data['steps'])} may be planned again: there is no plan without",
     "plan.rejected": lambda data: f"a plan fails in the simulation: {data['reason']}",
+    "plan.compared": lambda data: f"a plan without {data['without']} costs {data['cost']:g}, the best {data['best']:g}",
     "plan.wrong": lambda data: f"a plan of {data['engine']} does not lead to the goal: {data['reason']}",
     "plan.gave_up": lambda data: f"gave up: {data['reason']}",
 }
