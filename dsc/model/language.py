@@ -99,7 +99,10 @@ def kind_by_key(*keys: str) -> Callable[[Any], str | None]:
 
     def kind(value: Any) -> str | None:
         present = value if isinstance(value, Mapping) else _written_keys(type(value))
-        return next((key for key in keys if key in present), None)
+        for key in keys:
+            if key in present:
+                return key
+        return None
 
     return kind
 
@@ -140,7 +143,8 @@ def _term(value: Any) -> Term:
         return literal({name: _term(part) for name, part in value.items()})
     if not isinstance(value, str):
         raise ValueError(f"a value was expected: a constant, ?variable or (+ ?n 1); found {value!r}")
-    return _read(parse_term, value) if value.startswith(("?", "(")) or is_quoted(value) else _named(value)
+    is_form = value[:1] in _MARKS and (value[0] != '"' or is_quoted(value))
+    return _read(parse_term, value) if is_form else _named(value)
 
 
 _MARKS = frozenset('?("')

@@ -117,10 +117,13 @@ class Escalation:
         return reached
 
     def _end(self, run: PlanRun) -> tuple[PlanStep, ...] | None:
-        """Return the fewest last steps of the successor, or of the plan without one, that lead to the goal."""
+        """Return the fewest last steps of the successor, or of the plan without one, that lead to the goal.
+
+        `None` if there are none, or if the simulation foresees that the plan fails.
+        """
         world, progress = self._knowledge.snapshot(), run.progress  # reads of a snapshot need no lock
         if run.successor is None:
-            return progress.shortest_end(world)
+            return None if run.rejected else progress.shortest_end(world)
         return shortest_end(run.successor.steps, progress.domain, world, progress.goal)
 
     def _chosen(

@@ -42,6 +42,7 @@ class Broken:
         user: the number of the first step that needs the condition; the number of steps plus one for the goal.
         author: the author of the change.
         version: the version of the knowledge base from which the condition is broken.
+        foreseen: whether no condition is broken, but the simulation foresees that a step fails.
     """
 
     why: str
@@ -49,6 +50,7 @@ class Broken:
     user: int
     author: str
     version: int
+    foreseen: bool = False
 
     @property
     def foreign(self) -> bool:

@@ -16,6 +16,7 @@ from planning.execution.link_monitor import OVERTAKING, OWN_STEPS, Broken, GoalR
 from planning.execution.outcomes import GoalHolds, Monitored, PlanInvalid
 from planning.execution.plan_ends import shortest_end
 from planning.execution.plan_run import Better, PlanNews, PlanRun, PlanState, Successor
+from planning.execution.reassessment import foresee_failure
 from planning.execution.search_results import Found, NotFound
 from planning.model.plan import PlanFound
 
@@ -88,6 +89,8 @@ class MonitorSkill:
                 self._install().look_first()  # the world may have changed since the search
         else:
             self._resume()
+        if self._escalation.search.reads:
+            self._tasks.append(asyncio.create_task(self._reassess()))
         if run.improvements is not None:
             self._tasks.append(asyncio.create_task(self._improve(run.improvements)))
 
@@ -173,7 +176,7 @@ class MonitorSkill:
         if isinstance(news, Broken):
             if self._run.state is PlanState.BROKEN:
                 return
-            self._run.state = PlanState.BROKEN
+            self._run.state, self._run.rejected = PlanState.BROKEN, news.foreseen
             self._records.broken(self._run.progress, news)
         self._put(news)
 
@@ -188,10 +191,14 @@ class MonitorSkill:
         run.overtaken = False
 
     def _may_continue(self, news: Broken) -> bool:
-        """Return whether running steps that do not need the condition may continue during a search."""
+        """Return whether running steps may continue during a search, since the break does not concern them."""
         run = self._run
         others = set(run.progress.running) - {news.user}
-        return bool(others) and bool(news.needed) and (news.foreign or run.attempt.replans < run.replans)
+        return (
+            bool(others)
+            and (bool(news.needed) or news.foreseen)
+            and (news.foreign or run.attempt.replans < run.replans)
+        )
 
     def _search_meanwhile(self, since: float) -> None:
         self._run.searching_since = since
@@ -205,6 +212,9 @@ class MonitorSkill:
         except Exception as error:  # noqa: BLE001  an error of the search must not end the monitoring
             found = NotFound("failed", described(error))
         self._put(found)
+
+    async def _reassess(self) -> None:
+        self._receive(await foresee_failure(self._run, self._escalation.search, self._knowledge, self._is_own))
 
     async def _improve(self, improvements: Improvements) -> None:
         async with aclosing(improvements):

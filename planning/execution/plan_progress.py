@@ -207,7 +207,11 @@ class PlanProgress:
 
     def coming(self) -> tuple[PlanStep, ...]:
         """Return the steps that have not begun."""
-        return self.steps_of(self._after(self.running))
+        return self.steps_of(self.coming_numbers())
+
+    def coming_numbers(self) -> tuple[int, ...]:
+        """Return the numbers of the steps that have not begun."""
+        return self._after(self.running)
 
     def _ways_on(self) -> Iterator[tuple[PlanStep, ...]]:
         """Return the step sequences that may remain, one for each choice of running steps that are done."""

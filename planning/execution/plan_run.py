@@ -33,6 +33,7 @@ _PLAIN = (
     "replaces",
     "searching_since",
     "disturbed",
+    "rejected",
     "monitored_for",
     "overtaken",
     "replaced",
@@ -109,6 +110,7 @@ class PlanRun:
         missed: the labels of the steps that began after a restart of the program and before a restart of the monitor.
         on_begin: receives the number in `progress` of each step that begins; `None` while the plan is not monitored.
         disturbed: whether changes by another author, and no failure, ended the plan.
+        rejected: whether the simulation foresees that coming steps fail, so that the plan must not continue.
         labels: for each step, its number in the plot; by default, the steps count from 1. A step of a replaced plan
             keeps its number, and other steps have new ones, so that equal numbers of successive plots mean equal steps.
         replaced: the name of the replaced plan whose running steps may continue in this plan; empty without one.
@@ -135,6 +137,7 @@ class PlanRun:
     missed: list[int] = field(default_factory=list)
     on_begin: Callable[[int], None] | None = None
     disturbed: bool = False
+    rejected: bool = False
     labels: tuple[int, ...] = ()
     replaced: str = ""
     origins: dict[int, str] = field(default_factory=dict)

@@ -57,7 +57,11 @@ if TYPE_CHECKING:
 
 
 class Foresight(Protocol):
-    """A simulation that models more than the planning domain does, e.g. the physics of a ready world (S1.10)."""
+    """A simulation that models more than the planning domain does, e.g. the physics of a ready world (S1.10).
+
+    An attribute `reads`, which is optional, names predicates and functions: if others change their facts or values, the
+    coming steps of a running plan are simulated again.
+    """
 
     def foresee(self, plan: Plan, world: World) -> Validation:
         """Simulate the plan from `world`, the state of the world that the robot believes, and return the result.
@@ -449,13 +453,31 @@ class Search:
         self._excluded = {step: until for step, until in self._excluded.items() if until > now}
         return set(self._excluded)
 
-    async def _foreseen(self, found: Found) -> Validation:
+    @property
+    def reads(self) -> frozenset[str]:
+        """The predicates and functions that the simulation reads, as its attribute `reads` tells."""
+        return frozenset(getattr(self._foresight, "reads", ()))
+
+    async def foresee_coming(self, progress: PlanProgress) -> Validation:
+        """Simulate the coming steps of a running plan, from the world after its running steps.
+
+        Raises:
+            InputError: the simulation returns another value than a `Validation`.
+        """
+        world = _ahead(self._running(progress), self._domain, self._knowledge.snapshot())
+        return Validation(valid=True) if world is None else await self._foresee(Plan(progress.coming()), world)
+
+    async def _foresee(self, plan: Plan, world: World) -> Validation:
         foresight = self._foresight
         if foresight is None:
             return Validation(valid=True)
-        world, plan = self._knowledge.snapshot(), found.answer.plan
         verdict = await self.aside(lambda: foresight.foresee(plan, world))
         _require_verdict(verdict, len(plan.steps))
+        return verdict
+
+    async def _foreseen(self, found: Found) -> Validation:
+        plan = found.answer.plan
+        verdict = await self._foresee(plan, self._knowledge.snapshot())
         if not verdict.valid:
             step = None if verdict.failing_step is None else plan.steps[verdict.failing_step]
             self._records.rejected(step, verdict.why, found.answer.engine)

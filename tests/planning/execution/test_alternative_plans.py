@@ -13,7 +13,7 @@ from planning import PlanningDomain, Robot, Validation
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain rover) (:types place)
-  (:predicates (at ?p - place) (way ?origin ?to - place))
+  (:predicates (at ?p - place) (way ?origin ?to - place) (blocked ?p - place) (seen ?p - place))
   (:action drive :parameters (?origin ?to - place)
     :precondition (and (at ?origin) (way ?origin ?to)) :effect (and (not (at ?origin)) (at ?to))))
 """)
@@ -40,13 +40,11 @@ class Wheels(Component):
 class Seconds:
     """The seconds of each step, by its target; the ways of `blocked` cannot be driven."""
 
-    def __init__(self, seconds, blocked=(), meanwhile=None):
-        self.seconds, self.blocked, self.meanwhile = seconds, blocked, meanwhile
+    def __init__(self, seconds, blocked=()):
+        self.seconds, self.blocked = seconds, blocked
         self.asked = []
 
     def foresee(self, plan, world):
-        if self.meanwhile is not None:
-            self.meanwhile(plan)
         targets = [step.args[1] for step in plan.steps]
         self.asked.append(targets)
         for number, target in enumerate(targets):
@@ -56,7 +54,7 @@ class Seconds:
         return Validation(valid=True, cost=sum(costs), costliest_step=costs.index(max(costs)))
 
 
-def drive(foresight, ways=WAYS, goal="(at goal)"):
+def drive(foresight, ways=WAYS, goal="(at goal)", changes=()):
     """Return how the robot's run ended, the places it drove to, and its records about plans."""
     wheels = Wheels()
     records: list[Record] = []
@@ -66,7 +64,12 @@ def drive(foresight, ways=WAYS, goal="(at goal)"):
         told = (fact("at", "home"), *(fact("way", *way) for way in ways))
         robot.knowledge.apply(Delta(nodes=places, added=told), author="map")
         robot.listen(records.append)
-        end = robot.achieve(goal)
+
+        def disturb(sequencer):
+            for seconds, delta in changes:
+                sequencer.change(delta, "somebody", after=seconds)
+
+        end = robot.achieve(goal, prepare=disturb)
     return end, wheels.driven, [one for one in records if one.type.startswith("plan.")]
 
 
@@ -130,3 +133,64 @@ def test_wrong_answers_of_a_simulation(answer, said):
     end, driven, _ = drive(Wrong())
     assert driven == []
     assert said in end.emitted[-1].attributes["reason"]
+
+
+class Blocked:
+    """Blocked ways, which are facts that the planning domain does not read."""
+
+    reads = ("blocked",)
+
+    def __init__(self):
+        self.asked = 0
+
+    def foresee(self, plan, world):
+        self.asked += 1
+        for number, step in enumerate(plan.steps):
+            if world.holds("blocked", (step.args[1],)):
+                return Validation(valid=False, failing_step=number, why="the way is blocked")
+        return Validation(valid=True)
+
+
+LONG = [("home", "a"), ("a", "b"), ("b", "goal"), ("a", "c"), ("c", "goal")]
+
+
+def told(predicate, place):
+    return Delta(added=(fact(predicate, place),))
+
+
+def test_a_running_plan_that_fails_in_the_simulation_after_a_change_by_others():
+    first = drive(Blocked(), ways=LONG)[1]
+    other = {"b": "c", "c": "b"}[first[1]]
+    foresight = Blocked()
+    end, driven, records = drive(foresight, ways=LONG, changes=[(0.5, told("blocked", first[1]))])
+    assert end.reached
+    assert driven == ["a", other, "goal"]  # the first step continues during the search
+    (broken,) = [one.data for one in records if one.type == "plan.broken"]
+    assert broken["reason"] == f"the simulation foresees a failure: (drive a {first[1]}): the way is blocked"
+    assert broken["author"] == "somebody"
+    assert broken["link"]["user"] == f"(drive a {first[1]})"
+
+
+def test_changes_that_the_simulation_does_not_read():
+    foresight = Blocked()
+    _, driven, records = drive(foresight, ways=LONG, changes=[(0.5, told("seen", "b")), (1.5, told("blocked", "home"))])
+    assert len(driven) == 3
+    assert foresight.asked == 2  # before the plan, and after the second change
+    assert not [one for one in records if one.type == "plan.broken"]
+
+
+def test_a_simulation_that_fails_during_the_plan():
+    class Failing(Blocked):
+        def foresee(self, plan, world):
+            if self.asked:
+                raise RuntimeError("out of memory")
+            return super().foresee(plan, world)
+
+    end, _, _ = drive(Failing(), ways=LONG, changes=[(0.5, told("blocked", "home"))])
+    assert "out of memory" in (end.programming_error or "")
+
+
+def test_a_change_after_which_every_plan_fails_in_the_simulation():
+    end, _, _ = drive(Blocked(), ways=LONG, changes=[(0.5, told("blocked", "goal"))])
+    assert not end.reached
+    assert "the simulation foresees that every plan fails" in end.emitted[-1].attributes["reason"]
