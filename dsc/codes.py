@@ -67,7 +67,7 @@ CODES: Mapping[str, str] = {
     "reachable": "A transition leads to each state.",
     "readable": "A file or part of a robot can be read.",
     "reserved-event": "A plot does not declare or emit an event that the executive itself fires.",
-    "robot": "Operations set motors to values in range, and only the outermost plot has a robot section.",
+    "robot": "Operations set motors to values of their types, and only the outermost plot has a robot section.",
     "rule": "The states and steps that a rule names exist.",
     "rule-event": "A state of the plot can end with the event of a rule.",
     "rule-response": "The response of a rule or handler exists for this kind of rule.",

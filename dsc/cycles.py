@@ -6,10 +6,12 @@ event-driven run: the cycle is the event `cycle`, which brings the values of the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from dsc.data_types import data_type
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.engine import steps
@@ -24,6 +26,8 @@ from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 
+_TIME = data_type("number from -4e9 to 4e9 in s")
+"""The times of cycles: nanoseconds have 64 bits in generated controllers."""
 _SECOND = 1_000_000_000
 """Nanoseconds in a second; times are whole nanoseconds, as in generated controllers."""
 
@@ -44,10 +48,9 @@ class CycleController:
     Args:
         plot: the plot, with a robot section.
         parameters: values for the plot's parameters, by name.
-        now: the time of the start in seconds.
 
     Attributes:
-        ended: whether the plot has ended; then each motor has its initial value.
+        ended: whether the plot has ended, also by an error; then each motor has its initial value.
         emitted: outcome events of the plot, in order.
 
     Raises:
@@ -56,14 +59,16 @@ class CycleController:
             failed, and no state handles `error`.
     """
 
-    def __init__(self, plot: ActionPlot, parameters: Mapping[str, Any] = NO_ATTRIBUTES, now: float = 0.0) -> None:
+    def __init__(self, plot: ActionPlot, parameters: Mapping[str, Any] = NO_ATTRIBUTES) -> None:
         self._library = Library([plot])
         raise_findings(validate_plot(plot, self._library))
         self._robot = _robot_of(plot)
         self._machine, self._knowledge = Machine(self._library), KnowledgeBase(Schema())
         self._timers: list[_Timer] = []
         self._orders = 0
-        self._clock = self._time = _nanoseconds(now)
+        self._clock = 0
+        self._first: int | None = None
+        self._last = -math.inf
         self._read: dict[str, int] = {}
         self.ended = False
         self.emitted: list[Event] = []
@@ -86,23 +91,21 @@ class CycleController:
         """Execute a cycle and return the values of the motors.
 
         The timers due until `now` come first, in their order, and read the values of the cycle before. The event
-        `cycle` with the values of the sensors follows.
+        `cycle` with the values of the sensors follows. The timers of the initial states count from the first cycle.
 
         Args:
             sensors: values of the sensors by name; one with a `rate` may be missing for the time of a reading.
-            now: the time in seconds, which does not decrease.
+            now: the time in seconds, which begins anywhere and does not decrease.
 
         Raises:
             UnknownNameError: there is no sensor of that name.
-            InputError: a value is missing, of another type or out of range, or the time decreases: nothing happens.
-                Or an evaluation failed, and no state handles `error`: the controller has ended.
+            InputError: a value is missing, of another type or out of range, or the time is not finite or decreases:
+                nothing happens. Or an evaluation failed, and no state handles `error`: the controller has ended.
             RunawayError: the chart goes round; the controller has ended.
         """
-        time = _nanoseconds(now)
-        if time < self._time:
-            raise InputError(f"the time of a cycle does not decrease: {now:g} s follows {self._time / _SECOND:g} s")
+        time = self._count(now)
         readings = self._check(sensors, time)
-        self._time = time
+        self._first, self._last = _nanoseconds(now) - time, now
         while not self.ended and self._timers and min(self._timers).due <= time:
             timer = min(self._timers)
             self._timers.remove(timer)
@@ -113,23 +116,41 @@ class CycleController:
             self._send(Event(CYCLE, readings))
         return self.motors
 
+    def _count(self, now: float) -> int:
+        """Return the nanoseconds since the first cycle."""
+        _TIME.check("the time of a cycle", now)
+        if now < self._last:
+            raise InputError(f"the time of a cycle does not decrease: {now:g} s follows {self._last:g} s")
+        time = _nanoseconds(now)
+        return 0 if self._first is None else time - self._first
+
     def _check(self, sensors: Mapping[str, Number], time: int) -> dict[str, Number]:
+        if not isinstance(sensors, Mapping):
+            remedy = f"pass a map, e.g. {{{', '.join(f'{name!r}: ...' for name in self._robot.sensors)}}}"
+            raise InputError(f"the values of the sensors are a map by name, not {sensors!r}: {remedy}")
         for name in sensors:
             if name not in self._robot.sensors:
                 message = f"the robot has no sensor '{name}'"
-                raise UnknownNameError(message, found=name, valid=self._robot.sensors)
+                raise UnknownNameError(message, found=str(name), valid=self._robot.sensors)
         readings = {}
         for name, sensor in self._robot.sensors.items():
             if name in sensors:
                 readings[name] = sensor.kind.check(f"the sensor '{name}'", sensors[name])
             elif not self._is_valid(name, sensor, time):
-                raise InputError(_missing(name, sensor), found=name)
+                raise InputError(self._missing(name, sensor), found=name)
         self._read.update(dict.fromkeys(readings, time))
         return readings
 
     def _is_valid(self, name: str, sensor: Sensor, time: int) -> bool:
         """Return whether the last reading of a sensor is still valid."""
         return sensor.rate is not None and name in self._read and (time - self._read[name]) * sensor.rate <= _SECOND
+
+    def _missing(self, name: str, sensor: Sensor) -> str:
+        late = ""
+        if sensor.rate is not None:
+            older = f"its last value is older than {1 / sensor.rate:g} s"
+            late = f"; {older if name in self._read else 'it has had no value before'}"
+        return f"the sensor '{name}' has no value in this cycle{late}; it is of type {sensor.type}"
 
     def _situation(self) -> KnowledgeSituation:
         return KnowledgeSituation(self._knowledge, self._library, lambda: self._clock / _SECOND)
@@ -138,14 +159,15 @@ class CycleController:
         try:
             self._after(self._machine.send(event, self._situation()))
         except RunawayError:
-            self.ended = True
+            self._take(self._machine.leave(self._situation()))
             raise
 
     def _after(self, step: steps.Step) -> None:
         self._take(step)
         if step.errors or step.bugs:
             self._take(self._machine.leave(self._situation()))
-            raise InputError("; ".join((*step.errors, *step.bugs)))
+            problems = "; ".join((*step.errors, *step.bugs))
+            raise InputError(f"{problems}: no state handles the `error`, and the plot has ended")
 
     def _take(self, step: steps.Step) -> None:
         self.emitted += step.emitted
@@ -170,11 +192,6 @@ def _robot_of(plot: ActionPlot) -> RobotSection:
         message = f"the plot '{plot.name}' uses the component '{component}'; in cycles it has only sensors and motors"
         raise InputError(message, found=component)
     return plot.robot
-
-
-def _missing(name: str, sensor: Sensor) -> str:
-    late = "" if sensor.rate is None else f"; its last value is older than {1 / sensor.rate:g} s"
-    return f"the sensor '{name}' has no value in this cycle{late}; it is of type {sensor.type}"
 
 
 def _nanoseconds(seconds: float) -> int:

@@ -171,7 +171,7 @@ class DataType:
         return checked
 
     def _number(self, where: str, value: Any) -> Any:
-        fits = _is_number(value) and (self.kind == "number" or not float(value) % 1)
+        fits = _is_number(value) and (self.kind == "number" or not value % 1)
         fits = fits and (self.least is None or value >= self.least) and (self.most is None or value <= self.most)
         self._require(fits, where, value)
         return int(value) if self.kind == "integer" else value
@@ -187,7 +187,7 @@ ANY = "any"
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < math.inf
 
 
 def _require_size(where: str, value: Any) -> Any:

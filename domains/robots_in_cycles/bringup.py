@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from domains.robots_in_cycles.drives import HOME, TRACKS, Drive, avoid, follow
+from domains.robots_in_cycles.drives import HOME, Drive, avoid, follow
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.outcomes import Outcome
 from dsc.sequencer.run_end import RunEnd
 from dsc.skills import skill
 from dsc.text.plot_files import load_plot
-from knowledge_base.errors import InputError
 from knowledge_base.store import KnowledgeBase
 from planning.robot.bundles import Bundle
 from planning.robot.simulation import Left, Setup, Simulation
@@ -35,8 +34,6 @@ class Rovers(Component):
     @skill
     async def follow_line(self, call: SkillCall, seconds: float, track: int) -> Driven:
         """Follow the line of a track."""
-        if not 0 <= track < len(TRACKS):
-            raise InputError(f"there are the tracks 0 to {len(TRACKS) - 1}, and no track {track}")
         self.drive = follow(track, self._seed, seconds)
         return await self._wait(call, seconds)
 

@@ -7,16 +7,25 @@ from collections.abc import Iterator, Mapping
 from dsc.controllers.c_functions import constant_text
 from dsc.controllers.identifiers import by_name, identifiers
 from dsc.controllers.model import Controller, Device
+from dsc.controllers.runtime.tables import MAX_NOW
 
 _HEAD = """int chart_cycle(struct chart *c, const struct chart_sensors *sensors, int64_t now_ns,
                 struct chart_motors *motors)"""
+
+_TIME = ("(!c->cycled || now_ns >= c->clock)", f"now_ns >= -INT64_C({MAX_NOW})", f"now_ns <= INT64_C({MAX_NOW})")
+_FIRST = """        for (int timer = 0; timer < CHART_TIMERS && !c->cycled; timer++) {
+            c->due[timer] += now_ns - c->clock;
+        }
+        c->clock = c->cycled ? c->clock : now_ns;
+        c->cycled = true;""".splitlines()
 
 
 def declare_cycle(controller: Controller) -> Iterator[str]:
     """Yield the declaration of the function `cycle`."""
     if controller.cycle:
         yield "/* Execute `step`, store the values of the sensors, fire `cycle`, and write the values of the motors."
-        yield "   CHART_UNKNOWN: a sensor is out of range, and nothing happens. CHART_BUSY: there was no cycle. */"
+        yield "   The timers of the initial states count from the first cycle. CHART_BUSY: there was no cycle."
+        yield "   CHART_UNKNOWN: a sensor is out of range, or the time decreases, and nothing happens. */"
         yield f"{_HEAD};"
 
 
@@ -31,7 +40,8 @@ def define_cycle(controller: Controller) -> Iterator[str]:
         yield "    (void)sensors;"
     if not controller.motors:
         yield "    (void)motors;"
-    yield f"    if ({' && '.join(checks) or 'true'}) {{"
+    yield f"    if ({' && '.join((*_TIME, *checks))}) {{"
+    yield from _FIRST
     yield from ("        status = chart_step(c, now_ns);", "        if (!c->ended && !(status & CHART_BUSY)) {")
     yield f"            struct chart_occurrence cycle = chart_occurred({controller.cycle});"
     for (word, _), name in zip(_words(controller.sensors), controller.sensors, strict=True):

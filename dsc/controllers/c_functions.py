@@ -24,6 +24,7 @@ from dsc.controllers.model import (
     attributes_read,
     may_fail,
 )
+from dsc.controllers.runtime.tables import SHORTEST_PERIOD
 from dsc.controllers.runtime.values import INT64_MIN
 
 TYPES: Mapping[Kind, str] = {"integer": "int64_t", "number": "double", "boolean": "bool"}
@@ -43,7 +44,7 @@ def constant_text(value: Fixed) -> str:
 
 
 class _CExpressions(ExpressionText):
-    words = ("&&", "||", "!")
+    words = ("&", "|", "!")  # compilers warn of contradictions between operands of `&&`, which charts may have
 
     def __init__(self, data: Mapping[str, str], attributes: Mapping[str, str]) -> None:
         self._data, self._attributes = data, attributes
@@ -102,7 +103,8 @@ class CFunctions:
             yield f"    case {number}: /* {timer.kind} of {_comment(self._controller.nodes[timer.node].name)} */"
             yield from self._absent(timer.seconds, "return chart_no_num(CHART_ERROR);")
             text = self._text.value(timer.seconds)
-            yield f"        return {text if may_fail(timer.seconds) else f'chart_num({text})'};"
+            seconds = text if may_fail(timer.seconds) else f"chart_num({text})"
+            yield f"        return chart_lasting({seconds}, {SHORTEST_PERIOD if timer.kind == 'every' else 0.0});"
         yield from ("    default:", "        return chart_no_num(CHART_ERROR);", "    }", "}", "")
 
     def _absent(self, e: Value | Condition, then: str) -> Iterator[str]:

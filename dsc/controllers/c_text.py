@@ -9,9 +9,9 @@ from importlib.resources import files
 from dsc.controllers.c_cycles import declare_cycle, define_cycle
 from dsc.controllers.c_functions import TYPES, CFunctions
 from dsc.controllers.identifiers import identifier, identifiers
-from dsc.controllers.model import Controller, Kind
+from dsc.controllers.model import Controller, Kind, Timer
 
-_FUNCTION = re.compile(r"(?:/\*[^\n]*\*/\n)?static inline [^\n]*?chart_(\w+)\([^;]*?\n\}\n\n?", re.DOTALL)
+_FUNCTION = re.compile(r"(?:/\*[^\n]*\*/\n)?static inline [^\n]*?chart_(\w+)\(.*?\n\}\n\n?", re.DOTALL)
 
 
 def c_text(controller: Controller, queue: int) -> str:
@@ -113,7 +113,7 @@ def _used_values(functions: str) -> str:
     """Return the functions of `values.c` that are used, so that a compiler warns of none."""
     text = _runtime("values") + "\n"
     found = {match[1]: match for match in _FUNCTION.finditer(text)}
-    needed, left = set[str](), ["num", "no_num", *re.findall(r"chart_(\w+)\(", functions)]
+    needed, left = set[str](), re.findall(r"chart_(\w+)\(", functions)
     while left:
         name = left.pop()
         if name in found and name not in needed:
@@ -149,13 +149,18 @@ def _tables(one: Controller) -> Iterator[str]:
     yield from _array("const struct chart_trigger chart_triggers", [", ".join(triggers) or "{0, 0}"])
     yield from _array("const int chart_targets", [", ".join(targets) or "0"])
     yield from _array("const int chart_cleared", [", ".join(cleared) or "0"])
-    timers = [f"{{CHART_{timer.kind.upper()}, {timer.node}, {timer.number}}}," for timer in one.timers]
-    yield from _array("const struct chart_timer chart_timers", timers or ["{0, 0, 0},"])
+    yield from _array("const struct chart_timer chart_timers", [*map(_timer, one.timers)] or ["{0, 0, 0, 0},"])
     activities = [f"{{{activity.node}, {activity.timer}}}, /* {activity.skill} */" for activity in one.activities]
     yield from _array("const struct chart_activity chart_activities", activities or ["{0, -1},"])
     yield from _array("const int chart_errors", [", ".join(map(str, one.error_events))])
     yield f"enum {{ CHART_ERRORS = {len(one.error_events)}, CHART_SCXML = {int(one.scxml)} }};"
     yield ""
+
+
+def _timer(one: Timer) -> str:
+    """Return a row of the timers; the numbers of an edge and of an activity are valid positions in any case."""
+    edge, activity = (0, one.number) if one.kind == "within" else (max(one.number, 0), 0)
+    return f"{{CHART_{one.kind.upper()}, {one.node}, {edge}, {activity}}},"
 
 
 def _array(head: str, rows: list[str]) -> Iterator[str]:

@@ -6,17 +6,26 @@ assigned.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, StrictBool, StrictFloat, StrictInt
+from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, StrictFloat, StrictInt
 
 from dsc.data_types import DataType, data_type
 from dsc.model.declarations import PlotVariable, TypeText
 from dsc.model.language import Frozen, TermField
+from dsc.model.reading import in_yaml
 from knowledge_base.language.syntax.expression import Constant
 
-Number = StrictBool | StrictInt | StrictFloat
+
+def _number(value: Any) -> Any:
+    if isinstance(value, int | float) and math.isfinite(value):
+        return value
+    raise ValueError(f"a finite number, true or false was expected; found {in_yaml(value)}")
+
+
+Number = Annotated[StrictBool | StrictInt | StrictFloat, BeforeValidator(_number)]
 """A value of a sensor, motor or constant."""
 
 

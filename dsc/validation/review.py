@@ -19,6 +19,7 @@ from dsc.validation.candidates import MOST, review_candidates
 from dsc.validation.emissions import review_outcomes
 from dsc.validation.library import MAX_FINDINGS
 from dsc.validation.names import review_names
+from dsc.validation.robot import review_motors
 from dsc.validation.subject import Subject, by_trigger
 from dsc.validation.turns import waiting_parts
 from knowledge_base.language.checking.contradiction import contradictory
@@ -52,7 +53,7 @@ def review_plot(
     subject = Subject(plot, library, skills=None if skills is None else by_trigger(skills))
     checks = (
         _rules(subject), _handlers(subject), _transitions(subject), review_candidates(subject), review_names(subject),
-        review_outcomes(subject), waiting_parts(subject, exclusive),
+        review_outcomes(subject), waiting_parts(subject, exclusive), review_motors(subject),
     )  # fmt: skip
     return list(islice(chain.from_iterable(checks), MAX_FINDINGS))
 

@@ -1,16 +1,20 @@
-"""Checks of the robot section: operations set declared motors, and only the outermost plot drives a robot (S3.3)."""
+"""Checks and review of the robot section: operations set motors, and the outermost plot drives a robot (S3.3)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
+from dsc.data_types import data_type
 from dsc.errors import Finding
 from dsc.events import CYCLE
 from dsc.model.actions import Assign, Perform
+from dsc.model.plot import Path
 from dsc.model.robot import RobotSection
 from dsc.model.states import State
 from dsc.validation.subject import Subject
 from knowledge_base.errors import InputError
+from knowledge_base.language.syntax.expression import Arithmetic, Constant, Term, Variable
+from knowledge_base.language.syntax.text import to_text
 
 
 def check_robot(subject: Subject) -> Iterator[Finding]:
@@ -37,6 +41,48 @@ def sets_motors(subject: Subject, action: object) -> bool:
     """Return whether an action sets only motors; entry and exit may contain such an action."""
     motors = {} if subject.plot.robot is None else subject.plot.robot.motors
     return isinstance(action, Perform) or (isinstance(action, Assign) and action.assign.keys() <= motors.keys())
+
+
+def review_motors(subject: Subject) -> Iterator[Finding]:
+    """Yield a warning for each value of an integer motor that may be a fraction, such as a quotient."""
+    robot = subject.plot.robot
+    if robot is None:
+        return
+    whole = {name for name, motor in robot.motors.items() if motor.kind.kind == "integer"}
+    for path, values in _assignments(subject, robot):
+        for name, term in values.items():
+            if name in whole and _may_be_fraction(term, subject, robot):
+                message = f"'{name}' is an integer, and {to_text(term)} may be a fraction, which is an `error`"
+                fix = f"declare the motor '{name}' as a number, or compute with integers"
+                yield subject.finding((*path, name), "robot", message, fix, found=to_text(term), level="warning")
+
+
+def _assignments(subject: Subject, robot: RobotSection) -> Iterator[tuple[Path, Mapping[str, Term]]]:
+    """Yield the values that operations, states and transitions assign, with their paths."""
+    for name, values in robot.operations.items():
+        yield ("robot", "operations", name), values
+    for path, action, _ in subject.actions():
+        if isinstance(action, Assign):
+            yield (*path, "assign"), action.assign
+    for path, _, way in subject.ways():
+        yield (*path, "assign"), way.assign
+        for number, action in enumerate(way.do):
+            if isinstance(action, Assign):
+                yield (*path, "do", number, "assign"), action.assign
+
+
+def _may_be_fraction(term: Term, subject: Subject, robot: RobotSection) -> bool:
+    match term:
+        case Constant(bool() | int() | float() as value):
+            return value % 1 != 0
+        case Variable(name) if name in robot.constants:
+            return robot.constants[name] % 1 != 0
+        case Variable(name):
+            return data_type(subject.types.get(name) or "integer").kind == "number"
+        case Arithmetic(operator, args):
+            return operator == "/" or any(_may_be_fraction(one, subject, robot) for one in args)
+        case _:
+            return False
 
 
 def _check_operations(subject: Subject) -> Iterator[Finding]:

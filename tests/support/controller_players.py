@@ -27,7 +27,7 @@ QUEUE = 4
 """Capacity of the queue, so small that it overflows."""
 FULL, UNKNOWN, LOST, OVERFLOW, FAILED, RUNAWAY, BUSY = 1, 2, 4, 8, 16, 32, 64
 MOST_EVENTS = 1000
-NEVER = 9e9
+NEVER = 4e9
 """The seconds from which a timer of a controller is never due."""
 NOT_OF_THE_ENGINE = LOST | OVERFLOW | RUNAWAY
 

@@ -49,7 +49,7 @@ struct chart {
     int queue_first, queue_count, internal_first, internal_count, kept_count;
     uint32_t turn, macrostep, runs, orders;
     int microsteps;
-    bool finished, failed;
+    bool finished, failed, cycled;
 };
 
 /* Enter the initial states; the status has CHART_FAILED if a parameter or an initial value does not fit. */

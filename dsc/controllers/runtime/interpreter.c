@@ -54,12 +54,9 @@ static void chart_fail(struct chart *c, int failure)
 static void chart_arm(struct chart *c, int timer)
 {
     const struct chart_num seconds = chart_seconds(c, timer);
-    const double least = chart_timers[timer].kind == CHART_EVERY ? 0.001 : 0.0;
     if (seconds.bad) {
         chart_fail(c, seconds.bad);
-    } else if (seconds.value < least) {
-        chart_fail(c, CHART_ERROR);
-    } else if (seconds.value < 9e9) { /* others are never due: nanoseconds have 64 bits */
+    } else if (seconds.value < 4e9) { /* others are never due: nanoseconds have 64 bits */
         c->armed[timer] = true;
         c->due[timer] = c->clock + (int64_t)(seconds.value * 1e9 + 0.5);
         c->order[timer] = ++c->orders;
@@ -713,8 +710,8 @@ static void chart_time_out(struct chart *c, int number)
     c->clock = c->due[number] > c->clock ? c->due[number] : c->clock;
     if (timer->kind == CHART_WITHIN) {
         occurrence.event = CHART_TIMED_OUT;
-        chart_stop(c, timer->number);
-        chart_end_activity(c, timer->number, &occurrence);
+        chart_stop(c, timer->activity);
+        chart_end_activity(c, timer->activity, &occurrence);
         return;
     }
     const uint32_t serial = c->serial[timer->node];
@@ -725,7 +722,7 @@ static void chart_time_out(struct chart *c, int number)
         occurrence.node = timer->node;
         occurrence.serial = serial;
         occurrence.exact = true;
-        occurrence.edge = timer->number;
+        occurrence.edge = timer->edge;
         occurrence.periodic = timer->kind == CHART_EVERY;
         chart_take(c, &occurrence);
     }

@@ -59,7 +59,7 @@ class ControllerState:
         self.kept: list[Occurrence] = []
         self.event: Mapping[str, Any] = NO_DATA
         self.turn = self.macrostep = self.microsteps = self.runs = self.armed = self.dropped = self.lost = 0
-        self.ended = self.finished = self.failed = False
+        self.ended = self.finished = self.failed = self.cycled = False
 
     def _fire(self, occurrence: Occurrence) -> None:
         if len(self.internal) >= self.internal_capacity:

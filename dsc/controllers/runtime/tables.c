@@ -26,9 +26,9 @@ struct chart_trigger {
     int event, edge;
 };
 
-/* A timer of a node; `number` is its edge, for CHART_WITHIN its activity. */
+/* A timer of a node with its edge or, for CHART_WITHIN, its activity. */
 struct chart_timer {
-    int kind, node, number;
+    int kind, node, edge, activity;
 };
 
 /* An activity of a node, with its timer of kind CHART_WITHIN; -1 is none. */

@@ -10,8 +10,10 @@ MAX_MICROSTEPS = 1000
 """Upper bound of microsteps for one event."""
 MAX_EVENTS = 1000
 """Upper bound of events and timers that one call of `step` handles."""
-MAX_SECONDS = 9e9
+MAX_SECONDS = 4e9
 """The time from which a timer is never due: nanoseconds have 64 bits."""
+MAX_NOW = 2**62
+"""The largest time of a cycle in nanoseconds."""
 DONE_EVENT, ERROR_EVENT = 1, 2
 AT_LEAST, AFTER, EVERY, WITHIN = range(4)
 SHORTEST_PERIOD = 0.001

@@ -142,6 +142,12 @@ static inline struct chart_num chart_between_num(struct chart_num a, struct char
     return a.bad || (least.value <= a.value && a.value <= most.value) ? a : chart_no_num(CHART_ERROR);
 }
 
+/* The seconds of a timer, which are a failure if they are too few. */
+static inline struct chart_num chart_lasting(struct chart_num a, double least)
+{
+    return a.bad || a.value >= least ? a : chart_no_num(CHART_ERROR);
+}
+
 /* The result of a condition is 1 (true), 0 (false) or a failure. */
 static inline int chart_eq_int(struct chart_int a, struct chart_int b)
 {

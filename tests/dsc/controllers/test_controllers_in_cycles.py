@@ -136,5 +136,13 @@ def test_wrong_values_of_sensors_of_a_generated_controller():
     for wrong in ({"light": 2}, {"light": True}, {"steps": 1.5}, {"bumper": 1}, {"light": None}, {"lite": 1}):
         with pytest.raises(ValueError, match=r"'light'|'steps'|'bumper'"):
             controller.cycle({**good, **wrong}, 5)
+    for wrong in (None, [("light", 1)]):
+        with pytest.raises(ValueError, match="a map by name"):
+            controller.cycle(wrong, 5)
+    for wrong in (None, 0.5, True, 2**63):
+        with pytest.raises(ValueError, match="an integer of nanoseconds"):
+            controller.cycle(good, wrong)
     assert controller.post(names["Events"].CYCLE) == names["Status"].UNKNOWN
     assert controller.cycle(good, 5).keys() == {"wheel", "gear", "lamp"}
+    with pytest.raises(ValueError, match="does not decrease: 4 follows 5"):
+        controller.cycle(good, 4)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf, nan
+
 import pytest
 from dsc_charts import plot
 from hypothesis import given
@@ -10,6 +12,9 @@ from hypothesis import strategies as st
 from dsc import CycleController, Event, LoopClock, Machine, Sequencer, run_simulated
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
+from dsc.errors import RunawayError
+from dsc.text.plot_files import parse_plot
+from dsc.validation import review_plot
 from knowledge_base import InputError, KnowledgeBase, Schema
 
 FOLLOWER = """
@@ -85,6 +90,27 @@ def test_wrong_values_of_sensors(sensors, now, message):
     assert robot.step({"left": 1000, "right": 0}, 1)["wheel"] == -1.5
 
 
+@pytest.mark.parametrize(
+    ("sensors", "now", "message"),
+    [
+        ({"left": 1}, 1, "'right' has no value in this cycle; it has had no value before"),
+        (None, 1, r"a map by name, not None: pass a map, e\.g\. {'left': ..., 'right': ...}"),
+        ([("left", 1)], 1, "a map by name"),
+        ({1: 2}, 1, "no sensor '1'; valid: left, right"),
+        ({"left": 10**400, "right": 0}, 1, "the sensor 'left' is a number from 0 to 1023"),
+        *(
+            ({"left": 1, "right": 0}, now, "the time of a cycle is a number")
+            for now in (nan, inf, "1", None, True, 1e10)
+        ),
+    ],
+)
+def test_wrong_arguments_of_the_first_step(sensors, now, message):
+    robot = follower()
+    with pytest.raises(InputError, match=message):
+        robot.step(sensors, now)
+    assert robot.step({"left": 1000, "right": 0}, -5)["wheel"] == -1.5
+
+
 def test_a_sensor_with_a_rate_keeps_its_value_for_the_time_of_a_reading():
     robot = follower()
     robot.step({"left": 900, "right": 7}, 0.0)
@@ -120,6 +146,72 @@ def test_a_failed_evaluation_ends_the_cycles():
     with pytest.raises(InputError, match=r"a: .*division by zero"):
         robot.step({"s": 0}, 1)
     assert (robot.ended, robot.motors) == (True, {"m": 0.5})
+
+
+@pytest.mark.parametrize("begin", [-7.0, 0.0, 1000.0, 1.7e9])
+def test_timers_of_the_initial_state_from_the_first_cycle_on(begin):
+    text = """
+    plot: p
+    robot: {sensors: {}, motors: {m: integer}}
+    states:
+      a: {after: {seconds: 0.5, to: b}, every: {seconds: 0.2, assign: {m: (+ ?m 1)}}}
+      b: {entry: {assign: {m: 10}}, on: {cycle: {}}}
+    """
+    robot = CycleController(plot(text))
+    found = [robot.step({}, begin + tenths / 10 + 0.01)["m"] for tenths in (0, 1, 3, 4, 6)]
+    assert found == [0, 0, 1, 2, 10]
+
+
+def test_a_chart_that_goes_round_ends_with_the_initial_values_of_the_motors():
+    text = """
+    plot: p
+    robot: {sensors: {s: boolean}, motors: {m: {type: number, initial: 0.5}}}
+    emits: {left: }
+    states:
+      a: {entry: {assign: {m: 3}}, exit: {assign: {m: 4}}, on: {cycle: {to: b, when: (= ?s true)}}, after: {seconds: 9, to: a}}
+      b: {always: c}
+      c: {always: b}
+    """
+    robot = CycleController(plot(text))
+    assert robot.step({"s": False}, 0) == {"m": 3}
+    with pytest.raises(RunawayError, match="goes round"):
+        robot.step({"s": True}, 1)
+    assert (robot.ended, robot.motors, robot.active) == (True, {"m": 0.5}, [])
+    assert robot.step({"s": True}, 20) == {"m": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("term", "line"),
+    [("?s", 5), ("(/ ?n 2)", 5), ("(* ?half ?n)", 5), ("(+ 0.5 ?n)", 5), ("(+ ?two ?n)", 0), ("(* 2 ?n)", 0), (3, 0)],
+)
+@pytest.mark.parametrize("where", ["on: {cycle: {assign: {m: @}}}", "{entry: {assign: {m: @}}, on: {cycle: {}}}"])
+def test_fractions_for_an_integer_motor(term, line, where):
+    text = (
+        "plot: p\nrobot: {sensors: {s: number, n: integer}, motors: {m: integer, x: number},\n"
+        "  constants: {half: 0.5, two: 2}, operations: {go: {x: ?s}}}\nstates:\n  a: "
+    )
+    made = parse_plot(text + (where if where[0] == "{" else f"{{{where}}}").replace("@", str(term)) + "\n", "p.yaml")
+    found = [str(one) for one in review_plot(made, Library([made])) if one.code == "robot"]
+    assert len(found) == bool(line)
+    for one in found:
+        assert one.startswith("p.yaml:5:")
+        assert f"'m' is an integer, and {term} may be a fraction" in one
+
+
+def test_a_fraction_for_an_integer_motor_in_a_cycle():
+    text = (
+        "{plot: p, robot: {sensors: {s: number}, motors: {m: integer}}, states: {a: {on: {cycle: {assign: {m: ?s}}}}}}"
+    )
+    robot = CycleController(plot(text))
+    assert robot.step({"s": 2.0}, 0) == {"m": 2}
+    with pytest.raises(InputError, match=r"a: 'p.m' is an integer, not 2.5: no state handles the `error`"):
+        robot.step({"s": 2.5}, 1)
+
+
+@pytest.mark.parametrize("value", ["hello", ".nan", ".inf", "[1]", ""])
+def test_constants_that_are_no_numbers(value):
+    with pytest.raises(InputError, match=r"p.yaml:3:\d+: a finite number, true or false was expected; found"):
+        parse_plot(f"plot: p\nrobot:\n  constants: {{c: {value}}}\nstates: {{a: {{on: {{cycle: a}}}}}}\n", "p.yaml")
 
 
 def test_emitted_outcomes_and_parameters():
