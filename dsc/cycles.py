@@ -16,6 +16,7 @@ from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.engine import steps
 from dsc.engine.machine import Machine
+from dsc.engine.macrostep import MAX_MICROSTEPS
 from dsc.errors import RunawayError
 from dsc.events import CYCLE, NO_ATTRIBUTES, Event
 from dsc.model.plot import ActionPlot
@@ -106,15 +107,25 @@ class CycleController:
         time = self._count(now)
         readings = self._check(sensors, time)
         self._first, self._last = _nanoseconds(now) - time, now
-        while not self.ended and self._timers and min(self._timers).due <= time:
-            timer = min(self._timers)
-            self._timers.remove(timer)
-            self._clock = max(self._clock, timer.due)
-            self._send(timer.event)
-        self._clock = max(self._clock, time)
+        self._time_out(time)
         if not self.ended:
             self._send(Event(CYCLE, readings))
         return self.motors
+
+    def _time_out(self, time: int) -> None:
+        """Handle the timers that are due until a time, in their order."""
+        handled = 0
+        while not self.ended and self._timers and min(self._timers).due <= time:
+            timer = min(self._timers)
+            self._timers.remove(timer)
+            handled = 1 if timer.due > self._clock else handled + 1
+            if handled > MAX_MICROSTEPS:
+                error = RunawayError(f"{MAX_MICROSTEPS} timers are due at the same time", self.active)
+                self._take(self._machine.leave(self._situation()))
+                raise error
+            self._clock = max(self._clock, timer.due)
+            self._send(timer.event)
+        self._clock = max(self._clock, time)
 
     def _count(self, now: float) -> int:
         """Return the nanoseconds since the first cycle."""
@@ -195,4 +206,4 @@ def _robot_of(plot: ActionPlot) -> RobotSection:
 
 
 def _nanoseconds(seconds: float) -> int:
-    return int(seconds * _SECOND + 0.5)
+    return math.floor(seconds * _SECOND + 0.5)

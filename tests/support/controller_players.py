@@ -313,8 +313,35 @@ static void chart_play(void)
 }
 """
 MAIN = 'int main(void)\n{\n    int number;\n    while (scanf("%d", &number) == 1) {\n        switch (number) {\n'
-SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O0")
+SANITIZED = (
+    "-fsanitize=address,undefined", "-fsanitize-undefined-trap-on-error",
+    "-O0", "--param", "asan-instrumentation-with-call-threshold=0",
+)  # fmt: skip
+"""Options of gcc for programs that end at a wrong access or undefined behaviour; the last ones halve its time."""
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+
+
+def compile_players(folder, models, driver, cc, flags):
+    """Compile the C files of controllers with their drivers to one program; without a driver, with that of the plays."""
+    parts = ["#include <stdio.h>\n#include <stdlib.h>\n"]
+    for model in models:
+        name = identifier(model.name)
+        (folder / f"{name}.c").write_text(c_text(model, QUEUE), encoding="utf-8")
+        parts.append(f'#include "{name}.c"\n{_named(driver or _driver(model), name)}')
+    calls = [f"        case {n}: {identifier(model.name)}_play(); break;\n" for n, model in enumerate(models)]
+    parts.append(f"{MAIN}{''.join(calls)}        default: return 1;\n        }}\n        fflush(stdout);\n    }}\n}}\n")
+    (folder / "main.c").write_text("".join(parts), encoding="utf-8")
+    program = folder / "players"
+    subprocess.run([cc, *STRICT, *flags, "-o", program, "main.c"], check=True, timeout=600, cwd=folder)
+    return program
+
+
+def run_players(program, text):
+    """Return the lines that a program writes for a text."""
+    done = subprocess.run([program], input=text, capture_output=True, text=True, check=False, timeout=600)
+    if done.returncode:
+        raise AssertionError(f"the C program ended with {done.returncode}: {done.stderr[-3000:]}")
+    return done.stdout.splitlines()
 
 
 class CPlayers:
@@ -322,27 +349,12 @@ class CPlayers:
 
     def __init__(self, folder, plots, cc="cc", flags=SANITIZED):
         self.models = [compile_controller(plot) for plot in plots]
-        parts = ["#include <stdio.h>\n#include <stdlib.h>\n"]
-        for model in self.models:
-            name = identifier(model.name)
-            (folder / f"{name}.c").write_text(c_text(model, QUEUE), encoding="utf-8")
-            parts.append(f'#include "{name}.c"\n{_driver(model, name)}')
-        calls = [f"        case {n}: {identifier(model.name)}_play(); break;\n" for n, model in enumerate(self.models)]
-        parts.append(
-            f"{MAIN}{''.join(calls)}        default: return 1;\n        }}\n        fflush(stdout);\n    }}\n}}\n"
-        )
-        (folder / "main.c").write_text("".join(parts), encoding="utf-8")
-        self.program = folder / "players"
-        command = [cc, *STRICT, *flags, "-o", str(self.program), str(folder / "main.c")]
-        subprocess.run(command, check=True, timeout=600, cwd=folder)
+        self.program = compile_players(folder, self.models, None, cc, flags)
 
     def play(self, plays):
         """The records of each play; a play is the number of its chart and its calls."""
         text = "\n".join(f"{number}\n{''.join(self._line(number, call) for call in calls)}." for number, calls in plays)
-        done = subprocess.run([self.program], input=text, capture_output=True, text=True, check=False, timeout=600)
-        if done.returncode:
-            raise AssertionError(done.stderr[-3000:])
-        lines = iter(done.stdout.splitlines())
+        lines = iter(run_players(self.program, text))
         return [[self._record(self.models[number], lines) for _ in range(len(calls) + 1)] for number, calls in plays]
 
     def _line(self, number, call):
@@ -390,7 +402,7 @@ def _values(words, kinds):
     return found
 
 
-def _driver(model, name):
+def _driver(model):
     def shown(kinds, value, has):
         forms = {"integer": ("%lld", "(long long)"), "number": ("%.17g", ""), "boolean": ("%d", "")}
         parts = []
@@ -402,7 +414,10 @@ def _driver(model, name):
 
     text = DRIVER.replace("@ARGUMENTS@", shown(model.arguments, "a->", has=True))
     text = text.replace("@ATTRIBUTES@", shown(model.attributes, "a->", has=True))
-    text = text.replace("@DATA@", shown(model.data, "chart_it.data.", has=False))
+    return text.replace("@DATA@", shown(model.data, "chart_it.data.", has=False))
+
+
+def _named(text, name):
     return (
         text.replace("CHART_", f"{name.upper()}_")
         .replace("chart_", f"{name}_")

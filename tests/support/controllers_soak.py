@@ -1,9 +1,9 @@
 """Random charts and plays: do the engine, the Python controller and the C controller do the same, call by call?
 
 `make controllers` runs it. Each chart gets several plays; the record of each call has the status, the configuration,
-the skills started and stopped, the commands, the outcomes and the variables. After an overflow of 64 bits, which the
-engine does not have, only the two controllers are compared. At the end, a table has the sizes and times of the line
-follower of the page.
+the skills started and stopped, the commands, the outcomes and the variables. Every fourth chart has a robot section and
+is driven in cycles. After an overflow of 64 bits, which the engine does not have, only the two controllers are compared.
+At the end, a table has the sizes and times of the line follower of the page.
 """
 
 from __future__ import annotations
@@ -17,17 +17,23 @@ import tempfile
 import time
 from collections import Counter
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 from controller_charts import draw_play, grow
-from controller_players import NOT_OF_THE_ENGINE, CPlayers, EnginePlayer, PythonPlayer
+from controller_players import BUSY, LOST, NOT_OF_THE_ENGINE, OVERFLOW, CPlayers, EnginePlayer, PythonPlayer
 from controller_times import LINE_FOLLOWER, time_c, time_engine, time_python
+from cycle_charts import draw_cycles, grow_robot
+from cycle_players import CCycles, play_engine, play_python
 
 from dsc.controllers import build_controller
 from dsc.text.plot_files import load_plot
 
 BATCH = 20
 """Charts that are compiled to one program."""
+CYCLES = 60
+"""Cycles of one play of a chart with a robot section."""
+NOT_IN_CYCLES = LOST | OVERFLOW | BUSY
 
 
 class DiffersError(AssertionError):
@@ -76,23 +82,50 @@ class Chart:
         ends = (number for number, one in enumerate(records) if one.status & NOT_OF_THE_ENGINE)
         return next(ends, len(records))
 
+    C = CPlayers
+
+
+class RobotChart:
+    """A random chart with a robot section, with its cycles by `CycleController` and by the Python controller."""
+
+    C = CCycles
+
+    def __init__(self, seed, plays, counts):
+        self.seed, self.plot, self.plays = seed, grow_robot(seed), []
+        seen: Counter[str] = Counter()
+        for number in range(plays):
+            cycles = draw_cycles(seed * 100 + number, CYCLES)
+            engine, records = play_engine(self.plot, cycles), play_python(self.plot, cycles)
+            ends = (n for n, one in enumerate(records) if one.status & NOT_IN_CYCLES)
+            compared = min(next(ends, len(records)), len(engine))
+            compare(engine[:compared], records[:compared], f"seed {seed}, cycles by the engine and Python")
+            self.plays.append((cycles[: len(records)], records))
+            entered = sum(one.active != other.active for one, other in pairwise(records))
+            seen.update(cycles=len(records), cycles_compared=compared, configurations_in_cycles=entered)
+            seen.update(robot_plays=1, robots_that_end=int(records[-1].ended))
+        counts.update(seen, charts=1, robots=1, regions=1)
+
 
 def run(seeds, plays, cc, counts, batch=BATCH):
     """Compare the charts of these seeds; with a compiler, also with C."""
     left = [*seeds]
     while left:
         some, left = left[:batch], left[batch:]
-        charts = [Chart(seed, plays, counts) for seed in some]
-        if cc is None:
-            continue
-        with tempfile.TemporaryDirectory() as folder:
-            program = CPlayers(Path(folder), [chart.plot for chart in charts], cc)
-            wanted = [(n, calls) for n, chart in enumerate(charts) for calls, _ in chart.plays]
-            found = program.play(wanted)
-        expected = [(chart, records) for chart in charts for _, records in chart.plays]
-        for (chart, records), own in zip(expected, found, strict=True):
-            compare(records, own, f"seed {chart.seed}, Python and C")
-            counts.update(c_calls=len(own))
+        charts = [(RobotChart if seed % 4 == 3 else Chart)(seed, plays, counts) for seed in some]
+        for kind in (Chart, RobotChart) if cc is not None else ():
+            _compare_with_c([one for one in charts if type(one) is kind], cc, counts)
+
+
+def _compare_with_c(charts, cc, counts):
+    if not charts:
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        program = charts[0].C(Path(folder), [chart.plot for chart in charts], cc)
+        found = program.play([(n, calls) for n, chart in enumerate(charts) for calls, _ in chart.plays])
+    expected = [(chart, records) for chart in charts for _, records in chart.plays]
+    for (chart, records), own in zip(expected, found, strict=True):
+        compare(records, own, f"seed {chart.seed}, Python and C")
+        counts.update(c_calls=len(own))
 
 
 def print_table(cc):

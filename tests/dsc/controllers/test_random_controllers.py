@@ -20,7 +20,9 @@ def test_random_charts_by_the_engine_and_both_controllers():
     assert min(counts["with_timers"], counts["with_overflow"], counts["compared"]) > 3
     if CC is None:
         pytest.skip("there is no C compiler `cc`; the Python controllers agree with the engine")
-    assert counts["c_calls"] == counts["calls"]
+    assert counts["c_calls"] == counts["calls"] + counts["cycles"]
+    assert counts["cycles_compared"] > 200
+    assert counts["configurations_in_cycles"] > 50
 
 
 def test_a_difference_is_found():

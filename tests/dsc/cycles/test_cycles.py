@@ -180,6 +180,26 @@ def test_a_chart_that_goes_round_ends_with_the_initial_values_of_the_motors():
     assert robot.step({"s": True}, 20) == {"m": 0.5}
 
 
+def test_timers_that_are_due_again_at_once():
+    text = """
+    plot: p
+    robot: {sensors: {}, motors: {m: {type: integer, initial: 7}}}
+    states: {a: {entry: {assign: {m: 1}}, after: {seconds: 1, to: b}}, b: {after: {seconds: 0, to: c}}, c: {after: {seconds: 0, to: b}}}
+    """
+    robot = CycleController(plot(text))
+    assert robot.step({}, 0) == {"m": 1}
+    with pytest.raises(RunawayError, match="1000 timers are due at the same time"):
+        robot.step({}, 1)
+    assert (robot.ended, robot.motors) == (True, {"m": 7})
+
+
+def test_many_timers_in_one_cycle():
+    text = "{plot: p, robot: {motors: {m: integer}}, states: {a: {every: {seconds: 0.001, assign: {m: (+ ?m 1)}}}}}"
+    robot = CycleController(plot(text))
+    robot.step({}, 0)
+    assert robot.step({}, 3) == {"m": 3000}
+
+
 @pytest.mark.parametrize(
     ("term", "line"),
     [("?s", 5), ("(/ ?n 2)", 5), ("(* ?half ?n)", 5), ("(+ 0.5 ?n)", 5), ("(+ ?two ?n)", 0), ("(* 2 ?n)", 0), (3, 0)],
