@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+import shutil
+import subprocess
 from typing import Any
 
 import pytest
@@ -9,11 +12,14 @@ import pytest
 pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install 'dynamic-state-charts[physics]'")
 
 from domains.robots_in_cycles import avoid, follow, line_follower, obstacle_avoider
-from domains.robots_in_cycles.drives import HOME, TRACKS
+from domains.robots_in_cycles.drives import HOME, TRACKS, plot_of
 from domains.robots_in_cycles.picture import draw_avoid, draw_follow
 from dsc import load_plot
 from dsc.controllers import build_controller
+from knowledge_base import InputError
 from planning import deploy
+
+CC = shutil.which("cc")
 
 
 def generated(name):
@@ -23,6 +29,27 @@ def generated(name):
     controller = names["Controller"]()
     controller.init(names["Host"](), 0)
     return lambda sensors, now: controller.cycle(sensors, int(now * 1e9 + 0.5))
+
+
+def compiled(name, folder):
+    """The cycle of the generated C controller as a shared library; all its sensors and motors are doubles."""
+    plot = load_plot(HOME / "plots" / f"{name}.yaml")
+    (folder / f"{name}.c").write_text(build_controller(plot, "c99"))
+    flags = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-ffp-contract=off")
+    subprocess.run(
+        [str(CC), *flags, "-shared", "-fPIC", "-o", f"{name}.so", f"{name}.c"], check=True, cwd=folder, timeout=60
+    )
+    library = ctypes.CDLL(str(folder / f"{name}.so"))
+    controller, host = ctypes.create_string_buffer(1 << 20), (ctypes.c_void_p * 5)()
+    assert library[f"{name}_init"](controller, host, None, ctypes.c_int64(0)) == 0
+    sensors, motors = (ctypes.c_double * len(plot.robot.sensors))(), (ctypes.c_double * len(plot.robot.motors))()
+
+    def cycle(values, now):
+        sensors[:] = [values[one] for one in plot.robot.sensors]
+        assert library[f"{name}_cycle"](controller, sensors, ctypes.c_int64(int(now * 1e9 + 0.5)), motors) == 0
+        return dict(zip(plot.robot.motors, motors, strict=True))
+
+    return cycle
 
 
 def by_hand(sensors, _now):
@@ -54,9 +81,38 @@ def test_a_blind_robot_has_contacts():
     assert follow(0, 0, 20, lambda *_: {"left_wheel": 6, "right_wheel": 6}).distance > 0.1
 
 
-def test_the_generated_controllers_drive_the_same_path():
+def test_the_generated_python_controllers_drive_the_same_path():
     assert follow(1, 0, 10, generated("follow_line")).path == follow(1, 0, 10).path
     assert avoid(1, 10, generated("avoid_obstacles")).path == avoid(1, 10).path
+
+
+@pytest.mark.skipif(CC is None, reason="there is no C compiler `cc`")
+@pytest.mark.parametrize("track", range(len(TRACKS)))
+def test_the_generated_c_controllers_drive_the_same_path(track, tmp_path):
+    path = follow(track, 0, 20, compiled("follow_line", tmp_path)).path
+    assert path == follow(track, 0, 20).path
+    assert len(path) == 626
+    assert avoid(track, 10, compiled("avoid_obstacles", tmp_path)).path == avoid(track, 10).path
+
+
+def test_another_speed_drives_another_path():
+    """The comparison of paths sees a difference of one part in a million."""
+    drive = plot_of("follow_line")
+    assert (
+        follow(1, 0, 10).path
+        != follow(1, 0, 10, lambda *given: {k: v * (1 + 1e-6) for k, v in drive(*given).items()}).path
+    )
+
+
+@pytest.mark.parametrize("track", [-1, len(TRACKS), "x", 1.5])
+def test_tracks_that_do_not_exist(track):
+    with deploy(line_follower()) as robot, pytest.raises(InputError, match=r"'line_follower\.track' is .*integer"):
+        robot.run("line_follower", {"track": track})
+
+
+def test_the_range_of_tracks_is_that_of_the_tracks():
+    parameter = load_plot(HOME / "line_follower.yaml").parameters["track"]
+    assert (parameter.least, parameter.most) == (0, len(TRACKS) - 1)
 
 
 @pytest.mark.parametrize(("bundle", "field"), [(line_follower, "laps"), (obstacle_avoider, "metres")])

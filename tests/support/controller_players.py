@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections import deque
 from dataclasses import dataclass, field
@@ -318,7 +319,17 @@ SANITIZED = (
     "-O0", "--param", "asan-instrumentation-with-call-threshold=0",
 )  # fmt: skip
 """Options of gcc for programs that end at a wrong access or undefined behaviour; the last ones halve its time."""
+COMPILERS = [one for one in map(shutil.which, ("gcc", "clang")) if one is not None]
+LEVELS = ("-O0", "-O2", "-O3", "-Os", "-fsanitize=address,undefined")
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+
+
+def compile_at_levels(folder, text, compilers=COMPILERS):
+    """Compile the C file of a controller alone, at each level of optimization; a warning is an error."""
+    (folder / "alone.c").write_text(text, encoding="utf-8")
+    for compiler in compilers:
+        for level in LEVELS:
+            subprocess.run([compiler, *STRICT, level, "-c", "alone.c"], check=True, timeout=120, cwd=folder)
 
 
 def compile_players(folder, models, driver, cc, flags):

@@ -3,7 +3,7 @@
 `make controllers` runs it. Each chart gets several plays; the record of each call has the status, the configuration,
 the skills started and stopped, the commands, the outcomes and the variables. Every fourth chart has a robot section and
 is driven in cycles. After an overflow of 64 bits, which the engine does not have, only the two controllers are compared.
-At the end, a table has the sizes and times of the line follower of the page.
+One chart of a batch compiles at all levels of optimization. At the end, a table has the sizes and times of the line follower of the page.
 """
 
 from __future__ import annotations
@@ -21,12 +21,24 @@ from itertools import pairwise
 from pathlib import Path
 
 from controller_charts import draw_play, grow
-from controller_players import BUSY, LOST, NOT_OF_THE_ENGINE, OVERFLOW, CPlayers, EnginePlayer, PythonPlayer
+from controller_players import (
+    BUSY,
+    LOST,
+    NOT_OF_THE_ENGINE,
+    OVERFLOW,
+    QUEUE,
+    CPlayers,
+    EnginePlayer,
+    PythonPlayer,
+    compile_at_levels,
+)
 from controller_times import LINE_FOLLOWER, time_c, time_engine, time_python
 from cycle_charts import draw_cycles, grow_robot
-from cycle_players import CCycles, play_engine, play_python
+from cycle_players import CCycles, as_raised, play_engine, play_python
 
 from dsc.controllers import build_controller
+from dsc.controllers.building import compile_controller
+from dsc.controllers.c_text import c_text
 from dsc.text.plot_files import load_plot
 
 BATCH = 20
@@ -98,7 +110,7 @@ class RobotChart:
             engine, records = play_engine(self.plot, cycles), play_python(self.plot, cycles)
             ends = (n for n, one in enumerate(records) if one.status & NOT_IN_CYCLES)
             compared = min(next(ends, len(records)), len(engine))
-            compare(engine[:compared], records[:compared], f"seed {seed}, cycles by the engine and Python")
+            compare(engine[:compared], as_raised(records[:compared]), f"seed {seed}, cycles by the engine and Python")
             self.plays.append((cycles[: len(records)], records))
             entered = sum(one.active != other.active for one, other in pairwise(records))
             seen.update(cycles=len(records), cycles_compared=compared, configurations_in_cycles=entered)
@@ -120,6 +132,7 @@ def _compare_with_c(charts, cc, counts):
     if not charts:
         return
     with tempfile.TemporaryDirectory() as folder:
+        compile_at_levels(Path(folder), c_text(compile_controller(charts[0].plot), QUEUE))
         program = charts[0].C(Path(folder), [chart.plot for chart in charts], cc)
         found = program.play([(n, calls) for n, chart in enumerate(charts) for calls, _ in chart.plays])
     expected = [(chart, records) for chart in charts for _, records in chart.plays]
@@ -158,7 +171,7 @@ def main():
         if time.monotonic() - began < options.seconds:
             run(range(first, min(first + BATCH, end)), options.plays, cc, counts)
     for name, count in counts.items():
-        print(f"{name:14} {count}")
+        print(f"{name:24} {count}")
     print(f"{time.monotonic() - began:.0f} s: all players agree")
     print_table(cc)
 

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
-
 import pytest
-from controller_players import STRICT
+from controller_players import COMPILERS, compile_at_levels
 
 from dsc.controllers import build_controller
 from dsc.text.plot_files import parse_plot
 
-COMPILERS = [one for one in map(shutil.which, ("gcc", "clang")) if one is not None]
-LEVELS = ("-O0", "-O2", "-O3", "-Os")
 SMALL = {
     "no_timer": "robot: {motors: {m: number}}\nstates: {a: {on: {cycle: {assign: {m: 1}}}}}",
     "a_timer": "robot: {motors: {m: number}}\nstates: {a: {on: {cycle: b}}, b: {after: {seconds: 1, to: a}}}",
@@ -31,6 +26,4 @@ SMALL = {
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", SMALL)
 def test_compilation_of_small_charts_without_warnings(name, compiler, tmp_path):
-    (tmp_path / "chart.c").write_text(build_controller(parse_plot(f"plot: {name}\n{SMALL[name]}\n"), "c99"))
-    for level in (*LEVELS, "-fsanitize=address,undefined"):
-        subprocess.run([compiler, *STRICT, level, "-c", "chart.c"], check=True, timeout=120, cwd=tmp_path)
+    compile_at_levels(tmp_path, build_controller(parse_plot(f"plot: {name}\n{SMALL[name]}\n"), "c99"), [compiler])
