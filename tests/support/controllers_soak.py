@@ -3,7 +3,8 @@
 `make controllers` runs it. Each chart gets several plays; the record of each call has the status, the configuration,
 the skills started and stopped, the commands, the outcomes and the variables. Every fourth chart has a robot section and
 is driven in cycles. After an overflow of 64 bits, which the engine does not have, only the two controllers are compared.
-One chart of a batch compiles at all levels of optimization. At the end, a table has the sizes and times of the line follower of the page.
+One chart of a batch compiles at all levels of optimization. At the end, a table has the sizes and times of the line
+follower of the page.
 """
 
 from __future__ import annotations
