@@ -26,7 +26,7 @@ def rename_command(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the difference, and write nothing.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
-    """Rename a name in the plots, profiles and PDDL files of a project; report the places in Python code.
+    """Rename a name in the plots, profiles, scenarios and PDDL files of a project; report the places in Python code.
 
     Lines without the name keep their bytes, and Python code is not changed.
     """
@@ -39,13 +39,16 @@ def rename_command(
     if not dry_run:
         write_all({Output(file, "OLD"): _with_line_ends(file, text) for file, text in texts.items()})
     if json:
-        places = [{"file": str(file), "line": line} for file, line in found.in_python]
-        print_json({"files": {str(file): lines for file, lines in shown.items()}, "python": places})
+        places = {"python": found.in_python, "texts": found.in_texts}
+        left = {key: [{"file": str(file), "line": line} for file, line in lines] for key, lines in places.items()}
+        print_json({"files": {str(file): lines for file, lines in shown.items()}, **left})
         return
     for file, edits in found.edits.items():
         typer.echo(shown[file] if dry_run else f"{file}: {len(edits)} places", nl=not dry_run)
     for file, line in found.in_python:
         typer.echo(f"{file}:{line}: Python code has this name, too; change it there yourself")
+    for file, line in found.in_texts:
+        typer.echo(f"{file}:{line}: this text has the word '{old.rpartition('.')[2]}'; change it if the name is meant")
 
 
 def _with_line_ends(file: Path, text: str) -> str:

@@ -13,6 +13,7 @@ from dsc.editing.roles import PLOT, PROFILE, role_of
 from dsc.text.yaml import Document, Spans
 from knowledge_base.errors import InputError
 from knowledge_base.language.syntax.expression import KEYWORDS
+from knowledge_base.language.syntax.text import parse_condition
 
 NameKind = Literal["state", "plot", "skill", "variable", "event", "relation", "type", "object", "action", "offer"]
 """The kind of a name.
@@ -73,6 +74,11 @@ _PATHS = frozenset({"dsc:active", "dsc:running", "dsc:executes", "dsc:waits"})
 """Relations whose first argument is the path of a state."""
 _SYMBOL = re.compile(r"[A-Za-z_][\w\-]*")
 _SEGMENT = re.compile(r"[^/]+")
+_SENTENCE = re.compile(r'"[^"]*\s[^"]*"')
+"""A text of several words, without names."""
+_COMPONENT_VALUE = re.compile(r"(?<![\w\-])[A-Za-z_][\w\-]*\.\w")
+_SILENT = re.compile(r"\(\s*silent\s+$")
+_BRACKET = re.compile(r"[()]")
 
 
 def plot_names(document: Document, spans: Spans, text: str) -> Iterator[Occurrence]:
@@ -89,10 +95,12 @@ def plot_names(document: Document, spans: Spans, text: str) -> Iterator[Occurren
     yield from event_names(data, spans, text)
     for path, (begin, end) in spans.values.items():
         value, role = part_at(data, path), role_of(PLOT, path)
-        if not isinstance(value, str) or path[-1:] == ("about",):
+        if not isinstance(value, str) or (path[-1:] == ("about",) and role != "value"):
             continue
-        if value[:1] in {"(", "?"}:
-            yield from expression_names(text[begin:end], begin, plot, own)
+        if (written := value.lstrip()[:2])[:1] in {"(", "?"}:
+            yield from expression_names(*_inner(text, begin, end), plot, own)
+        elif written == '"(':
+            yield from condition_text_names(value, *_inner(text, begin, end), plot)
         elif role in {"type", "declaration"}:
             yield from _type_names(value, text[begin:end], begin)
         elif (role in _VALUES or role == "step") and (role != "value" or _SYMBOL.fullmatch(value)):
@@ -113,6 +121,8 @@ def _key_names(data: Mapping[str, Any], spans: Spans, plot: str, own: set[str]) 
             yield Occurrence(_KEYS[role], name, begin, end, True, scope, _about(part_at(data, path)))  # noqa: FBT003
             if role == "parameters" and data.get("implements"):
                 yield Occurrence("variable", name, begin, end, False, f"action {data['implements']}")  # noqa: FBT003
+        elif role == "cases" and _SYMBOL.fullmatch(name):
+            yield Occurrence("object", name, begin, end)
         elif role == "assigned" and name in own:
             yield Occurrence("variable", name, begin, end, scope=plot)
         elif role == "arguments":
@@ -178,7 +188,7 @@ def profile_names(data: Any, spans: Spans) -> Iterator[Occurrence]:
 def expression_names(text: str, start: int, scope: str, variables: Iterable[str]) -> Iterator[Occurrence]:
     """Yield the names in the text of a condition, effect or term that begins at an offset of a plot."""
     before = ""
-    for match in _TOKEN.finditer(text):
+    for match in _TOKEN.finditer(_SENTENCE.sub(lambda found: " " * len(found[0]), text)):
         word, begin = match["word"], start + match.start("word")
         name = word.removeprefix("?")
         if word.startswith("?"):
@@ -193,6 +203,54 @@ def expression_names(text: str, start: int, scope: str, variables: Iterable[str]
             kind: NameKind = "relation" if match["head"] else "type" if before == "-" else "object"
             yield Occurrence(kind, name, begin, begin + len(word))
         before = word
+
+
+def condition_text_names(value: str, written: str, start: int, scope: str) -> Iterator[Occurrence]:
+    """Yield the names in a text that is a condition, e.g. of `conditions.watch_truth`; none in any other text.
+
+    The values and ports of components, e.g. `hand.pose`, and the checks of these values have their names in Python.
+    """
+    try:
+        parse_condition(value.strip().strip('"'))
+    except InputError:
+        return
+    for one in expression_names(written, start, scope, ()):
+        at = one.begin - start
+        is_check = one.kind == "relation" and _COMPONENT_VALUE.search(_group(written, at))
+        if not ("." in one.name or is_check or _SILENT.search(written, 0, at)):
+            yield one
+
+
+def scenario_names(data: Any, spans: Spans, text: str) -> Iterator[Occurrence]:
+    """Yield the objects that a scenario may name, and the names in its conditions.
+
+    A key of the outermost mapping is a word of the simulation.
+    """
+    for path, (begin, end) in spans.keys.items():
+        if len(path) > 1 and _SYMBOL.fullmatch(str(path[-1])):
+            yield Occurrence("object", str(path[-1]), begin, end)
+    for path, (begin, end) in spans.values.items():
+        value = part_at(data, path)
+        if isinstance(value, str) and value.lstrip()[:1] == "(":
+            yield from expression_names(*_inner(text, begin, end), "", ())
+        elif isinstance(value, str) and _SYMBOL.fullmatch(value):
+            yield Occurrence("object", value, begin, end)
+
+
+def _inner(text: str, begin: int, end: int) -> tuple[str, int]:
+    """Return the brackets in a written value, with their offset; the whole value without brackets."""
+    first, last = text.find("(", begin, end), text.rfind(")", begin, end)
+    return (text[begin:end], begin) if first < 0 or last < 0 else (text[first : last + 1], first)
+
+
+def _group(text: str, at: int) -> str:
+    """Return the rest of the brackets around an offset."""
+    depth = 1
+    for bracket in _BRACKET.finditer(text, at):
+        depth += 1 if bracket[0] == "(" else -1
+        if depth == 0:
+            return text[at : bracket.start()]
+    return text[at:]
 
 
 def variables_in(data: Any) -> set[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -11,11 +11,12 @@ from types import MappingProxyType
 from dsc.annotations import type_class
 from dsc.data_types import WORDS
 from dsc.editing.kinds import Kind
+from dsc.editing.leftovers import lines_in_python, lines_in_texts
 from dsc.editing.name_index import NameIndex
 from dsc.editing.names import NameKind, Occurrence
 from dsc.editing.surgery.text_edits import TextEdit, patch
 from dsc.editing.view import View
-from dsc.editing.workspace import Page, Workspace, lines_in_python
+from dsc.editing.workspace import Page, Workspace
 from dsc.events import RESERVED
 from dsc.text.plot_files import parse_plot
 from knowledge_base.errors import InputError
@@ -38,10 +39,17 @@ _CLASSES = frozenset({"event", "type"})
 
 @dataclass(frozen=True, slots=True)
 class Rename:
-    """The edits of a rename by file, and the places in Python that are left to the author."""
+    """The edits of a rename by file, and the places that are left to the author.
+
+    Attributes:
+        edits: the edits by file.
+        in_python: file and line of each place in Python code.
+        in_texts: file and line of each word in a text, e.g. of a scenario, that may or may not be the name.
+    """
 
     edits: Mapping[Path, tuple[TextEdit, ...]]
     in_python: tuple[tuple[Path, int], ...]
+    in_texts: tuple[tuple[Path, int], ...]
 
 
 def rename_at(view: View, offset: int, new: str) -> Rename:
@@ -96,7 +104,7 @@ def _full(name: Occurrence) -> str:
     return f"{name.scope.rpartition(' ')[2]}.{name.name}" if name.scope else name.name
 
 
-def _rename(pages: Iterable[Page], index: NameIndex, names: list[Occurrence], new: str, root: Path) -> Rename:
+def _rename(pages: Sequence[Page], index: NameIndex, names: list[Occurrence], new: str, root: Path) -> Rename:
     kind, old = names[0].kind, names[0].name
     places = index.places(names)
     if stale := next((page for page in pages if not page.fresh), None):
@@ -115,8 +123,10 @@ def _rename(pages: Iterable[Page], index: NameIndex, names: list[Occurrence], ne
     edits = {page.file: tuple(_edits(page, places, new)) for page, _ in places}
     for page in {page.file: page for page, _ in places}.values():
         _verify(page, edits[page.file], new)
-    python = () if kind == "state" else tuple(lines_in_python(root, _spellings(names[0])))
-    return Rename(edits, python)
+    if kind == "state":
+        return Rename(edits, (), ())
+    in_texts = () if kind == "variable" else tuple(lines_in_texts(pages, old, places))
+    return Rename(edits, tuple(lines_in_python(root, _spellings(names[0]))), in_texts)
 
 
 def _edits(page: Page, places: Iterable[tuple[Page, Occurrence]], new: str) -> Iterator[TextEdit]:

@@ -18,6 +18,8 @@ _WAY = {
     "bind": "assigned",
     "bind_all": "assigned",
     "clear": "history",
+    "with": "values",
+    "pass": "passed",
 }
 _INSIDE = {"states": "states", "initial": "target"}
 _ROLES: Mapping[str, Mapping[str, str]] = {
@@ -50,6 +52,7 @@ _ROLES: Mapping[str, Mapping[str, str]] = {
     "actions": {"trigger": "skill", "emit": "event", "then": "actions", "else": "actions", "block": "actions",
                 "assign": "assigned", "into": "variable", "as": "renamed", "with": "values"},
     "renamed": {"*": "event"},
+    "value": {"*": "value"},
     "values": {"*": "value"},
     "arguments": {"*": "value"},
     "assigned": {"*": "value"},

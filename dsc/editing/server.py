@@ -164,9 +164,11 @@ def add_answers(server: Server) -> None:
             found = rename_at(*question(given), given.new_name)
         except InputError as error:
             raise JsonRpcInvalidParams(str(error)) from None
-        if found.in_python:
-            places = ", ".join(f"{file}:{line}" for file, line in found.in_python)
-            line = f"Python code also has this name, and is not changed: {places}"
+        for who, left in (("Python code", found.in_python), ("A text that may mean another thing", found.in_texts)):
+            if not left:
+                continue
+            places = ", ".join(f"{file}:{line}" for file, line in left)
+            line = f"{who} also has this name, and is not changed: {places}"
             server.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, line))
         changes = {
             uri_of(file): _edits(edits, text_of(file, server.checks.texts)) for file, edits in found.edits.items()

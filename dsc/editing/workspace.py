@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dsc.editing.kinds import Kind, kind_of
-from dsc.editing.names import Occurrence, plot_names, profile_names
+from dsc.editing.names import Occurrence, plot_names, profile_names, scenario_names
 from dsc.editing.pddl_names import pddl_names
 from dsc.text.incremental import IncrementalReader
 from dsc.text.yaml import Spans
@@ -86,21 +85,13 @@ class Workspace:
             return Page(file, text, kind, names, data, old, fresh=False)
         names = tuple(plot_names(document, spans, text) if kind is Kind.PLOT else ())
         names = tuple(profile_names(document.data, spans)) if kind is Kind.PROFILE else names
+        names = tuple(scenario_names(document.data, spans, text)) if kind is Kind.SCENARIO else names
         return Page(file, text, kind, names, document.data, spans, fresh=True)
 
 
 def text_of(file: Path, texts: Mapping[Path, str]) -> str:
     """Return the text of an open file, else the text on disk; nothing if it is not readable."""
     return texts[file] if file in texts else readable_text(file)
-
-
-def lines_in_python(root: Path, pattern: str) -> Iterator[tuple[Path, int]]:
-    """Yield file and line, from 1, of each line of a folder's Python code that has a pattern."""
-    found = re.compile(pattern)
-    for file in sorted(files_in(root, {".py"})):
-        for number, line in enumerate(readable_text(file).splitlines(), 1):
-            if found.search(line):
-                yield file, number
 
 
 def _files(root: Path, texts: Mapping[Path, str]) -> set[Path]:
