@@ -254,9 +254,12 @@ def _group(text: str, at: int) -> str:
 
 
 def variables_in(data: Any) -> set[str]:
-    """Return the names of all variables in the conditions, effects and terms of a plot's data."""
+    """Return the names of all variables in the conditions, effects and terms of a plot's data.
+
+    The variables of conditions in texts are not among them: these conditions receive their own `values`.
+    """
     if isinstance(data, str):
-        return {found.lower() for found in _VARIABLE.findall(data)}
+        return set() if data.lstrip()[:2] == '"(' else {found.lower() for found in _VARIABLE.findall(data)}
     inside = data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
     return {name for one in inside for name in variables_in(one)}
 

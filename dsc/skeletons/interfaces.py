@@ -1,17 +1,20 @@
-"""Interfaces of components, derived from the plots that use them: skills with parameters and outcomes, and messages."""
+"""Interfaces of components, derived from the plots that use them: skills with outcomes, messages, and ports."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
+from dsc.components.value_conditions import WATCH_OUTCOMES
 from dsc.events import EXECUTIVES, RESERVED
-from dsc.model.actions import Emit, Send, Trigger, component_of
+from dsc.model.actions import Configure, Emit, ExternalAction, Internal, Send, Trigger, component_of
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, State, SubmachineState
 from dsc.model.transitions import Transition
+from dsc.skeletons.port_uses import PortUse, add_use, is_watch, port_uses
 from knowledge_base.language.syntax.expression import Constant, Variable
 
 Types = dict[str, str | None]
@@ -30,40 +33,71 @@ class SkillUse:
 
 @dataclass(slots=True)
 class ComponentUse:
-    """A component as plots use it: its skills, and the types of the parameters of its messages."""
+    """A component as plots use it.
+
+    Attributes:
+        skills: the skills by name.
+        messages: the types of the parameters of messages, by message.
+        parameters: the types of the component's own parameters that plots set.
+        ports: the ports and modes.
+    """
 
     skills: dict[str, SkillUse] = field(default_factory=dict)
     messages: dict[str, Types] = field(default_factory=dict)
+    parameters: Types = field(default_factory=dict)
+    ports: PortUse = field(default_factory=PortUse)
 
 
-def find_components(plots: Iterable[ActionPlot]) -> dict[str, ComponentUse]:
+Known = Mapping[str, Collection[str]]
+"""The outcomes of skills that each run has, by `component.skill`."""
+
+
+def find_components(plots: Iterable[ActionPlot], known: Known = MappingProxyType({})) -> dict[str, ComponentUse]:
     """Return the components that plots use, by name, in order of their first use.
 
     The outcomes of a skill are events of the state that triggers it, and of the states around. Events that something
-    else in the plot fires are not among them. Their order equals the order in the text.
+    else in the plot fires are not among them, unless `as` names them, or the skill has no other outcome. Their order
+    equals the order in the text.
     """
     plots = list(plots)
     by_name = {plot.name: plot for plot in plots}
     found: dict[str, ComponentUse] = {}
+    shared: list[tuple[SkillUse, dict[str, Types]]] = []
     for plot in plots:
         for action in plot.actions():
-            if (reached := component_of(action)) is not None:
-                found.setdefault(reached, ComponentUse())
-            if isinstance(action, Send):
-                component, _, name = action.send.partition(".")
-                messages = found.setdefault(component, ComponentUse()).messages
-                _merge(messages.setdefault(name, {}), _argument_types(plot, action.arguments))
+            _add_commands(found, plot, action)
         renamed = {chart for trigger, _ in _triggers(plot) for chart in trigger.names.values()}
         for trigger, around in _triggers(plot):
+            if is_watch(trigger) or trigger.trigger in known:
+                continue
             component, _, name = trigger.trigger.partition(".")
             skill = found.setdefault(component, ComponentUse()).skills.setdefault(name, SkillUse())
             _merge(skill.parameters, _argument_types(plot, trigger.arguments))
             names = {chart: own for own, chart in trigger.names.items()}
-            for event, types in _outcomes(plot, around, by_name).items():
-                if event in renamed and event not in names:
-                    continue  # the outcome of another skill, by its `as`
-                _merge(skill.outcomes.setdefault(names.get(event, event), {}), types)
+            events = _outcomes(plot, around)
+            others = _others(plot, around, by_name, known)
+            for event, types in events.items():
+                if event in names or (event not in renamed and event not in others):
+                    _merge(skill.outcomes.setdefault(names.get(event, event), {}), types)
+            inside = _inside(around, by_name)
+            shared.append((skill, {event: types for event, types in events.items() if event in inside}))
+    for skill, events in shared:
+        skill.outcomes = skill.outcomes or events
     return found
+
+
+def _add_commands(found: dict[str, ComponentUse], plot: ActionPlot, action: ExternalAction | Internal) -> None:
+    """Add what an action other than a skill uses of components."""
+    if (reached := component_of(action)) is not None:
+        found.setdefault(reached, ComponentUse())
+    if isinstance(action, Send):
+        component, _, name = action.send.partition(".")
+        _merge(found[component].messages.setdefault(name, {}), _argument_types(plot, action.arguments))
+    elif isinstance(action, Configure):
+        component, _, name = action.set.partition(".")
+        _merge(found[component].parameters, _argument_types(plot, {name: action.to}))
+    for component, use in port_uses(action):
+        add_use(found.setdefault(component, ComponentUse()).ports, use)
 
 
 def _triggers(plot: ActionPlot) -> Iterator[tuple[Trigger, list[State]]]:
@@ -76,18 +110,31 @@ def _triggers(plot: ActionPlot) -> Iterator[tuple[Trigger, list[State]]]:
                 yield action, around
 
 
-def _outcomes(plot: ActionPlot, around: list[State], plots: Mapping[str, ActionPlot]) -> dict[str, Types]:
-    """Return the events that a skill in a state fires, with the types of the attributes that transitions read."""
-    others = {*RESERVED, *EXECUTIVES, *plot.receives, *_own_events(plot)}
-    for state in around:
-        others |= {event for name in _content(state) if name in plots for event in plots[name].emits}
+def _outcomes(plot: ActionPlot, around: list[State]) -> dict[str, Types]:
+    """Return the events that states handle, with the types of the attributes that transitions read."""
     found: dict[str, Types] = {}
     for state in around:
         for event, ways in state.on.items():
-            if event not in others:
+            if event not in RESERVED:
                 for way in ways:
                     _merge(found.setdefault(event, {}), _attributes(plot, way))
     return found
+
+
+def _others(plot: ActionPlot, around: list[State], plots: Mapping[str, ActionPlot], known: Known) -> set[str]:
+    """Return the events in states that come from the plot, from other plots, or from skills that each run has."""
+    found = {*EXECUTIVES, *plot.receives, *_own_events(plot), *_inside(around, plots)}
+    for state in around:
+        for action in state.entry:
+            if isinstance(action, Trigger) and (is_watch(action) or action.trigger in known):
+                events = WATCH_OUTCOMES if is_watch(action) else known[action.trigger]
+                found |= {action.names.get(event, event) for event in events}
+    return found
+
+
+def _inside(around: list[State], plots: Mapping[str, ActionPlot]) -> set[str]:
+    """Return the outcomes of the plots that states contain."""
+    return {event for state in around for name in _content(state) if name in plots for event in plots[name].emits}
 
 
 def _own_events(plot: ActionPlot) -> Iterator[str]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from dsc.annotations import lower_name, type_class
 from dsc.components.component import Component
 from dsc.model.plot import ActionPlot
-from dsc.skeletons.interfaces import ComponentUse, SkillUse, Types, find_components
+from dsc.skeletons.interfaces import ComponentUse, Known, SkillUse, Types, find_components
+from dsc.skeletons.port_code import declarations, parameters_class, simulate_values
 from dsc.skeletons.python_types import annotation, object_types, record_class, sample, with_types_above
 from dsc.text.typed_plots import is_python_name, type_definition
 from knowledge_base.errors import InputError
@@ -18,9 +20,10 @@ from knowledge_base.world.schema import Schema
 MARK = "Made by `dsc new --from`"
 """The beginning of each generated file; the command writes only these files again."""
 _TYPING = ("Annotated", "Any", "Literal", "NewType")
-_TAKEN = frozenset((*_TYPING, "ABC", "Component", "Outcome", "Simulation", "SkillCall"))
+_TAKEN = frozenset((*_TYPING, "ABC", "Component", "Outcome", "Parameters", "Push", "Simulation", "SkillCall", "Stream"))
 _SIGNATURE = frozenset({"self", "call"})
 _WIDTH = 100
+_FROM_DSC = ("Component", "Outcome", "Parameters", "Push", "SkillCall", "Stream", "skill", "takes")
 
 
 @dataclass(frozen=True)
@@ -38,24 +41,24 @@ class Skeleton:
     schema: Schema | None = None
 
     @classmethod
-    def of(cls, plots: Iterable[ActionPlot], schema: Schema | None = None, ready: Iterable[str] = ()) -> Skeleton:
-        """Return the skeleton of the components that plots use, except those that are ready.
+    def of(
+        cls, plots: Iterable[ActionPlot], schema: Schema | None = None, known: Known = MappingProxyType({})
+    ) -> Skeleton:
+        """Return the skeleton of the components that plots use, except those of known skills, which each run has.
 
         Raises:
-            InputError: a component, skill or parameter has a name that Python code cannot have.
+            InputError: a component, skill, port or parameter has a name that Python code cannot have.
         """
-        plots, ready = list(plots), set(ready)
-        used = {name: one for name, one in find_components(plots).items() if name not in ready}
+        plots, ready = list(plots), {name.partition(".")[0] for name in known}
+        used = {name: one for name, one in find_components(plots, known).items() if name not in ready}
         for component, use in used.items():
+            _require_names(component, *use.parameters)
+            for port, values in {**use.ports.pushes, **dict.fromkeys(use.ports.streams, ())}.items():
+                _require_new(component, port, values)
+                if port in {*use.skills, *use.messages}:
+                    raise InputError(f"'{component}.{port}' is a port and a skill or message; rename one", found=port)
             for name, parameters in _callables(use):
-                for one in (module_name(component), name, *parameters):
-                    if not is_python_name(one):
-                        message = f"'{component}.{name}' becomes Python code, in which '{one}' is not a name; rename it"
-                        raise InputError(message, found=one)
-                if hasattr(Component, name):
-                    raise InputError(
-                        f"'{name}' of '{component}' is an attribute of every component; rename it", found=name
-                    )
+                _require_new(component, name, parameters)
                 if used_up := _SIGNATURE.intersection(parameters):
                     message = f"'{component}.{name}' cannot have the parameter '{min(used_up)}', as its method has it"
                     raise InputError(message, found=min(used_up))
@@ -87,9 +90,10 @@ class Skeleton:
         parts = ["\n".join(type_definition(one, self.schema) for one in self.objects)]
         parts += [record_class(name, fields) for name, fields in self.records.items()]
         parts += [self._outcome(event, types) for event, types in self.outcomes.items()]
+        parts += [parameters_class(name, use) for name, use in self.components.items()]
         parts += [self._base(name, use) for name, use in self.components.items()]
         body = "\n\n\n".join(part for part in parts if part)
-        from_dsc = _words(("Component", "Outcome", "SkillCall", "skill", "takes"), body)
+        from_dsc = _words(_FROM_DSC, body)
         imports = ["from abc import ABC, abstractmethod"] if self.components else []
         imports += ["from dataclasses import dataclass"] if self.records else []
         if used := _words(_TYPING, body):
@@ -110,6 +114,10 @@ class Skeleton:
             "        super().__init__()",
             "        self.world = world",
         ]
+        simulated = simulate_values(use.ports)
+        if simulated:
+            begin[3:3] = [simulated[0], ""]
+            methods.insert(0, "\n".join(simulated[2:]))
         body = "\n\n".join(["\n".join(begin), *methods])
         known = [*self.objects_and_records(), *(self.outcome_class(event) for event in self.outcomes), base]
         names = sorted(_words(known, body))
@@ -155,7 +163,7 @@ class Skeleton:
             f'    """What plots use of the component `{name}`."""',
             "",
         ]
-        lines.append(f'    name = "{name}"')
+        lines += [f'    name = "{name}"', *declarations(name, use, self.components)]
         methods = [
             _method("skill", one, skill.parameters, self._result(skill), abstract=True)
             for one, skill in use.skills.items()
@@ -196,6 +204,19 @@ def module_name(component: str) -> str:
 
 def _base_class(component: str) -> str:
     return f"{type_class(component)}Skills"
+
+
+def _require_new(component: str, name: str, inside: Iterable[str]) -> None:
+    """Raise `InputError` unless a skill, message or port, and the names inside, can be names in a class."""
+    _require_names(f"{component}.{name}", module_name(component), name, *inside)
+    if hasattr(Component, name):
+        raise InputError(f"'{name}' of '{component}' is an attribute of every component; rename it", found=name)
+
+
+def _require_names(who: str, *names: str) -> None:
+    for one in names:
+        if not is_python_name(one):
+            raise InputError(f"'{who}' becomes Python code, in which '{one}' is not a name; rename it", found=one)
 
 
 def _callables(use: ComponentUse) -> Iterator[tuple[str, Types]]:
