@@ -1,14 +1,18 @@
-"""The time from an edit of a plot with 1,000 lines to its diagnostics, and the time of the first check."""
+"""The times from an edit of a plot with 1,000 lines to its diagnostics, and of reading a project again."""
 
+import os
 import statistics
+import tempfile
 import time
 from pathlib import Path
 
 from dsc.editing.diagnostics import FileFinding, diagnostics
+from dsc.editing.name_index import LatestIndex
 from dsc.editing.project_facts import ProjectFacts
 from dsc.editing.quick_check import QuickCheck
+from dsc.editing.workspace import Workspace
 
-STATES, EDITS = 249, 15
+STATES, EDITS, PLOTS, OTHERS = 249, 15, 200, 2000
 FILE = Path("long.yaml")
 STATE = """  s{0}:
     about: a step of a long plot
@@ -28,6 +32,28 @@ def milliseconds(check, text):
     return 1000 * (time.perf_counter() - start), len(found)
 
 
+def answers():
+    """Return the milliseconds for the names in a project, first and again; an answer of the server needs them."""
+    with tempfile.TemporaryDirectory() as name:
+        root, text = Path(name), "\n".join(long_plot().splitlines()[:40]) + "\n  over: {final: true}\n"
+        for number in range(PLOTS + OTHERS):
+            folder = root / f"part_{number % 20}"
+            folder.mkdir(exist_ok=True)
+            file = folder / (f"p{number}.yaml" if number < PLOTS else f"m{number}.py")
+            file.write_text(text if number < PLOTS else "pass\n")
+            os.utime(file, (1e9, 1e9))
+        for folder in (root, *root.iterdir()):
+            os.utime(folder, (1e9, 1e9))
+        workspace, latest, times = Workspace(), LatestIndex(), []
+        for _ in range(EDITS):
+            start = time.perf_counter()
+            pages = workspace.pages(root, {})
+            assert len(pages) == PLOTS
+            latest.of(pages)
+            times.append(1000 * (time.perf_counter() - start))
+    return times[0], statistics.median(times[1:])
+
+
 def main():
     check, text = QuickCheck(), long_plot()
     first, _ = milliseconds(check, text)
@@ -36,6 +62,9 @@ def main():
     print(f"lines of the plot  {len(text.splitlines()):6d}")
     print(f"first check        {first:6.0f} ms")
     print(f"after an edit      {after:6.0f} ms   median of {EDITS}; {first / after:.1f} times faster")
+    first, again = answers()
+    print(f"first answer       {first:6.0f} ms   {PLOTS} plots among {PLOTS + OTHERS} files")
+    print(f"next answer        {again:6.1f} ms   median of {EDITS - 1}")
 
 
 if __name__ == "__main__":

@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from dsc.editing.disk import Disk
 from dsc.editing.kinds import Kind
 from dsc.editing.names import Occurrence
-from dsc.editing.workspace import Page, files_in
+from dsc.editing.workspace import Page
 from dsc.text.yaml import Span
 from knowledge_base.pddl.unsaved_texts import readable_text
 
@@ -19,7 +20,7 @@ _KNOWN = frozenset({Kind.PLOT, Kind.PROFILE})
 def lines_in_python(root: Path, pattern: str) -> Iterator[tuple[Path, int]]:
     """Yield file and line, from 1, of each line of a folder's Python code that has a pattern."""
     found = re.compile(pattern)
-    for file in sorted(files_in(root, {".py"})):
+    for file in sorted(Disk().files_in(root, {".py"})):
         for number, line in enumerate(readable_text(file).splitlines(), 1):
             if found.search(line):
                 yield file, number

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -68,3 +68,17 @@ class NameIndex:
         scopes = dict.fromkeys(scope for one in name.scopes for scope in (self._steps if one == ANY_STEP else (one,)))
         found = [one for scope in scopes if (one := replace(name, scope=scope, scopes=())).identity in self._defined]
         yield from found or [replace(name, scope=name.scopes[-1], scopes=())]
+
+
+class LatestIndex:
+    """The index of the latest pages; it is made again only for other pages."""
+
+    def __init__(self) -> None:
+        self._latest: tuple[Sequence[Page], NameIndex] | None = None
+
+    def of(self, pages: Sequence[Page]) -> NameIndex:
+        """Return the index of pages."""
+        known = self._latest
+        if known is None or [*map(id, known[0])] != [*map(id, pages)]:
+            known = self._latest = pages, NameIndex(pages)
+        return known[1]

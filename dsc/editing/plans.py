@@ -7,10 +7,10 @@ from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from dsc.editing.disk import Disk
 from dsc.editing.goals import Goal, unknown_values
 from dsc.editing.project_command import ProjectCommand
 from dsc.editing.projects import Project
-from dsc.editing.workspace import files_in
 from knowledge_base.errors import InputError
 
 PLAN_S, START_S = 5.0, 20.0
@@ -80,5 +80,7 @@ def _is_passing(task: asyncio.Task[dict[str, Any]]) -> bool:
 
 def _version(project: Project, texts: Mapping[Path, str]) -> Hashable:
     """Return a value that changes with the unsaved texts, and with the files of a project."""
-    saved = frozenset((file, file.stat().st_mtime_ns) for file in files_in(project.root, _ENDINGS) if file.is_file())
+    saved = frozenset(
+        (file, file.stat().st_mtime_ns) for file in Disk().files_in(project.root, _ENDINGS) if file.is_file()
+    )
     return saved, frozenset(texts.items())

@@ -18,6 +18,7 @@ from dsc.editing.completion import Proposal, complete, word_before
 from dsc.editing.diagnostics import Diagnostic
 from dsc.editing.goals import goal_at, goals_of
 from dsc.editing.lines import Lines, Spot
+from dsc.editing.name_index import LatestIndex
 from dsc.editing.plans import Plans
 from dsc.editing.projects import Examiner, Project
 from dsc.editing.renaming import rename_at
@@ -66,6 +67,7 @@ class Server(LanguageServer):
         self.plans = plans
         self.findings_page = findings_page
         self._workspace = Workspace()
+        self._latest = LatestIndex()
         add_text_features(self)
         add_answers(self)
         add_plan_view(self)
@@ -76,7 +78,7 @@ class Server(LanguageServer):
         page = self._workspace.page(file, text_of(file, texts))
         root = file.parent if project is None else project.root
         pages = [page] if project is None else self._workspace.pages(root, texts)
-        return View(page, tuple(pages), self.checks.facts(file), root)
+        return View(page, tuple(pages), self.checks.facts(file), root, self._latest)
 
     async def plan_at(self, view: View, offset: int) -> dict[str, Any] | None:
         """Return the plan of the goal around an offset, see `Plans.plan`; `None` without a goal."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from dsc.editing.name_index import NameIndex
+from dsc.editing.name_index import LatestIndex, NameIndex
 from dsc.editing.names import Occurrence
 from dsc.editing.project_facts import ProjectFacts
 from dsc.editing.workspace import Page
@@ -21,11 +20,12 @@ class View:
     pages: tuple[Page, ...]
     facts: ProjectFacts
     root: Path
+    latest: LatestIndex = field(default_factory=LatestIndex)
 
-    @cached_property
+    @property
     def index(self) -> NameIndex:
         """The names of all pages."""
-        return NameIndex(self.pages)
+        return self.latest.of(self.pages)
 
     def names(self) -> Iterator[tuple[Page, Occurrence]]:
         """Yield all names of the project with their pages."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dsc.editing.disk import Disk
 from dsc.editing.kinds import Kind, kind_of
 from dsc.editing.names import Occurrence, plot_names, profile_names, scenario_names
 from dsc.editing.pddl_names import pddl_names
@@ -16,7 +16,6 @@ from dsc.text.yaml import Spans
 from knowledge_base.errors import InputError
 from knowledge_base.pddl.unsaved_texts import readable_text
 
-_SKIPPED = frozenset({"build", "dist", "node_modules", "site-packages", "__pycache__"})
 _ENDINGS = frozenset({".yaml", ".yml", ".pddl"})
 
 
@@ -53,6 +52,7 @@ class Workspace:
 
     def __init__(self) -> None:
         self._reader = IncrementalReader()
+        self._disk = Disk()
         self._pages: dict[Path, Page] = {}
 
     def page(self, file: Path, text: str) -> Page:
@@ -69,7 +69,9 @@ class Workspace:
             root: the folder.
             texts: the texts of open files, in place of those on disk.
         """
-        return [self.page(file, text_of(file, texts)) for file in sorted(_files(root, texts))]
+        opened = {file for file in texts if file.suffix in _ENDINGS and root in file.parents}
+        files = sorted(opened.union(self._disk.files_in(root, _ENDINGS)))
+        return [self.page(file, texts[file] if file in texts else self._disk.text(file)) for file in files]
 
     def _read(self, file: Path, text: str, before: Page | None) -> Page:
         kind = kind_of(file, text)
@@ -92,15 +94,3 @@ class Workspace:
 def text_of(file: Path, texts: Mapping[Path, str]) -> str:
     """Return the text of an open file, else the text on disk; nothing if it is not readable."""
     return texts[file] if file in texts else readable_text(file)
-
-
-def _files(root: Path, texts: Mapping[Path, str]) -> set[Path]:
-    opened = {file for file in texts if file.suffix in _ENDINGS and root in file.parents}
-    return opened | set(files_in(root, _ENDINGS))
-
-
-def files_in(root: Path, endings: set[str] | frozenset[str]) -> Iterator[Path]:
-    """Yield the files with these endings in a folder, without those of hidden folders and of builds."""
-    for folder, folders, files in os.walk(root):
-        folders[:] = [one for one in folders if not one.startswith(".") and one not in _SKIPPED]
-        yield from (Path(folder) / one for one in files if Path(one).suffix in endings)
