@@ -16,7 +16,9 @@ from dsc.editing import navigation
 from dsc.editing.checks import Checks
 from dsc.editing.completion import Proposal, complete, word_before
 from dsc.editing.diagnostics import Diagnostic
+from dsc.editing.formatting import format_edits
 from dsc.editing.goals import goal_at, goals_of
+from dsc.editing.kinds import Kind
 from dsc.editing.lines import Lines, Spot
 from dsc.editing.name_index import LatestIndex
 from dsc.editing.plans import Plans
@@ -128,6 +130,11 @@ def add_text_features(server: Server) -> None:
         await server.checks.stop()
         await server.plans.stop()
 
+    @server.feature(lsp.TEXT_DOCUMENT_FORMATTING)
+    def answer_formatting(given: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
+        page = server.view(path_of(given.text_document.uri)).page
+        return _edits(format_edits(page.text) if page.kind is not Kind.PDDL else (), page.text)
+
 
 def add_answers(server: Server) -> None:
     """Let the server answer questions about positions in the editor's texts."""
@@ -167,15 +174,11 @@ def add_answers(server: Server) -> None:
         except InputError as error:
             raise JsonRpcInvalidParams(str(error)) from None
         for who, left in (("Python code", found.in_python), ("A text that may mean another thing", found.in_texts)):
-            if not left:
-                continue
-            places = ", ".join(f"{file}:{line}" for file, line in left)
-            line = f"{who} also has this name, and is not changed: {places}"
-            server.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, line))
-        changes = {
-            uri_of(file): _edits(edits, text_of(file, server.checks.texts)) for file, edits in found.edits.items()
-        }
-        return lsp.WorkspaceEdit(changes=changes)
+            if places := ", ".join(f"{file}:{line}" for file, line in left):
+                line = f"{who} also has this name, and is not changed: {places}"
+                server.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, line))
+        texts = server.checks.texts
+        return lsp.WorkspaceEdit({uri_of(file): _edits(one, text_of(file, texts)) for file, one in found.edits.items()})
 
     @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions([lsp.CodeActionKind.QuickFix]))
     def answer_fixes(given: lsp.CodeActionParams) -> list[lsp.CodeAction]:

@@ -66,6 +66,9 @@ def test_each_ability_on_the_project_of_the_tutorial(project):
             lsp.RenameParams(lsp.TextDocumentIdentifier(plot.as_uri()), at(good, "  there:", 3), "arrived_there")
         )
         assert {uri: len(edits) for uri, edits in edit.changes.items()} == {plot.as_uri(): 2}
+        options = lsp.FormattingOptions(tab_size=2, insert_spaces=True)
+        formatting = lsp.DocumentFormattingParams(lsp.TextDocumentIdentifier(plot.as_uri()), options)
+        assert not await editor.text_document_formatting_async(formatting)
         text_of_domain = editor.open(domain)
         found = await editor.text_document_references_async(
             lsp.ReferenceParams(
