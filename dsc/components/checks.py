@@ -14,6 +14,8 @@ from typing import Any
 from knowledge_base.errors import InputError
 from knowledge_base.language.checking.inputs import shown
 
+_POSE = 7
+"""Number of the numbers of a pose: x y z in metres, and a quaternion."""
 MOST_KEPT = 100
 """Number of newest values that a series keeps."""
 
@@ -89,12 +91,20 @@ def approaches(value: Series, target: float) -> bool:
 
 
 def in_range(value: Series, least: float, most: float) -> bool:
-    """Return whether the value is between two bounds, inclusive."""
+    """Return whether the value is between two bounds, inclusive; raise `InputError` for exchanged bounds."""
+    if least > most:
+        raise InputError(f"the lower bound {least:g} is above the upper bound {most:g}")
     return least <= value.number <= most
 
 
 def mean(value: Series, puts: int) -> float:
-    """Return the mean of the newest values, at most that many."""
+    """Return the mean of that many newest values, or of all as long as there are fewer.
+
+    Raises:
+        InputError: `puts` is not a whole number from 1 to `MOST_KEPT`.
+    """
+    if puts != int(puts) or not 1 <= puts <= MOST_KEPT:
+        raise InputError(f"a mean is over a whole number of values from 1 to {MOST_KEPT}, not {puts:g}")
     newest = [_number(value.name, one) for _, one in [*value.kept][-int(puts) :]]
     return math.fsum(newest) / len(newest)
 
@@ -105,7 +115,7 @@ def magnitude(value: Series) -> float:
 
 
 def distance(value: Point, target: Point) -> float:
-    """Return the distance between two points, each a value or a list."""
+    """Return the distance between two points, each a value or a list; of a pose, its position counts."""
     first, second = _point(value), _point(target)
     if len(first) != len(second):
         raise InputError(f"a distance is between points of equal size, not {len(first)} and {len(second)} numbers")
@@ -113,7 +123,8 @@ def distance(value: Point, target: Point) -> float:
 
 
 def _point(given: Point) -> list[float]:
-    return given.numbers if isinstance(given, Series) else [_number("a point", one) for one in given]
+    numbers = given.numbers if isinstance(given, Series) else [_number("a point", one) for one in given]
+    return numbers[:3] if len(numbers) == _POSE else numbers
 
 
 def _number(name: str, value: Any) -> float:

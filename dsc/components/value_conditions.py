@@ -16,7 +16,7 @@ from dsc.components.checks import LIBRARY, Check, Series, by_name
 from dsc.components.hooks import contained
 from dsc.components.streams import Push
 from dsc.components.value_evaluation import ValueEvaluation
-from dsc.components.value_vocabulary import ValueVocabulary
+from dsc.components.value_vocabulary import ValueVocabulary, kinds_of
 from dsc.outcomes import Outcome
 from dsc.skills import Declared, SkillBody
 from knowledge_base.conditions.damping import relaxed
@@ -71,10 +71,9 @@ class ValueCondition:
         self._ports, self._checks = ports, checks
         rise = parse_condition(condition) if isinstance(condition, str) else condition
         pushed = {name: port.values for name, port in ports.items()}
-        ValueVocabulary(pushed, checks, values, "the component pushes no").check(rise)
+        ValueVocabulary(pushed, checks, kinds_of(values), "the component pushes no").check(rise)
         self._rise, self._stay = rise, relaxed(rise, hysteresis) if hysteresis else rise
-        if not 1 <= times <= out_of:
-            raise InputError(f"`times` is from 1 to `out_of`, not {times} of {out_of}")
+        require_times(times, out_of)
         if hold < 0:
             raise InputError(f"`hold` is a number of seconds, 0 or more, not {hold:g}")
         self._hold, self._times, self._last = hold, times, deque[bool](maxlen=out_of)
@@ -175,6 +174,12 @@ class ValueCondition:
 
     def _is_silent(self, port: str, seconds: float) -> bool:
         return asyncio.get_running_loop().time() >= self._silences[port, seconds]
+
+
+def require_times(times: Any, out_of: Any) -> None:
+    """Raise `InputError` unless a condition can be true for `times` of the last `out_of` values."""
+    if isinstance(times, int) and isinstance(out_of, int) and not 1 <= times <= out_of:
+        raise InputError(f"`times` is from 1 to `out_of`, not {times} of {out_of}; write both: `times: 3, out_of: 5`")
 
 
 def port_of(name: str) -> str:

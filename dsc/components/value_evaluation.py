@@ -95,6 +95,8 @@ class ValueEvaluation:
         given = [self._argument(arg) for arg in args]
         try:
             return self._checks[name](*given)
+        except InputError as error:
+            raise InputError(f"{to_text(form)}: {error.message}", place=form.place) from error
         except TypeError as error:  # a variable has a value of another type
             raise InputError(f"{to_text(form)}: {error}", place=form.place) from error
 

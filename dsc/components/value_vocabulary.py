@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from dsc.components.checks import ARGUMENT_KINDS, Check, Series
-from dsc.data_types import data_type
+from dsc.data_types import ANY, data_type
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.evaluation.terms import ORDER
 from knowledge_base.language.syntax.expression import (
@@ -26,6 +26,7 @@ from knowledge_base.language.syntax.expression import (
     Variable,
     free_variables,
 )
+from knowledge_base.language.syntax.rewriting import inside, name_in
 from knowledge_base.language.syntax.text import to_text
 
 SILENT = "silent"
@@ -43,17 +44,17 @@ class ValueVocabulary:
     Attributes:
         ports: the types of the values of each push port, by the port's name in the condition.
         checks: the functions by name.
-        variables: the names of the variables that have values; `None` accepts any name.
+        variables: the kinds of the variables that have values by name, empty if unknown; `None` accepts any name.
         who: the beginning of messages about unknown values, e.g. `the component pushes no`.
-        knowledge: the functions of the knowledge base, whose present values the condition may read.
+        knowledge: the kinds of the functions of the knowledge base, whose present values the condition may read.
         any_check: whether components in other programs may have further checks.
     """
 
     ports: Mapping[str, Mapping[str, str | None]]
     checks: Mapping[str, Check]
-    variables: Collection[str] | None
+    variables: Mapping[str, str] | None
     who: str
-    knowledge: Collection[str] = field(default=())
+    knowledge: Mapping[str, str] = field(default_factory=dict)
     any_check: bool = False
 
     def check(self, e: Expression) -> None:
@@ -72,11 +73,8 @@ class ValueVocabulary:
             case Imply(premise, conclusion):
                 self.check(premise)
                 self.check(conclusion)
-            case Comparison(compare, left, right):
-                for term in (left, right):
-                    kind = self._kind(term)
-                    if compare in ORDER and not _fits(kind, "number"):
-                        raise self._no_number(e, term, kind)
+            case Comparison():
+                self._check_comparison(e)
             case Atom("silent", args):
                 self._check_silence(args, e)
             case Atom(name, args):
@@ -88,6 +86,22 @@ class ValueVocabulary:
         """Return whether a function is one of the knowledge base; a check of the same name precedes."""
         return function in self.knowledge and function not in self.checks
 
+    def require_knowledge(self, form: Expression) -> None:
+        """Raise an error for a check in a form that reads no value, and so belongs to the knowledge base.
+
+        Raises:
+            InputError: the form uses a check, or has the form of one.
+            UnknownNameError: a variable has no value, or `silent` names no port.
+        """
+        self.require_variables(form)
+        for one in inside(form):
+            name = name_in(one)
+            if isinstance(one, Atom) and name == SILENT:
+                self.check(one)
+            if name in self.checks and name not in self.knowledge:
+                message = f"'{name}' is a check of pushed values, and {to_text(one)} reads none"
+                raise InputError(message, place=one.place, found=name)
+
     def require_variables(self, form: Expression | Term) -> None:
         """Raise `UnknownNameError` for a variable without a value."""
         for name in free_variables(form):
@@ -95,11 +109,34 @@ class ValueVocabulary:
                 message = f"there is no value for '?{name}' in `values`"
                 raise UnknownNameError(message, place=form.place, found=name, valid=self.variables)
 
+    def _check_comparison(self, e: Comparison) -> None:
+        kinds = {term: self._kind(term) for term in (e.left, e.right)}
+        for term, kind in kinds.items():
+            if e.operator in ORDER and not _fits(kind, "number"):
+                raise self._no_number(e, term, kind)
+        if e.operator not in ORDER and not _comparable(*(kinds[term] for term in (e.left, e.right))):
+            message = f"{to_text(e)} compares {kinds[e.left]} with {kinds[e.right]}, which are never equal"
+            raise InputError(message, place=e.place, found=to_text(e.right))
+        for value, other in ((e.left, e.right), (e.right, e.left)):
+            self._check_choice(value, other)
+
+    def _check_choice(self, value: Term, other: Term) -> None:
+        """Raise `UnknownNameError` if a constant is not among the choices of the value with which it is compared."""
+        if self._reads_value(value) and isinstance(value, Constant) and isinstance(other, Constant):
+            port, _, name = str(value.value).rpartition(".")
+            choices = data_type(self.ports[port][name] or ANY).values
+            if choices and other.value not in choices and not self._reads_value(other):
+                message, valid = f"'{value.value}' is never {to_text(other)}", [str(one) for one in choices]
+                raise UnknownNameError(message, place=other.place, found=str(other.value), valid=valid)
+
     def _check_silence(self, args: tuple[Term, ...], e: Atom) -> None:
         match args:
             case (Constant(str(port), False) as name, Constant(int() | float() as seconds)) if (
                 not isinstance(seconds, bool) and seconds > 0
             ):
+                if self._is_value(port):
+                    message = f"{to_text(e)}: '{port}' is a value; a port is silent, as in (silent {_port(port)} 2)"
+                    raise InputError(message, place=name.place, found=port)
                 if port not in self.ports:
                     raise UnknownNameError(f"{self.who} '{port}'", place=name.place, found=port, valid=self.ports)
             case _:
@@ -126,9 +163,9 @@ class ValueVocabulary:
                 return self._kind_of_value(name, term)
             case Constant():
                 return "text"
-            case Variable():
+            case Variable(name):
                 self.require_variables(term)
-                return ""
+                return (self.variables or {}).get(name, "")
             case Call("list", args) | Arithmetic("geometry", args):
                 return self._kind_of_parts(args, "list", term)
             case Arithmetic(_, args):
@@ -151,14 +188,14 @@ class ValueVocabulary:
         if value not in self.ports.get(port, ()):
             valid_names = [f"{one}.{value}" for one, values in self.ports.items() for value in values]
             raise UnknownNameError(f"{self.who} '{name}'", place=term.place, found=name, valid=valid_names)
-        return _kind_of_type(self.ports[port][value])
+        return kind_of_type(self.ports[port][value])
 
     def _kind_of_call(self, name: str, args: tuple[Term, ...], form: Call | Atom) -> str:
         if name in self.checks:
             return self._kind_of_check(name, self.checks[name], args, form)
         if isinstance(form, Call) and self.is_of_knowledge(name):
             self.require_variables(form)
-            return ""
+            return self.knowledge[name]
         if not self.any_check:
             valid = (SILENT, *self.checks, *self.knowledge)
             message = f"there is no check{' or function' if self.knowledge else ''} '{name}'"
@@ -184,6 +221,8 @@ class ValueVocabulary:
                 of = "a number" if wanted_kind == "number" else "a list of numbers"
                 message = f"{said} {of}, and {to_text(arg)} is of type {kind}"
                 raise InputError(message, place=form.place, found=to_text(arg))
+        if wanted_kind == "number":
+            _try(check, args, form)
         return _RESULTS.get(signature.return_annotation, "")
 
     def _reads_value(self, term: Term) -> bool:
@@ -203,7 +242,45 @@ def _fits(kind: str, wanted: str) -> bool:
     return kind in {"", wanted} or (wanted == "number" and kind in _NUMBERS)
 
 
-def _kind_of_type(declared: str | None) -> str:
+def _comparable(kind: str, other: str) -> bool:
+    return not kind or _fits(other, kind) or _fits(kind, other)
+
+
+def _port(value: str) -> str:
+    return value.rpartition(".")[0]
+
+
+def _try(check: Check, args: tuple[Term, ...], form: Call | Atom) -> None:
+    """Raise the check's error about its constants, such as exchanged bounds; without other constants, do nothing."""
+    sample = Series("a value")
+    sample.kept.append((0.0, 0.0))
+    constants = [one.value for one in args[1:] if isinstance(one, Constant) and not isinstance(one.value, str)]
+    if len(constants) < len(args) - 1:
+        return
+    try:
+        check(sample, *constants)
+    except InputError as error:
+        raise InputError(f"{to_text(form)}: {error.message}", place=form.place) from error
+
+
+def kinds_of(values: Mapping[str, object]) -> dict[str, str]:
+    """Return the kinds of the values of variables by name, empty for an unknown kind.
+
+    Raises:
+        InputError: a variable has no value, e.g. as a geometry was never set.
+    """
+    for name, value in values.items():
+        if value is None:
+            raise InputError(f"'?{name}' has no value: the term in `values` is unset", found=name)
+    return {name: _kind_of_value(value) for name, value in values.items()}
+
+
+def _kind_of_value(value: object) -> str:
+    kinds = ((bool, "boolean"), (int | float, "number"), (str, "text"), (list | tuple, "list"))
+    return next((name for types, name in kinds if isinstance(value, types)), "")
+
+
+def kind_of_type(declared: str | None) -> str:
     """Return the kind of the values of a declared type; empty for a type that has values of several kinds."""
     if declared is None:
         return ""

@@ -151,7 +151,7 @@ class _Splitter:
     def _part(self, e: Expression) -> Part:
         components = components_in(e)
         if not components:
-            self._vocabulary.require_variables(e)
+            self._vocabulary.require_knowledge(e)
             return Part(substitute(e, self._values_for(e)), to_text(e))
         self._vocabulary.check(e)
         live: dict[str, Term] = {}

@@ -11,6 +11,7 @@ from typing import Any, Never, Protocol, TypeVar
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.components.value_conditions import WATCH, BecameFalse, BecameTrue, ValueCondition, checks_of
+from dsc.components.value_vocabulary import kinds_of
 from dsc.errors import NoAnswerError, RefusedError
 from dsc.loop_calls import LoopCalls
 from dsc.outcomes import Outcome
@@ -71,7 +72,7 @@ class WatchedCondition:
             relaxed(whole, hysteresis)  # refuses a condition without bounds
         self._hysteresis = hysteresis
         interfaces = {name: component.interface() for name, component in components.items()}
-        self._structure = split(whole, values, vocabulary_of(interfaces, values, knowledge.schema.functions))
+        self._structure = split(whole, values, vocabulary_of(interfaces, kinds_of(values), knowledge.schema.functions))
         for part in parts_in(self._structure):
             require_evaluable(part.live.values(), knowledge)
         self._truths: dict[Part, bool] = {}

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dsc.components.value_conditions import WATCH
-from dsc.components.value_evaluation import SILENT
+from dsc.components.value_vocabulary import SILENT
 from dsc.model.actions import ExternalAction, Internal, Switch, Trigger, Wire
 from dsc.sensing.condition_parts import value_names
 from knowledge_base.errors import InputError

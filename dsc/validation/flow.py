@@ -132,7 +132,7 @@ def _handled(states: Iterable[AnyState]) -> dict[str, bool]:
 
 
 def _outcomes(
-    subject: Subject, name: str, outcomes: Iterable[str], handled: Mapping[str, bool], path: Path
+    subject: Subject, name: str, outcomes: Iterable[str], handled: Mapping[str, bool], path: Path, other: str = "a rule"
 ) -> Iterator[Finding]:
     for event in outcomes:
         if handled.get(event):
@@ -144,7 +144,7 @@ def _outcomes(
             sources = subject.contents(name) if is_open(subject.state(name), subject.library) else []
             whose = "".join(f" of plot '{one.name}'" for one in sources if event in one.emits)
             message = f"state '{name}' does not handle its outcome '{event}'{whose}"
-            fix = f"add `{event}: STATE` under `on`, or a rule"
+            fix = f"add `{event}: STATE` under `on`, or {other}"
         yield subject.finding((*path, "on", event), "every-outcome-is-wired", message, fix)
 
 
@@ -174,11 +174,14 @@ def _skills(
                 yield subject.finding((*here, "as", renamed), "known-outcome", message, found=renamed, valid=outcomes)
         events = [action.names.get(event, event) for event in outcomes]
         yield from (_reserved(subject, event, (*here, "trigger")) for event in events if event in EXECUTIVES)
-        if (subject.skills or {})[action.trigger].pattern == "event":
+        is_event = (subject.skills or {})[action.trigger].pattern == "event"
+        if is_event:
             yield from _visible_outside(subject, action, here)
             elsewhere = traffic.received_in(path).union(subject.plot.emits)
             events = [event for event in events if event not in elsewhere]
-        yield from _outcomes(subject, name, [event for event in events if event not in EXECUTIVES], handled, path)
+        remaining = [event for event in events if event not in EXECUTIVES]
+        other = "`{}` instead of STATE to ignore it" if is_event else "a rule"
+        yield from _outcomes(subject, name, remaining, handled, path, other)
 
 
 def _visible_outside(subject: Subject, action: Trigger, path: Path) -> Iterator[Finding]:

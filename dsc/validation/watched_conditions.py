@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 
 from dsc.components.checks import LIBRARY
-from dsc.components.value_conditions import WATCH
-from dsc.components.value_vocabulary import ValueVocabulary
+from dsc.components.value_conditions import WATCH, require_times
+from dsc.components.value_vocabulary import ValueVocabulary, kind_of_type, kinds_of
 from dsc.errors import Finding
 from dsc.model.actions import Trigger
 from dsc.model.data_forms import literal_parts
@@ -14,9 +14,18 @@ from dsc.sensing.condition_parts import parts_in, split
 from dsc.sensing.vocabulary import vocabulary_of
 from dsc.validation.objects import KnownObjects
 from dsc.validation.subject import Subject
-from knowledge_base.errors import InputError
+from knowledge_base.conditions.damping import relaxed
+from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.checking.check import check, check_term
-from knowledge_base.language.syntax.expression import Constant, Expression, Term, free_variables
+from knowledge_base.language.syntax.expression import (
+    Arithmetic,
+    Call,
+    Constant,
+    Expression,
+    Term,
+    Variable,
+    free_variables,
+)
 from knowledge_base.language.syntax.text import parse_condition
 
 SEVERAL = "conditions.watch_truth"
@@ -29,19 +38,61 @@ def check_watched_conditions(subject: Subject) -> Iterator[Finding]:
         if isinstance(action, Trigger) and (action.trigger == SEVERAL or action.trigger.endswith(f".{WATCH}")):
             text = action.arguments.get("condition")
             if isinstance(text, Constant) and isinstance(text.value, str):
-                variables = _variables(action.arguments.get("values"))
+                variables = _variables(subject, action.arguments.get("values"))
                 try:
-                    _check(subject, action.trigger, parse_condition(text.value), variables)
+                    condition = parse_condition(text.value)
+                    _check(subject, action.trigger, condition, variables)
+                    _require_used(condition, variables or {})
+                    _require_options(condition, action.arguments)
                 except InputError as error:
-                    yield subject.caught(error, (*path, "with", "condition"), "condition")
+                    yield subject.caught(_inside(error), (*path, "with", "condition"), "condition")
 
 
-def _variables(values: Term | None) -> Collection[str] | None:
-    """Return the names of the variables that an argument gives values; `None` if a run decides them."""
-    return () if values is None else literal_parts(values)
+def _variables(subject: Subject, values: Term | None) -> dict[str, str] | None:
+    """Return the kinds of the variables that an argument gives values; `None` if a run decides them."""
+    parts = {} if values is None else literal_parts(values)
+    return None if parts is None else {name: _kind(subject, term) for name, term in parts.items()}
 
 
-def _check(subject: Subject, trigger: str, condition: Expression, variables: Collection[str] | None) -> None:
+def _kind(subject: Subject, term: Term) -> str:
+    """Return the kind of a term's value; empty if it is unknown."""
+    match term:
+        case Constant(value):
+            return "" if isinstance(value, str) else kinds_of({"": value})[""]
+        case Variable(name):
+            return kind_of_type(subject.types.get(name))
+        case Call(name) if subject.schema is not None and name in subject.schema.functions:
+            return kind_of_type(subject.schema.functions[name].result)
+        case Call("list") | Arithmetic("geometry"):
+            return "list"
+        case _:
+            return ""
+
+
+def _require_used(condition: Expression, variables: Collection[str]) -> None:
+    used = free_variables(condition)
+    for name in variables:
+        if name not in used:
+            message = f"the condition does not use '{name}' of `values`"
+            raise UnknownNameError(message, found=name, valid=used)
+
+
+def _require_options(condition: Expression, arguments: Mapping[str, Term]) -> None:
+    """Raise an error about constant options that do not fit the condition or each other."""
+    options = {name: one.value for name, one in arguments.items() if isinstance(one, Constant)}
+    if isinstance(hysteresis := options.get("hysteresis"), int | float) and hysteresis > 0:
+        relaxed(condition, hysteresis)
+    require_times(options.get("times", 1), options.get("out_of", 1))
+
+
+def _inside(error: InputError) -> InputError:
+    """Add the place in the condition's text to the message; the finding has the place in the plot."""
+    if error.place is not None and error.place.line is not None:
+        error.message += f" (line {error.place.line}, column {error.place.column} of the condition)"
+    return error
+
+
+def _check(subject: Subject, trigger: str, condition: Expression, variables: Mapping[str, str] | None) -> None:
     """Raise `InputError` for a condition that cannot be evaluated."""
     name = trigger.partition(".")[0]
     if trigger == SEVERAL and subject.interfaces and subject.schema is not None:

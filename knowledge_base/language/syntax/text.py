@@ -247,8 +247,8 @@ def _compound_term(group: Group) -> Term:
 def _call(group: Group) -> Call:
     head = _head(group, "a function's name")
     if head in (*KEYWORDS, *COMPUTING):
-        said = f"'{head}' is not a function; a name, number or function is expected (text is written in quotes)"
-        raise ParseError(said, place=group.place)
+        message = f"'{head}' is not a function; a name, number or function is expected"
+        raise ParseError(f"{message} (a condition as text: '\"({head} …)\"')", place=group.place)
     return Call(head, tuple(parse_term(a) for a in group.items[1:]), place=group.place)
 
 

@@ -132,8 +132,8 @@ def test_only_changes_of_the_truth_arrive(far):
         ("(< (mean pose.distance 2) 10)", {}, [(0.0, False), (3.0, True), (4.0, False)]),
         ("(< (magnitude pose.xyz) 10)", {}, [(0.0, False), (2.0, True), (4.0, False)]),
         ("(< (distance pose.xyz (list 20 0 0)) 1)", {}, [(0.0, False), (1.0, True), (2.0, False)]),
+        ("(< (distance pose.xyz (geometry 20 0 0 0 0 0 1)) 1)", {}, [(0.0, False), (1.0, True), (2.0, False)]),
         ("(< (distance pose.xyz (geometry 20 0 0)) 1)", {}, [(0.0, False), (1.0, True), (2.0, False)]),
-        ("(= (- pose.distance 29) true)", {}, [(0.0, False)]),
         ("(beyond pose.distance 25)", {}, [(0.0, True), (1.0, False)]),
         ("(imply (> pose.distance 8) (< pose.distance 10))", {}, [(0.0, False), (2.0, True), (4.0, False)]),
         ("(> (- (* 2 pose.distance) 1) 30)", {}, [(0.0, True), (2.0, False)]),
@@ -168,7 +168,11 @@ def test_a_silent_port_is_an_event():
         ("(< (magnitude pose.distance) 10)", "list of numbers"),
         ("(< (rate pose.distance 1) 10)", "as in (rate value)"),
         ("(< (rate 3) 10)", "'value' is a value of a port, not 3"),
-        ("(< (distance pose.xyz ?limit) 10)", "not iterable"),
+        ("(< (distance pose.xyz ?limit) 10)", "is a list of numbers, and ?limit is of type number"),
+        ("(< (distance pose.xyz (list 1 2)) 10)", "not 3 and 2 numbers"),
+        ("(= (- pose.distance 29) true)", "compares number with boolean, which are never equal"),
+        ("(> (mean pose.distance ?half) 1)", "a whole number of values from 1 to 100, not 0.5"),
+        ("(in-range pose.distance ?limit 1)", "(in-range pose.distance ?limit 1): the lower bound 3"),
         ("(< pose 10)", "'pose' is a port, whose values are pose.distance, pose.xyz"),
         ("(< force.label 10)", "needs numbers, and force.label is of type text"),
         ("(< (differs force.z) 10)", "needs numbers, and (differs force.z) is of type boolean"),
@@ -184,7 +188,7 @@ def test_a_silent_port_is_an_event():
     ],
 )
 def test_mistakes_end_the_activation_with_their_reason(condition, why):
-    _, end, _ = ran(condition, distances(30, 20), values="{limit: 3}")
+    _, end, _ = ran(condition, distances(30, 20), values="{limit: 3, half: 0.5}")
     assert end.emitted[-1].name == "broken"
     assert why in end.emitted[-1].attributes["why"]
 
