@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+from dsc.components.checks import ARGUMENT_KINDS, LIBRARY
 from dsc.components.value_conditions import WATCH
 from dsc.components.value_vocabulary import SILENT
 from dsc.model.actions import ExternalAction, Internal, Switch, Trigger, Wire
@@ -15,7 +16,7 @@ from knowledge_base.language.syntax.expression import Atom, Call, Comparison, Co
 from knowledge_base.language.syntax.rewriting import inside
 from knowledge_base.language.syntax.text import parse_condition
 
-_LISTS = frozenset({"magnitude", "distance"})
+_LISTS = frozenset(name for name, check in LIBRARY.items() if ARGUMENT_KINDS.get(check) == "list")
 """Checks whose values are lists of numbers."""
 _Form = Expression | Term
 _KINDS = {bool: "boolean", int: "number", float: "number", str: "text"}
