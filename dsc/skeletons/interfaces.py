@@ -14,21 +14,28 @@ from dsc.model.actions import Configure, Emit, ExternalAction, Internal, Send, T
 from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, State, SubmachineState
 from dsc.model.transitions import Transition
+from dsc.skeletons.guard_values import EVENT, guard_values, values_in
 from dsc.skeletons.port_uses import PortUse, add_use, is_watch, port_uses
 from knowledge_base.language.syntax.expression import Constant, Variable
 
 Types = dict[str, str | None]
 """Types of plots by name; `None` where the plots leave the type open."""
-_EVENT = "event."
 _ATTRIBUTE = re.compile(r"\?event\.([\w\-]+)")
 
 
 @dataclass(slots=True)
 class SkillUse:
-    """A skill as plots use it: the types of its parameters, and of the attributes of each outcome."""
+    """A skill as plots use it.
+
+    Attributes:
+        parameters: the types of the parameters.
+        outcomes: the types of the attributes of each outcome.
+        values: attributes of each outcome with which the guards of the plots are true.
+    """
 
     parameters: Types = field(default_factory=dict)
     outcomes: dict[str, Types] = field(default_factory=dict)
+    values: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -76,6 +83,8 @@ def find_components(plots: Iterable[ActionPlot], known: Known = MappingProxyType
             names = {chart: own for own, chart in trigger.names.items()}
             events = _outcomes(plot, around)
             others = _others(plot, around, by_name, known)
+            for event, values in guard_values(around).items():
+                skill.values[names.get(event, event)] = values | skill.values.get(names.get(event, event), {})
             for event, types in events.items():
                 if event in names or (event not in renamed and event not in others):
                     _merge(skill.outcomes.setdefault(names.get(event, event), {}), types)
@@ -154,12 +163,13 @@ def _content(state: State) -> tuple[str, ...]:
 def _attributes(plot: ActionPlot, way: Transition) -> Types:
     """Return the attributes of the event that a transition reads, with the types of the places that receive them."""
     types: Types = dict.fromkeys(_ATTRIBUTE.findall(way.model_dump_json(by_alias=True)))
+    _merge(types, {name: _type_of(value) for name, value in values_in(way).items()})
     declared: Types = {name: one.type for name, one in (*plot.all_variables.items(), *plot.outputs.items())}
     emitted: Mapping[str, Any] = (plot.emits.get(way.emit) if way.emit else None) or {}
     for into, values in ((declared, way.assign), (emitted, way.arguments)):
         for name, term in values.items():
-            if isinstance(term, Variable) and term.name.startswith(_EVENT):
-                _merge(types, {term.name.removeprefix(_EVENT): into.get(name)})
+            if isinstance(term, Variable) and term.name.startswith(EVENT):
+                _merge(types, {term.name.removeprefix(EVENT): into.get(name)})
     return types
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -183,13 +184,18 @@ class Skeleton:
         return _method("skill", name, skill.parameters, self._result(skill), body=body)
 
     def _make(self, event: str, skill: SkillUse) -> str:
-        """Return the expression of an outcome: an attribute repeats a parameter of its type, or has a sample."""
+        """Return the expression of an outcome: an attribute fits a guard, repeats a parameter, or has a sample."""
         if event == _NO_OUTCOME:
             return f'Outcome("{event}")'
         by_type = {kind: name for name, kind in reversed(skill.parameters.items())}
         by_type.pop(None, None)
+        fitting = {
+            name: json.dumps(value) if isinstance(value, str) else repr(value)
+            for name, value in skill.values.get(event, {}).items()
+        }
         values = (
-            f"{name}={by_type.get(kind) or sample(kind, self.schema)}" for name, kind in self.outcomes[event].items()
+            f"{name}={fitting.get(name) or by_type.get(kind) or sample(kind, self.schema)}"
+            for name, kind in self.outcomes[event].items()
         )
         return f"{self.outcome_class(event)}({', '.join(values)})"
 

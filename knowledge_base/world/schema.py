@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from knowledge_base.errors import Place, SchemaError, UnknownNameError
+from knowledge_base.errors import Place, SchemaError, UnknownNameError, nearest
 from knowledge_base.facts import GEOMETRY, UNSET, Content
 from knowledge_base.language.checking.check import check_reads
 from knowledge_base.language.checking.relations import relation, relation_names, require_fact
@@ -273,7 +273,9 @@ class Schema:
             if name in self.types:
                 said = f"'{name}' is a type, which a condition tests of one thing: ({name} THING)"
                 raise SchemaError(f"{said}; a new thing gets its type with its name", place=place)
-            valid = (*self.predicates, *self.computed, *self.types, *KEYWORDS, *relation_names())
+            own = (*self.predicates, *self.computed, *self.types)
+            every = (*own, *KEYWORDS, *relation_names())
+            valid = every if nearest(name, every) is not None or not own else own
             raise UnknownNameError(f"there is no predicate '{name}'", place=place, found=name, valid=valid)
         of = self.computed[name]
         return Signature(of.name, of.parameters, place=of.place)

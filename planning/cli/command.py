@@ -190,7 +190,7 @@ def _tell(error: InputError, *, as_json: bool) -> None:
 def _drop_unwritten() -> None:
     """Discard unwritten output, so that Python reports no second error at its exit."""
     try:
-        if sys.stdout is not None:  # `None` if the process started without standard output
+        if sys.stdout is not None and not sys.stdout.closed:  # `None` if the process started without standard output
             sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

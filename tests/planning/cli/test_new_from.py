@@ -112,6 +112,27 @@ def test_plots_and_persons_files_after_edits_of_both(project):
     assert "6 passed" in run(sys.executable, "-m", "pytest", "-q", "-p", "no:asyncio", cwd=project)
 
 
+def test_attributes_that_guards_compare(tmp_path):
+    (tmp_path / "plots").mkdir()
+    (tmp_path / "plots" / "sort.yaml").write_text("""
+plot: sort
+emits: {bad: {}}
+states:
+  see:
+    entry: {trigger: eye.see}
+    on:
+      seen:
+        - {to: over, when: (and (< 2 ?event.size) (= ?event.ok true) (= ?event.colour "Dark red"))}
+        - {to: over, emit: bad}
+  over: {final: true}
+""")
+    run(DSC, "new", "--from", "plots", "sorter", cwd=tmp_path)
+    project = tmp_path / "sorter"
+    assert 'Seen(size=3, ok=True, colour="Dark red")' in (project / "sorter" / "skills" / "eye.py").read_text()
+    assert "Goal reached" in run(DSC, "run", ".", cwd=project)
+    assert "passed" in run(sys.executable, "-m", "pytest", "-q", "-p", "no:asyncio", cwd=project)
+
+
 def test_a_main_plot_with_an_outcome_that_is_a_failure(project):
     plot = project / "tidy_bot" / "plots" / "tidy.yaml"
     plot.write_text(plot.read_text().replace("done: over, slipped: go", "done: lost, slipped: over"))
