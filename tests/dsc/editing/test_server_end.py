@@ -21,6 +21,6 @@ def frame(**message: Any) -> bytes:
 def test_the_exit_status():
     start = frame(id=1, method="initialize", params={"capabilities": {}, "processId": None, "rootUri": None})
     last = [frame(method="initialized", params={}), frame(id=2, method="shutdown"), frame(method="exit")]
-    command = [Path(sys.executable).with_name("dsc"), "lsp"]
+    command: list[str | Path] = [Path(sys.executable).with_name("dsc"), "lsp"]
     done = subprocess.run(command, input=b"".join([start, *last]), capture_output=True, timeout=60, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
