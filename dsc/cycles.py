@@ -21,6 +21,7 @@ from dsc.errors import RunawayError
 from dsc.events import CYCLE, NO_ATTRIBUTES, Event
 from dsc.model.plot import ActionPlot
 from dsc.model.robot import Number, RobotSection, Sensor
+from dsc.text.profiles import Profile, devices_of, with_profile
 from dsc.validation import raise_findings, validate_plot
 from dsc.validation.subject import addressed_by
 from knowledge_base.errors import InputError, UnknownNameError
@@ -49,6 +50,7 @@ class CycleController:
     Args:
         plot: the plot, with a robot section.
         parameters: values for the plot's parameters, by name.
+        profile: the settings for the robot: its devices by sensor and motor, and defaults of the parameters.
 
     Attributes:
         ended: whether the plot has ended, also by an error; then each motor has its initial value.
@@ -56,14 +58,19 @@ class CycleController:
 
     Raises:
         PlotError: the plot has mistakes.
-        InputError: the plot has no robot section, or uses a component; a parameter does not fit; or an evaluation
-            failed, and no state handles `error`.
+        InputError: the plot has no robot section, or uses a component; a parameter or the profile does not fit; or an
+            evaluation failed, and no state handles `error`.
     """
 
-    def __init__(self, plot: ActionPlot, parameters: Mapping[str, Any] = NO_ATTRIBUTES) -> None:
+    def __init__(
+        self, plot: ActionPlot, parameters: Mapping[str, Any] = NO_ATTRIBUTES, profile: Profile | None = None
+    ) -> None:
+        profile = profile or Profile.model_validate({"profile": "none"})
+        plot = with_profile(plot, profile)
         self._library = Library([plot])
         raise_findings(validate_plot(plot, self._library))
-        self._robot = _robot_of(plot)
+        self._robot, self._devices = _robot_of(plot), devices_of(plot, profile)
+        self._sensors = {self._devices[name]: name for name in self._robot.sensors}
         self._machine, self._knowledge = Machine(self._library), KnowledgeBase(Schema())
         self._timers: list[_Timer] = []
         self._orders = 0
@@ -77,11 +84,12 @@ class CycleController:
 
     @property
     def motors(self) -> dict[str, Number]:
-        """The values of the motors, saturated at the bounds of their ranges."""
-        root = self._machine.state.root
-        if root is None:
-            return {name: one.start for name, one in self._robot.motors.items()}
-        return {name: one.clip(root.variables[name]) for name, one in self._robot.motors.items()}
+        """The values of the motors by device, saturated at the bounds of their ranges."""
+        root, motors = self._machine.state.root, self._robot.motors
+        return {
+            self._devices[name]: one.start if root is None else one.clip(root.variables[name])
+            for name, one in motors.items()
+        }
 
     @property
     def active(self) -> list[str]:
@@ -89,17 +97,17 @@ class CycleController:
         return list(self._machine.state.configuration())
 
     def step(self, sensors: Mapping[str, Number], now: float) -> dict[str, Number]:
-        """Execute a cycle and return the values of the motors.
+        """Execute a cycle and return the values of the motors by device.
 
         The timers due until `now` come first, in their order, and read the values of the cycle before. The event
         `cycle` with the values of the sensors follows. The timers of the initial states count from the first cycle.
 
         Args:
-            sensors: values of the sensors by name; one with a `rate` may be missing for the time of a reading.
+            sensors: values of the sensors by device; one with a `rate` may be missing for the time of a reading.
             now: the time in seconds, which begins anywhere and does not decrease.
 
         Raises:
-            UnknownNameError: there is no sensor of that name.
+            UnknownNameError: no sensor is a device of that name.
             InputError: a value is missing, of another type or out of range, or the time is not finite or decreases:
                 nothing happens. Or an evaluation failed, and no state handles `error`: the controller has ended.
             RunawayError: the chart goes round; the controller has ended.
@@ -137,18 +145,19 @@ class CycleController:
 
     def _check(self, sensors: Mapping[str, Number], time: int) -> dict[str, Number]:
         if not isinstance(sensors, Mapping):
-            remedy = f"pass a map, e.g. {{{', '.join(f'{name!r}: ...' for name in self._robot.sensors)}}}"
+            remedy = f"pass a map, e.g. {{{', '.join(f'{device!r}: ...' for device in self._sensors)}}}"
             raise InputError(f"the values of the sensors are a map by name, not {sensors!r}: {remedy}")
-        for name in sensors:
-            if name not in self._robot.sensors:
-                message = f"the robot has no sensor '{name}'"
-                raise UnknownNameError(message, found=str(name), valid=self._robot.sensors)
+        for device in sensors:
+            if device not in self._sensors:
+                message = f"the robot has no sensor '{device}'"
+                raise UnknownNameError(message, found=str(device), valid=self._sensors)
         readings = {}
-        for name, sensor in self._robot.sensors.items():
-            if name in sensors:
-                readings[name] = sensor.kind.check(f"the sensor '{name}'", sensors[name])
+        for device, name in self._sensors.items():
+            sensor = self._robot.sensors[name]
+            if device in sensors:
+                readings[name] = sensor.kind.check(f"the sensor '{device}'", sensors[device])
             elif not self._is_valid(name, sensor, time):
-                raise InputError(self._missing(name, sensor), found=name)
+                raise InputError(self._missing(name, sensor), found=device)
         self._read.update(dict.fromkeys(readings, time))
         return readings
 
@@ -161,7 +170,7 @@ class CycleController:
         if sensor.rate is not None:
             older = f"its last value is older than {1 / sensor.rate:g} s"
             late = f"; {older if name in self._read else 'it has had no value before'}"
-        return f"the sensor '{name}' has no value in this cycle{late}; it is of type {sensor.type}"
+        return f"the sensor '{self._devices[name]}' has no value in this cycle{late}; it is of type {sensor.type}"
 
     def _situation(self) -> KnowledgeSituation:
         return KnowledgeSituation(self._knowledge, self._library, lambda: self._clock / _SECOND)

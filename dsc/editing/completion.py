@@ -14,6 +14,7 @@ from dsc.editing.plot_data import used_plots
 from dsc.editing.roles import PLOT, role_of
 from dsc.editing.view import View
 from dsc.events import EXECUTIVES
+from dsc.text.profiles import BY_PLOT
 from knowledge_base.language.syntax.expression import KEYWORDS
 
 _WORD = re.compile(r"[\w?.\-]*$")
@@ -166,8 +167,8 @@ def _in_profile(view: View, cursor: Cursor) -> list[Proposal]:
     path = cursor.path
     if cursor.value is None and path:
         group, *rest = path
-        if group in {"plots", "choose"}:
-            kind: NameKind = "plot" if not rest else "variable" if group == "plots" else "state"
+        if group in BY_PLOT:
+            kind: NameKind = "plot" if not rest else "state" if group == "choose" else "variable"
             return _names(view, kind, str(rest[0]) if rest else None)
         if group == "components":
             known = view.facts.components

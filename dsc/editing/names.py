@@ -172,13 +172,13 @@ def _type_names(value: str, text: str, start: int) -> Iterator[Occurrence]:
 
 
 def profile_names(data: Any, spans: Spans) -> Iterator[Occurrence]:
-    """Yield the names of plots, parameters, states and objects in a profile."""
+    """Yield the names of plots, variables, states and objects in a profile."""
     for path, (begin, end) in spans.keys.items():
         role, name = role_of(PROFILE, path[:-1]), str(path[-1])
         if role == "settings":
             yield Occurrence("plot", name, begin, end)
         elif role == "values":
-            yield Occurrence("variable" if path[0] == "plots" else "state", name, begin, end, scope=str(path[1]))
+            yield Occurrence("state" if path[0] == "choose" else "variable", name, begin, end, scope=str(path[1]))
     for path, (begin, end) in spans.values.items():
         value = part_at(data, path)
         if path[:1] == ("plots",) and isinstance(value, str) and _SYMBOL.fullmatch(value):

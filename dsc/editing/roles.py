@@ -63,7 +63,7 @@ _ROLES: Mapping[str, Mapping[str, str]] = {
     "response": {"use": "plot", "with": "arguments", "pass": "passed", "then": "target", "on": "answers"},
     "passed": {"*": "value"},
     "answers": {"*": "target"},
-    "profile": {"plots": "settings", "choose": "settings", "components": "components"},
+    "profile": {"plots": "settings", "choose": "settings", "devices": "settings", "components": "components"},
     "settings": {"*": "values"},
     "components": {"*": "settings of a component"},
 }  # fmt: skip

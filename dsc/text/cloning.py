@@ -16,7 +16,7 @@ from dsc.model.plot import ActionPlot
 from dsc.model.plot import Path as FormPath
 from dsc.model.states import DynamicState
 from dsc.text.plot_files import Neighbours, load_plot, parse_plot, plot_to_yaml
-from dsc.text.profiles import Profile, adapted, load_profile, profile_to_yaml
+from dsc.text.profiles import BY_PLOT, Profile, adapted, load_profile, profile_to_yaml
 from dsc.text.yaml import read_file
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.output_files import Output, write_all
@@ -60,11 +60,11 @@ def cloned(plot: ActionPlot, library: Library, prefix: str, *, made: Library | N
 
 def cloned_profile(profile: Profile, prefix: str, names: Container[str]) -> Profile:
     """Return a profile for clones: `prefix` precedes its name and, in its values, the names of the plots in `names`."""
-    plots, choices = (
-        {prefix + name if name in names else name: values for name, values in group.items()}
-        for group in (profile.plots, profile.choose)
-    )
-    return profile.model_copy(update={"name": prefix + profile.name, "plots": plots, "choose": choices})
+    groups = {
+        group: {prefix + name if name in names else name: values for name, values in getattr(profile, group).items()}
+        for group in BY_PLOT
+    }
+    return profile.model_copy(update={"name": prefix + profile.name, **groups})
 
 
 def _dependencies(plot: ActionPlot, library: Library, *, plans: bool) -> Iterable[ActionPlot]:
@@ -149,10 +149,11 @@ def clone_files(file: Path, prefix: str, into: Path | None = None, profiles: Seq
     for profile in profiles:
         target = folder / f"{prefix}{profile.name}"
         read = load_profile(profile)
-        known, choices = (
-            {name: values for name, values in group.items() if name in library} for group in (read.plots, read.choose)
-        )
-        adapted(library, read.model_copy(update={"plots": known, "choose": choices}))  # a value may not fit
+        known = {
+            group: {name: values for name, values in getattr(read, group).items() if name in library}
+            for group in BY_PLOT
+        }
+        adapted(library, read.model_copy(update=known))  # a value may not fit
         text = profile_to_yaml(cloned_profile(read, prefix, names))
         if os.path.lexists(target):
             kept.append(target)

@@ -1,4 +1,4 @@
-"""Settings profiles: values of parameters for one robot or simulation, for a common set of plots (S2.10, S1.11)."""
+"""Settings profiles: values of parameters for one robot or simulation, for common plots (S2.10, S1.11, S3.3)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -18,6 +18,8 @@ from dsc.text.yaml import dump, load_document, read_file, read_model
 from knowledge_base.errors import InputError, UnknownNameError
 
 Settings = dict[str, dict[str, Setting]]
+BY_PLOT = ("plots", "choose", "devices")
+"""The groups of a profile whose keys are names of plots."""
 
 
 class Profile(Written):
@@ -29,6 +31,8 @@ class Profile(Written):
         components: values by component and parameter, within the range that the component's builder declares.
         plots: new defaults by plot and parameter; plots that use the plot may pass another value.
         choose: choices of dynamic states among candidates that fit, by plot and state, see `DynamicState`.
+        devices: the robot's devices by plot, and by sensor or motor of its robot section, see `dsc.cycles`; a sensor or
+            motor without an entry is the device of the same name.
         wiring: providers of required ports, both as `component.port`, see `dsc.components.wiring`.
     """
 
@@ -38,6 +42,7 @@ class Profile(Written):
     components: Settings = Field(default_factory=dict)
     plots: Settings = Field(default_factory=dict)
     choose: dict[str, dict[str, Choice]] = Field(default_factory=dict)
+    devices: dict[str, dict[str, Annotated[str, Field(min_length=1)]]] = Field(default_factory=dict)
     wiring: dict[str, str] = Field(default_factory=dict)
 
     @property
@@ -86,15 +91,16 @@ def adapted(plots: Iterable[ActionPlot], profile: Profile | None = None) -> tupl
     """Return the plots with the profile's values as defaults of their parameters, and with its choices.
 
     Raises:
-        UnknownNameError: a plot, parameter or dynamic state of the profile does not exist.
-        InputError: a value has another type than the parameter or is out of its range, or a profile may not change it.
+        UnknownNameError: a plot, parameter, dynamic state, sensor or motor of the profile does not exist.
+        InputError: a value has another type than the parameter or is out of its range, or a profile may not change it;
+            or two sensors or two motors are the same device.
     """
     plots = tuple(plots)
-    if profile is None or not (profile.plots or profile.choose):
+    if profile is None or not any(getattr(profile, group) for group in BY_PLOT):
         return plots
     names = [plot.name for plot in plots]
-    for group, settings in (("plots", profile.plots), ("choose", profile.choose)):
-        for name in settings:
+    for group in BY_PLOT:
+        for name in getattr(profile, group):
             if name not in names:
                 raise unknown_in(profile, group, "plot", name, names)
     return tuple(with_profile(plot, profile) for plot in plots)
@@ -108,7 +114,34 @@ def with_profile(plot: ActionPlot, profile: Profile) -> ActionPlot:
     for state, choice in profile.choose.get(plot.name, {}).items():
         with _at(profile, ("choose", plot.name, state)):
             plot = _with_choice(plot, state, choice)
+    devices_of(plot, profile)
     return plot
+
+
+def devices_of(plot: ActionPlot, profile: Profile) -> dict[str, str]:
+    """Return the robot's devices by sensor and motor of a plot; errors as for `adapted`."""
+    groups = () if plot.robot is None else (plot.robot.sensors, plot.robot.motors)
+    given = profile.devices.get(plot.name, {})
+    found = {name: given.get(name, name) for group in groups for name in group}
+    for name in [one for one in given if one not in found]:
+        with _at(profile, ("devices", plot.name, name)):
+            raise UnknownNameError(f"plot '{plot.name}' has no sensor or motor '{name}'", found=name, valid=found)
+    for group in groups:
+        _require_distinct({name: found[name] for name in group}, profile, plot)
+    return found
+
+
+def _require_distinct(devices: Mapping[str, str], profile: Profile, plot: ActionPlot) -> None:
+    """Raise an error if two sensors, or two motors, of a plot are the same device."""
+    names: dict[str, str] = {}
+    for name, device in sorted(devices.items(), key=lambda one: one[0] in profile.devices.get(plot.name, {})):
+        if device in names:
+            with _at(profile, ("devices", plot.name, name)):
+                remedy = "give them separate devices"
+                raise InputError(
+                    f"'{names[device]}' and '{name}' are both the device '{device}': {remedy}", found=device
+                )
+        names[device] = name
 
 
 def _with_choice(plot: ActionPlot, state: str, choice: Choice) -> ActionPlot:

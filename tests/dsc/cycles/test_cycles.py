@@ -14,6 +14,7 @@ from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.errors import RunawayError
 from dsc.text.plot_files import parse_plot
+from dsc.text.profiles import parse_profile
 from dsc.validation import review_plot
 from knowledge_base import InputError, KnowledgeBase, Schema
 
@@ -299,3 +300,68 @@ def test_an_event_cycle_from_outside_in_a_run():
     """)
     end = run_simulated(run())
     assert [(one.name, dict(one.attributes)) for one in end.emitted] == [("high", {"m": 8})]
+
+
+PAIR = """profile: pair
+plots: {follower: {white: 500}}
+devices:
+  follower: {left: "ground sensor 0", right: left, wheel: wheel_l}
+  other: {left: lidar}
+"""
+
+
+def adjustable(text):
+    limit = "parameters: {white: {type: number, default: 950}}"
+    return plot(text.replace(", white: 950", "").replace("plot: follower", f"plot: follower\n{limit}"))
+
+
+def test_one_chart_for_two_robots_with_other_devices():
+    robot = CycleController(adjustable(FOLLOWER), profile=parse_profile(PAIR))
+    other = CycleController(adjustable(FOLLOWER), {"white": 500})
+    assert robot.motors == {"wheel_l": 1.5, "lamp": False, "gear": 2}
+    for number, left in enumerate((400, 600, 700, 300, 800)):
+        found = robot.step({"ground sensor 0": left, "left": 7}, number / 100)
+        expected = other.step({"left": left, "right": 7}, number / 100)
+        assert found == {"wheel_l": expected["wheel"], "lamp": expected["lamp"], "gear": expected["gear"]}
+    assert robot.step({"ground sensor 0": 0, "left": 0}, 1) == {"wheel_l": 0, "lamp": False, "gear": 2}
+
+
+@pytest.mark.parametrize(
+    ("sensors", "message"),
+    [
+        ({"right": 1, "left": 0}, "the robot has no sensor 'right'; valid: ground sensor 0, left"),
+        ({"ground sensor 0": 2000, "left": 0}, "the sensor 'ground sensor 0' is a number from 0 to 1023, not 2000"),
+        ({"ground sensor 0": 1}, "the sensor 'left' has no value in this cycle"),
+        (None, "pass a map, e.g. {'ground sensor 0': ..., 'left': ...}"),
+    ],
+)
+def test_errors_about_values_with_the_names_of_devices(sensors, message):
+    robot = CycleController(adjustable(FOLLOWER), profile=parse_profile(PAIR))
+    with pytest.raises(InputError) as error:
+        robot.step(sensors, 0)
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("devices", "column", "message"),
+    [
+        ("{lefft: a}", 14, "plot 'follower' has no sensor or motor 'lefft'; did you mean 'left'?"),
+        ("{speed: a}", 14, "plot 'follower' has no sensor or motor 'speed'; valid: gear, lamp, left, right, wheel"),
+        ("{left: a, right: a}", 23, "'left' and 'right' are both the device 'a': give them separate devices"),
+        ("{left: right}", 14, "'right' and 'left' are both the device 'right'"),
+        ("{lamp: gear}", 14, "'gear' and 'lamp' are both the device 'gear'"),
+        ('{left: ""}', 14, "at least 1 character; found ''"),
+    ],
+)
+def test_devices_that_do_not_fit_the_robot_section(devices, column, message):
+    text = f"profile: p\ndevices:\n  follower: {devices}\n"
+    with pytest.raises(InputError) as error:
+        CycleController(plot(FOLLOWER), profile=parse_profile(text, "p.yaml"))
+    assert str(error.value).startswith(f"p.yaml:3:{column}: ")
+    assert message in str(error.value)
+
+
+def test_a_sensor_and_a_motor_on_one_device():
+    profile = parse_profile("{profile: p, devices: {follower: {left: axle, wheel: axle}}}")
+    robot = CycleController(plot(FOLLOWER), profile=profile)
+    assert robot.step({"axle": 3, "right": 0}, 0)["axle"] == 1.5

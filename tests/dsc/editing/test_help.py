@@ -115,7 +115,10 @@ def test_profiles_and_scenarios_are_completed():
     profile = "profile: fast\ncomponents:\n  arm: {|}\nplots:\n  take: {}\n"
     assert labels("profiles/fast.yaml", profile) == {"speed"}
     assert labels("profiles/fast.yaml", profile.replace("|", "").replace("take: {}", "take: {|}")) == {"item", "room"}
-    assert {"components", "plots", "wiring"} <= labels("profiles/fast.yaml", "profile: fast\n|")
+    devices = profile.replace("|", "").replace("plots:", "devices:")
+    assert labels("profiles/fast.yaml", devices.replace("take: {}", "take: {|}")) == {"item", "room"}
+    assert labels("profiles/fast.yaml", devices.replace("take: {}", "|")) == {"take", "main"}
+    assert {"components", "devices", "plots", "wiring"} <= labels("profiles/fast.yaml", "profile: fast\n|")
     assert labels("scenarios/one.yaml", "s|") == {"says", "slow"}
     assert labels("scenarios/one.yaml", "slow: |") == {"true", "false"}
 

@@ -194,6 +194,18 @@ def test_an_event_from_outside_and_one_with_a_name_of_the_plot(project):
     assert len(lines) == 2
 
 
+def test_a_sensor_in_its_plot_and_in_profiles(project):
+    (project / "plots" / "drive.yaml").write_text(
+        "plot: drive\nrobot:\n  sensors: {dark: number}\nstates: {a: {on: {cycle: {when: (> ?dark 3)}}}}\n"
+    )
+    (project / "profiles" / "slow.yaml").write_text("profile: slow\ndevices: {drive: {dark: dark}}\n")
+    assert rename_in(project, "variable", "drive.dark", "dim")[0] == {
+        "drive: sensors: {dim: number}",
+        "drive: states: {a: {on: {cycle: {when: (> ?dim 3)}}}}",
+        "slow: devices: {drive: {dim: dark}}",
+    }
+
+
 def test_types_objects_and_actions(project):
     assert "take: emits: {lost: {what: list of thing}}" in rename_in(project, "type", "item", "thing")[0]
     lines, _ = rename_in(project, "object", "cup", "mug")

@@ -88,10 +88,13 @@ def test_a_plot_that_is_not_there_is_named():
 
 
 def test_what_a_profile_says_of_originals_is_said_of_their_clones():
-    profile = parse_profile("profile: sim\nrobot: r\nplots: {look: {height: 900}, other: {height: 1}}")
+    profile = parse_profile(
+        "profile: sim\nrobot: r\nplots: {look: {height: 900}, other: {height: 1}}\ndevices: {look: {left: lidar}}"
+    )
     clone = cloned_profile(profile, "b_", {"look"})
     assert (clone.name, clone.robot) == ("b_sim", "r")
     assert clone.plots == {"b_look": {"height": 900}, "other": {"height": 1}}
+    assert clone.devices == {"b_look": {"left": "lidar"}}
     assert parse_profile(profile_to_yaml(clone)).digest == clone.digest
 
 

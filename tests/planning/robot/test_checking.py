@@ -228,6 +228,8 @@ PROFILES = [
     ("profile: bad\ncomponents: {weels: {speed: 5}}\n", 2, "no component 'weels'; did you mean 'wheels'"),
     ("profile: bad\nplots: {drve: {to: hall}}\n", 2, "no plot 'drve'; did you mean 'drive'"),
     ("profile: bad\nplots: {drive: {tu: hall}}\n", 2, "plot 'drive' has no parameter 'tu'"),
+    ("profile: bad\ndevices: {drve: {left: a}}\n", 2, "no plot 'drve'; did you mean 'drive'"),
+    ("profile: bad\ndevices: {drive: {left: a}}\n", 2, "plot 'drive' has no sensor or motor 'left'"),
 ]
 
 
