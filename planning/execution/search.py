@@ -220,7 +220,7 @@ class Search:
             refused.steps[step] = f"the plan costs {latest.cost:g}"
             latest = await self._valid_plan(goal, limit.left, None, sleep, running, refused)
             best = await self._compare(best, latest, step)
-        if isinstance(best, Found) and refused.steps and best.version != self._knowledge.version:
+        if isinstance(best, Found) and best.cost < math.inf and best.version != self._knowledge.version:
             return await self._valid_plan(goal, seconds, best.progress, sleep, running, _Refused())
         return best
 
