@@ -272,10 +272,11 @@ def kinds_of(values: Mapping[str, object]) -> dict[str, str]:
     for name, value in values.items():
         if value is None:
             raise InputError(f"'?{name}' has no value: the term in `values` is unset", found=name)
-    return {name: _kind_of_value(value) for name, value in values.items()}
+    return {name: kind_of_value(value) for name, value in values.items()}
 
 
-def _kind_of_value(value: object) -> str:
+def kind_of_value(value: object) -> str:
+    """Return the kind of a value; empty for an unknown kind."""
     kinds = ((bool, "boolean"), (int | float, "number"), (str, "text"), (list | tuple, "list"))
     return next((name for types, name in kinds if isinstance(value, types)), "")
 

@@ -23,9 +23,9 @@ def format_edits(text: str) -> list[TextEdit]:
     spans = Spans()
     try:
         before = load_document(text, spans=spans).data
-        kept = [span for span in spans.values.values() if text[span[0]] not in "{[" and "\n" in text[slice(*span)]]
-        inner = {path[:-1] for path in spans.values}
-        kept = [span for path, span in spans.values.items() if path not in inner and span in kept]
+        outer = {path[:-1] for path in spans.values}
+        single = [span for path, span in spans.values.items() if path not in outer]
+        kept = [span for span in single if text[span[0]] not in "{[" and "\n" in text[slice(*span)]]
         edits = [one for one in _edits(text) if not any(one.begin < end and begin < one.end for begin, end in kept)]
         return edits if load_document(patch(text, edits)).data == before else []
     except InputError:

@@ -25,5 +25,5 @@ def vocabulary_of(
     checks = {name: check for known in own if known is not None for name, check in known.items()}
     knowledge = {name: kind_of_type(one.result) for name, one in functions.items()}
     return ValueVocabulary(
-        ports, {**checks, **LIBRARY}, variables, "no component pushes a value", knowledge, any_check=None in own
+        ports, {**LIBRARY, **checks}, variables, "no component pushes a value", knowledge, any_check=None in own
     )

@@ -15,7 +15,7 @@ from dsc.model.plot import ActionPlot
 from dsc.model.states import DynamicState, State, SubmachineState
 from dsc.model.transitions import Transition
 from dsc.skeletons.guard_values import EVENT, guard_values, values_in
-from dsc.skeletons.port_uses import PortUse, add_use, is_watch, port_uses
+from dsc.skeletons.port_uses import PortUse, add_use, is_watch, port_uses, type_of
 from knowledge_base.language.syntax.expression import Constant, Variable
 
 Types = dict[str, str | None]
@@ -163,7 +163,7 @@ def _content(state: State) -> tuple[str, ...]:
 def _attributes(plot: ActionPlot, way: Transition) -> Types:
     """Return the attributes of the event that a transition reads, with the types of the places that receive them."""
     types: Types = dict.fromkeys(_ATTRIBUTE.findall(way.model_dump_json(by_alias=True)))
-    _merge(types, {name: _type_of(value) for name, value in values_in(way).items()})
+    _merge(types, {name: type_of(value) for name, value in values_in(way).items()})
     declared: Types = {name: one.type for name, one in (*plot.all_variables.items(), *plot.outputs.items())}
     emitted: Mapping[str, Any] = (plot.emits.get(way.emit) if way.emit else None) or {}
     for into, values in ((declared, way.assign), (emitted, way.arguments)):
@@ -182,13 +182,8 @@ def _argument_types(plot: ActionPlot, values: Mapping[str, Any]) -> Types:
         if isinstance(term, Variable) and term.name in declared:
             types[name] = declared[term.name].type
         elif isinstance(term, Constant):
-            types[name] = _type_of(term.value)
+            types[name] = type_of(term.value)
     return types
-
-
-def _type_of(value: object) -> str | None:
-    kinds = {bool: "boolean", int: "number", float: "number", str: "text"}
-    return kinds.get(type(value))
 
 
 def _merge(into: Types, more: Mapping[str, str | None]) -> None:

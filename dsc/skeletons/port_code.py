@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 
 from dsc.annotations import type_class
@@ -23,7 +24,7 @@ def parameters_class(component: str, use: ComponentUse) -> str:
         return ""
     head = [f"class {_parameters(component)}(Parameters):", f'    """The parameters of `{component}`."""', ""]
     fields = [
-        f"    {name}: {_PARAMETERS[kind.kind]} = {_literal(sample_value(str(kind)))}"
+        f"    {name}: {_PARAMETERS[kind.kind]} = {literal(sample_value(str(kind)))}"
         for name, kind in kinds.items()
         if kind
     ]
@@ -35,7 +36,7 @@ def declarations(component: str, use: ComponentUse, all_uses: Mapping[str, Compo
     if parameters_class(component, use):
         yield f"    parameters: {_parameters(component)}"
     if use.ports.modes:
-        yield f"    modes = ({' '.join(f'{_literal(one)},' for one in use.ports.modes)})"
+        yield f"    modes = ({' '.join(f'{literal(one)},' for one in use.ports.modes)})"
     for port, values in use.ports.pushes.items():
         yield f"    {port} = Push({_types(values)})"
     for port, source in use.ports.streams.items():
@@ -52,7 +53,7 @@ def simulate_values(ports: PortUse) -> list[str]:
     for port, values in ports.pushes.items():
         given = list[str]()
         for name, (low, high) in values.items():
-            given.append(f"{name}=({_literal(low)}, {_literal(high)})[self.steps // {_SECONDS * 2**number} % 2]")
+            given.append(f"{name}=({literal(low)}, {literal(high)})[self.steps // {_SECONDS * 2**number} % 2]")
             number += 1
         puts += [f"        self.{port}.put({', '.join(given)})"] if given else []
     if not puts:
@@ -69,5 +70,6 @@ def _types(values: Mapping[str, tuple[object, object]]) -> str:
     return "{" + ", ".join(f'"{name}": "{type_of(low)}"' for name, (low, _) in values.items()) + "}"
 
 
-def _literal(value: object) -> str:
-    return f'"{value}"' if isinstance(value, str) else repr(value)
+def literal(value: object) -> str:
+    """Return plain data as an expression of Python."""
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)

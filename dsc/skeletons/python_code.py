@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from dsc.annotations import lower_name, type_class
 from dsc.components.component import Component
 from dsc.model.plot import ActionPlot
 from dsc.skeletons.interfaces import ComponentUse, Known, SkillUse, Types, find_components
-from dsc.skeletons.port_code import declarations, parameters_class, simulate_values
+from dsc.skeletons.port_code import declarations, literal, parameters_class, simulate_values
 from dsc.skeletons.python_types import annotation, object_types, record_class, sample, with_types_above
 from dsc.text.typed_plots import is_python_name, type_definition
 from knowledge_base.errors import InputError
@@ -189,10 +188,7 @@ class Skeleton:
             return f'Outcome("{event}")'
         by_type = {kind: name for name, kind in reversed(skill.parameters.items())}
         by_type.pop(None, None)
-        fitting = {
-            name: json.dumps(value) if isinstance(value, str) else repr(value)
-            for name, value in skill.values.get(event, {}).items()
-        }
+        fitting = {name: literal(value) for name, value in skill.values.get(event, {}).items()}
         values = (
             f"{name}={fitting.get(name) or by_type.get(kind) or sample(kind, self.schema)}"
             for name, kind in self.outcomes[event].items()

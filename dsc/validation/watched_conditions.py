@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 
 from dsc.components.checks import LIBRARY
 from dsc.components.value_conditions import WATCH, require_times
-from dsc.components.value_vocabulary import ValueVocabulary, kind_of_type, kinds_of
+from dsc.components.value_vocabulary import ValueVocabulary, kind_of_type, kind_of_value
 from dsc.errors import Finding
 from dsc.model.actions import Trigger
 from dsc.model.data_forms import literal_parts
@@ -58,7 +58,7 @@ def _kind(subject: Subject, term: Term) -> str:
     """Return the kind of a term's value; empty if it is unknown."""
     match term:
         case Constant(value):
-            return "" if isinstance(value, str) else kinds_of({"": value})[""]
+            return "" if isinstance(value, str) else kind_of_value(value)
         case Variable(name):
             return kind_of_type(subject.types.get(name))
         case Call(name) if subject.schema is not None and name in subject.schema.functions:
@@ -101,7 +101,7 @@ def _check(subject: Subject, trigger: str, condition: Expression, variables: Map
     elif name in subject.interfaces:
         interface = subject.interfaces[name]
         ports = {port: service.gives for port, service in interface.pushes.items()}
-        checks = {**(interface.checks or {}), **LIBRARY}
+        checks = {**LIBRARY, **(interface.checks or {})}
         who, any_check = f"component '{name}' pushes no value", interface.checks is None
         ValueVocabulary(ports, checks, variables, who, any_check=any_check).check(condition)
 

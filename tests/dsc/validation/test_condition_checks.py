@@ -165,3 +165,16 @@ def test_options_that_do_not_fit(option, condition, said):
     with pytest.raises(PlotError) as error:
         Robot(DOMAIN, [parse_plot(text)], [Hand(), Wrist()])
     assert said in str(error.value)
+
+
+@pytest.mark.parametrize("trigger", ["lift.watch_values", "conditions.watch_truth"])
+def test_an_own_check_precedes_one_of_the_library(trigger):
+    def in_range(value: Series) -> bool:
+        return value.number < 2
+
+    class Lift(Component):
+        name = "lift"
+        height = Push({"x": "number"}, checks=(in_range,))
+
+    name = "height.x" if trigger.startswith("lift") else "lift.height.x"
+    Robot(DOMAIN, [parse_plot(written(trigger, f"(in-range {name})"))], [Lift()])
