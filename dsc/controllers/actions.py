@@ -14,10 +14,12 @@ from dsc.controllers.model import (
     Block,
     Branch,
     Command,
+    Comparison,
     Controller,
     Fire,
     Fixed,
     Group,
+    Read,
     Start,
     Timer,
     Value,
@@ -63,8 +65,12 @@ class BlockBuilder:
         match action:
             case model.Assign(assign=terms):
                 return self._assignment(terms)
-            case model.Perform(perform=name):
-                return self._assignment(self._compiled.plot.operation(name))
+            case model.Perform():
+                return self._assignment(self._compiled.plot.motor_values(action))
+            case model.StartActivity() | model.StopActivity():
+                name, active = action.change
+                changes = Comparison("eq", Read("data", name, "boolean"), Fixed(not active, "boolean"))
+                return Branch(changes, (self._assignment(self._compiled.plot.motor_values(action)),), ())
             case model.Emit():
                 return self._fire(action)
             case model.Trigger():

@@ -19,6 +19,8 @@ from dsc.model.actions import (
     Log,
     Perform,
     Send,
+    StartActivity,
+    StopActivity,
     Switch,
     Tell,
     Trigger,
@@ -232,6 +234,9 @@ def action_text(action: Internal | ExternalAction, *, brief: bool = False) -> st
             return ", ".join(f"{name} := {term_text(value)}" for name, value in values.items())
         case Perform(perform=name):
             return name
+        case StartActivity() | StopActivity():
+            name, active = action.change
+            return f"start({name})" if active else f"stop({name})"
         case Tell(tell=effect):
             return f"tell {to_text(effect)}"
         case Withdraw(withdraw=sent):
@@ -309,8 +314,14 @@ def _robot(robot: RobotSection) -> Iterator[tuple[str, str]]:
     yield "sensors", _declared(robot.sensors)
     yield "motors", _declared(robot.motors)
     yield "constants", ", ".join(f"{name} = {value_text(value)}" for name, value in robot.constants.items())
-    for name, values in robot.operations.items():
-        yield f"operation {name}", ", ".join(f"{motor} := {term_text(term)}" for motor, term in values.items())
+    for (group, *words), values in robot.assignments.items():
+        yield (
+            f"{_KINDS[group]} {' '.join(map(str, words))}",
+            ", ".join(f"{motor} := {term_text(term)}" for motor, term in values.items()),
+        )
+
+
+_KINDS = {"operations": "operation", "activities": "activity"}
 
 
 def _events(declared: Mapping[str, Mapping[str, str] | None]) -> str:

@@ -7,7 +7,19 @@ from collections.abc import Callable, Mapping
 from dsc.dynamic.fresh_names import FreshNames
 from dsc.dynamic.steps import Plots, filled
 from dsc.events import DONE, FAILURES, GAVE_UP, SKILL_FAILURES
-from dsc.model.actions import Assign, Block, Choose, Emit, Log, Perform, Tell, Withdraw, WrittenAction
+from dsc.model.actions import (
+    Assign,
+    Block,
+    Choose,
+    Emit,
+    Log,
+    Perform,
+    StartActivity,
+    StopActivity,
+    Tell,
+    Withdraw,
+    WrittenAction,
+)
 from dsc.model.plot import ActionPlot
 from dsc.model.rules import CONTINUE, ENTER, GIVE_UP, REPLAN, RETRY, Rule
 from dsc.model.states import AnyState, FinalState, State, SubmachineState
@@ -238,7 +250,9 @@ def _action_because(action: WrittenAction, reason: Terms) -> WrittenAction:
             return Assign(assign=filled(action.assign, reason))
         case Emit():
             return action.model_copy(update={"arguments": filled(action.arguments, reason)})
-        case Perform() | Withdraw() | Log() | Choose() | Block():  # without a reason, or of dialect scxml
+        case (
+            Perform() | StartActivity() | StopActivity() | Withdraw() | Log() | Choose() | Block()
+        ):  # without a reason, or of dialect scxml
             return action
 
 

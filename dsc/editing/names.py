@@ -88,7 +88,7 @@ def plot_names(document: Document, spans: Spans, text: str) -> Iterator[Occurren
     robot: Any = data.get("robot")
     robot = robot if isinstance(robot, dict) else {}
     groups = [data.get(group) for group in ("parameters", "variables", "outputs")]
-    groups += [robot.get(group) for group in ("sensors", "motors", "constants")]
+    groups += [robot.get(group) for group in ("sensors", "motors", "constants", "activities")]
     own = {name for group in groups for name in group or {}}
     states = {path[-1] for path in spans.keys if role_of(PLOT, path[:-1]) == "states"}
     yield from _key_names(data, spans, plot, own)

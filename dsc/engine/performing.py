@@ -28,6 +28,8 @@ from dsc.model.actions import (
     Log,
     Perform,
     Send,
+    StartActivity,
+    StopActivity,
     Switch,
     Tell,
     Trigger,
@@ -206,8 +208,9 @@ class Performer:
         match action:
             case Assign(assign=terms):
                 _set_variables(frame, self.values(frame, terms))
-            case Perform(perform=name):
-                _set_variables(frame, self.values(frame, frame.compiled.plot.operation(name)))
+            case Perform() | StartActivity() | StopActivity():
+                if isinstance(action, Perform) or frame.variables[action.change[0]] is not action.change[1]:
+                    _set_variables(frame, self.values(frame, frame.compiled.plot.motor_values(action)))
             case Bind(names=names):
                 found = self.find(frame, action)
                 if found is None:

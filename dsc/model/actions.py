@@ -99,6 +99,32 @@ class Perform(Frozen):
     perform: str
 
 
+class StartActivity(Frozen):
+    """Start an activity of `robot`, unless it is active: assign its values for the start to motors (S3.7)."""
+
+    start: str
+
+    @property
+    def change(self) -> tuple[str, bool]:
+        """The name of the activity, and whether it is active afterwards."""
+        return self.start, True
+
+
+class StopActivity(Frozen):
+    """Stop an activity of `robot`, if it is active: assign its values for the stop to motors (S3.7)."""
+
+    stop: str
+
+    @property
+    def change(self) -> tuple[str, bool]:
+        """The name of the activity, and whether it is active afterwards."""
+        return self.stop, False
+
+
+OfRobot = Perform | StartActivity | StopActivity
+"""The actions on the operations and activities of `robot`, as a union of types."""
+
+
 class Tell(Frozen):
     """Change the knowledge base; later guards of the same macrostep read the changed knowledge."""
 
@@ -162,7 +188,7 @@ class Block(Frozen):
     block: tuple[InternalAction, ...]
 
 
-WrittenAction = Assign | Perform | Tell | Emit | Withdraw | Log | Choose | Block
+WrittenAction = Assign | Perform | StartActivity | StopActivity | Tell | Emit | Withdraw | Log | Choose | Block
 """The internal actions that a list of actions contains, as a union of types."""
 Internal = WrittenAction | Bind
 """The internal actions as a union of types."""
@@ -198,5 +224,7 @@ def component_of(action: ExternalAction | Internal) -> str | None:
             return port.partition(".")[0]
         case Switch(switch=name):
             return name
-        case Bind() | Assign() | Perform() | Tell() | Emit() | Withdraw() | Log() | Choose() | Block():
+        case Bind() | Assign() | Perform() | StartActivity() | StopActivity() | Tell() | Emit() | Withdraw() | Log():
+            return None
+        case Choose() | Block():
             return None

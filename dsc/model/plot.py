@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from dsc.events import CYCLE
 from dsc.model import relations  # noqa: F401  declares them for all texts
-from dsc.model.actions import ExternalAction, Internal, flat
+from dsc.model.actions import ExternalAction, Internal, OfRobot, flat
 from dsc.model.declarations import PlotParameter, PlotVariable, TypeText
 from dsc.model.language import ConditionField, TermField, Written, constant
 from dsc.model.plot_names import check_declarations, check_states, check_variables
@@ -63,7 +63,7 @@ class ActionPlot(Written):
         outputs: typed values that the plot returns (S2.1). The plot assigns and reads them like variables. At the
             plot's end they become the attributes of the host state's `done` event.
         types: records by name: the types of their fields. Plots of one library share their records.
-        robot: sensors, motors, constants and operations of a robot that the plot drives in cycles (S3.3).
+        robot: sensors, motors, constants, operations and activities of a robot that the plot drives in cycles (S3.3).
         emits: outcome events with the types of their attributes; the host state must handle every outcome event.
         when: condition under which the plot fits as a candidate of a dynamic state (bottom-up, S0.4).
         priority, utility, cost: terms by which dynamic states may choose among candidates that fit, see `choose`
@@ -143,7 +143,7 @@ class ActionPlot(Written):
         paths: list[Path] = []
         for group in ("parameters", "variables", "outputs"):
             paths += [(group, name) for name in getattr(self, group)]
-        for group in ("sensors", "motors", "constants") if self.robot is not None else ():
+        for group in ("sensors", "motors", "constants", "activities") if self.robot is not None else ():
             paths += [("robot", group, name) for name in getattr(self.robot, group)]
         check_declarations(paths)
         for group, events in (("emits", self.emits), ("receives", self.receives)):
@@ -171,12 +171,9 @@ class ActionPlot(Written):
             return self.receives
         return {**self.receives, CYCLE: {name: one.type for name, one in self.robot.sensors.items()}}
 
-    def operation(self, name: str) -> dict[str, TermField]:
-        """Return the values of motors in an operation; raise `UnknownNameError` if there is none of that name."""
-        operations: dict[str, dict[str, TermField]] = {} if self.robot is None else self.robot.operations
-        if name not in operations:
-            raise UnknownNameError(f"there is no operation '{name}'", found=name, valid=operations)
-        return operations[name]
+    def motor_values(self, action: OfRobot) -> dict[str, TermField]:
+        """Return the values that an action assigns, see `RobotSection.motor_values`."""
+        return (self.robot or RobotSection()).motor_values(action)
 
     def walk(self) -> Iterator[tuple[str, AnyState, Path]]:
         """Yield name, state and path of every state at any depth, in document order."""

@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, StrictFloat, StrictInt
 
 from dsc.data_types import DataType, data_type
+from dsc.model.actions import OfRobot, Perform
 from dsc.model.declarations import PlotVariable, TypeText
 from dsc.model.language import Frozen, TermField
 from dsc.model.reading import in_yaml
+from knowledge_base.errors import UnknownNameError
 from knowledge_base.language.syntax.expression import Constant
+
+_Declared = TypeVar("_Declared")
 
 
 def _number(value: Any) -> Any:
@@ -79,32 +83,75 @@ class Sensor(Device):
     rate: float | None = Field(default=None, gt=0, strict=True)
 
 
+class RobotActivity(Frozen):
+    """An activity, which actions start and stop by name.
+
+    Attributes:
+        start: values of motors at the start.
+        stop: values of motors at the stop.
+    """
+
+    start: dict[str, TermField] = Field(default_factory=dict)
+    stop: dict[str, TermField] = Field(default_factory=dict)
+
+
 class RobotSection(Frozen):
-    """Sensors, motors, constants and operations of a robot that a plot drives in cycles.
+    """Sensors, motors, constants, operations and activities of a robot that a plot drives in cycles.
 
     Attributes:
         sensors: sensors by name, with their types.
         motors: motors by name, with their types.
         constants: numbers and truth values by name.
         operations: for each name, values of motors, which the action `perform` assigns.
+        activities: activities by name; a boolean of that name is true while the activity is active.
     """
 
     sensors: dict[str, Sensor] = Field(default_factory=dict)
     motors: dict[str, Device] = Field(default_factory=dict)
     constants: dict[str, Number] = Field(default_factory=dict)
     operations: dict[str, dict[str, TermField]] = Field(default_factory=dict)
+    activities: dict[str, RobotActivity] = Field(default_factory=dict)
 
     @property
     def read_only(self) -> Mapping[str, str]:
         """The names that a plot only reads, each with its kind in words."""
-        return {**dict.fromkeys(self.sensors, "sensor"), **dict.fromkeys(self.constants, "constant")}
+        found = {**dict.fromkeys(self.sensors, "a sensor"), **dict.fromkeys(self.constants, "a constant")}
+        return {**found, **dict.fromkeys(self.activities, "an activity")}
+
+    @property
+    def assignments(self) -> dict[tuple[str, ...], dict[str, TermField]]:
+        """The values of motors in operations and activities, by their paths in the written form."""
+        found: dict[tuple[str, ...], dict[str, TermField]] = {}
+        for name, values in self.operations.items():
+            found["operations", name] = values
+        for name, activity in self.activities.items():
+            found |= {("activities", name, "start"): activity.start, ("activities", name, "stop"): activity.stop}
+        return found
+
+    def motor_values(self, action: OfRobot) -> dict[str, TermField]:
+        """Return the values that an action assigns to motors, and to the name of an activity.
+
+        Raises:
+            UnknownNameError: there is no operation or activity of that name.
+        """
+        if isinstance(action, Perform):
+            return _look_up("operation", action.perform, self.operations)
+        name, active = action.change
+        activity = _look_up("activity", name, self.activities)
+        return {**(activity.start if active else activity.stop), name: Constant(active)}
 
     @property
     def variables(self) -> dict[str, PlotVariable]:
-        """The sensors, motors and constants as variables; a motor has no bounds here, as its value is saturated."""
+        """The variables of the section; a motor has no bounds here, as its value is saturated."""
         bare = {name: one.kind.kind for name, one in self.motors.items()}
         types = {**{name: one.type for name, one in self.sensors.items()}, **bare}
         values = {name: one.start for name, one in (*self.sensors.items(), *self.motors.items())}
-        for name, value in self.constants.items():
+        for name, value in {**self.constants, **dict.fromkeys(self.activities, False)}.items():
             types[name], values[name] = "boolean" if isinstance(value, bool) else "number", value
         return {name: PlotVariable(type=types[name], initial=Constant(value)) for name, value in values.items()}
+
+
+def _look_up(kind: str, name: str, declared: Mapping[str, _Declared]) -> _Declared:
+    if name not in declared:
+        raise UnknownNameError(f"there is no {kind} '{name}'", found=name, valid=declared)
+    return declared[name]

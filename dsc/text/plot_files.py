@@ -62,12 +62,12 @@ def plot_to_yaml(plot: ActionPlot) -> str:
 
 _ORDER = (
     "plot", "about", "generated", "implements", "effects", "confirm", "parameters", "variables", "outputs", "robot",
-    "sensors", "motors", "constants", "operations", "receives", "emits", "seconds", "set", "switch", "send", "to",
-    "pass", "before", "when", "offers", "utility", "cost", "of", "interrupt", "listen", "trigger", "use", "dynamic",
-    "choose", "exclude", "situation", "explore", "bind", "bind_all", "order_by", "assign", "perform", "tell",
-    "emit", "command", "with", "as", "within", "goal", "budget", "clear", "do", "then", "limit", "rule", "choice",
-    "select", "cases", "else", "entry", "at_least", "initial", "final", "states", "regions", "on", "after", "every",
-    "always", "exit", "on_break", "rules", "handlers",
+    "sensors", "motors", "constants", "operations", "activities", "start", "stop", "receives", "emits", "seconds",
+    "set", "switch", "send", "to", "pass", "before", "when", "offers", "utility", "cost", "of", "interrupt",
+    "listen", "trigger", "use", "dynamic", "choose", "exclude", "situation", "explore", "bind", "bind_all",
+    "order_by", "assign", "perform", "tell", "emit", "command", "with", "as", "within", "goal", "budget", "clear",
+    "do", "then", "limit", "rule", "choice", "select", "cases", "else", "entry", "at_least", "initial", "final",
+    "states", "regions", "on", "after", "every", "always", "exit", "on_break", "rules", "handlers",
 )  # fmt: skip
 """Keys of a plot file in the order in which they are written."""
 _SINGLE = frozenset({

@@ -114,8 +114,8 @@ class _Data:
             for name, variable in declared.items():
                 yield from self._type_exists(variable.type, (group, name))
                 yield from self._fits(variable.initial, variable.type, self._own, (group, name, "initial"))
-        for name, values in ({} if plot.robot is None else plot.robot.operations).items():
-            yield from self._terms(values, self._own, ("robot", "operations", name), self._assigned)
+        for place, values in ({} if plot.robot is None else plot.robot.assignments).items():
+            yield from self._terms(values, self._own, ("robot", *place), self._assigned)
         for group, events in (("types", plot.types), ("emits", plot.emits), ("receives", plot.receives)):
             for event, attributes in events.items():
                 for name, kind in (attributes or {}).items():
@@ -218,7 +218,9 @@ class _Data:
         match action:
             case actions.Tell(tell=effect):
                 yield from self._effect(effect, scope, (*path, "tell"))
-            case actions.Bind() | actions.Perform():  # see `_bindings` and `check_robot`
+            case (
+                actions.Bind() | actions.Perform() | actions.StartActivity() | actions.StopActivity()
+            ):  # see `_bindings` and `check_robot`
                 pass
             case actions.Assign(assign=values):
                 for name in values:
@@ -274,7 +276,7 @@ class _Data:
             message = f"'{name}' is a parameter, which the plot only reads; assign a variable"
             yield self._subject.finding(path, "declared-variable", message, found=name)
         elif self._plot.robot is not None and name in self._plot.robot.read_only:
-            message = f"'{name}' is a {self._plot.robot.read_only[name]}, which the plot only reads; assign a motor"
+            message = f"'{name}' is {self._plot.robot.read_only[name]}, which the plot only reads; assign a motor"
             yield self._subject.finding(path, "declared-variable", message, found=name)
         elif name not in self._assigned:
             message, called = f"there is no variable '{name}'", self._call_of(name)

@@ -1,4 +1,4 @@
-"""Checks and review of the robot section: operations set motors, and the outermost plot drives a robot (S3.3)."""
+"""Checks and review of the robot section: its parts set motors, and the outermost plot drives a robot (S3.3)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from dsc.data_types import data_type
 from dsc.errors import Finding
 from dsc.events import CYCLE
-from dsc.model.actions import Assign, Perform
+from dsc.model.actions import Assign, OfRobot, Perform
+from dsc.model.language import first_key
 from dsc.model.plot import Path
 from dsc.model.robot import RobotSection
 from dsc.model.states import State
@@ -40,7 +41,7 @@ def check_robot(subject: Subject) -> Iterator[Finding]:
 def sets_motors(subject: Subject, action: object) -> bool:
     """Return whether an action sets only motors; entry and exit may contain such an action."""
     motors = {} if subject.plot.robot is None else subject.plot.robot.motors
-    return isinstance(action, Perform) or (isinstance(action, Assign) and action.assign.keys() <= motors.keys())
+    return isinstance(action, OfRobot) or (isinstance(action, Assign) and action.assign.keys() <= motors.keys())
 
 
 def review_motors(subject: Subject) -> Iterator[Finding]:
@@ -58,9 +59,9 @@ def review_motors(subject: Subject) -> Iterator[Finding]:
 
 
 def _assignments(subject: Subject, robot: RobotSection) -> Iterator[tuple[Path, Mapping[str, Term]]]:
-    """Yield the values that operations, states and transitions assign, with their paths."""
-    for name, values in robot.operations.items():
-        yield ("robot", "operations", name), values
+    """Yield the values that operations, activities, states and transitions assign, with their paths."""
+    for place, values in robot.assignments.items():
+        yield ("robot", *place), values
     for path, action, _ in subject.actions():
         if isinstance(action, Assign):
             yield (*path, "assign"), action.assign
@@ -86,17 +87,19 @@ def _may_be_fraction(term: Term, subject: Subject, robot: RobotSection) -> bool:
 
 
 def _check_operations(subject: Subject) -> Iterator[Finding]:
-    """Yield findings about actions that perform an unknown operation."""
+    """Yield findings about actions with an unknown operation or activity."""
     states = [(state, path) for _, state, path in subject.states if isinstance(state, State)]
     blocks = [((*path, key), block) for state, path in states for key, block in state.blocks()]
     for path, actions in (*blocks, *(((*path, "do"), way.do) for path, _, way in subject.ways())):
         for number, action in enumerate(actions):
-            if isinstance(action, Perform):
+            if isinstance(action, OfRobot):
                 try:
-                    subject.plot.operation(action.perform)
+                    subject.plot.motor_values(action)
                 except InputError as error:
-                    fix = "declare it under `operations` of `robot`"
-                    yield subject.caught(error, (*path, number, "perform"), "robot", fix)
+                    fix = (
+                        f"declare it under `{'operations' if isinstance(action, Perform) else 'activities'}` of `robot`"
+                    )
+                    yield subject.caught(error, (*path, number, first_key(type(action))), "robot", fix)
 
 
 def _check_devices(subject: Subject, robot: RobotSection) -> Iterator[Finding]:
@@ -106,10 +109,10 @@ def _check_devices(subject: Subject, robot: RobotSection) -> Iterator[Finding]:
                 device.kind.check(f"'{name}'", device.start)
             except InputError as error:
                 yield subject.caught(error, ("robot", group, name, "initial"), "robot")
-    for operation, values in robot.operations.items():
+    for place, values in robot.assignments.items():
         for name in values.keys() - robot.motors.keys():
-            message, path = (
-                f"'{name}' is no motor, and an operation sets motors",
-                ("robot", "operations", operation, name),
-            )
+            message, path = f"'{name}' is no motor, and {_SETTERS[place[0]]} sets motors", ("robot", *place, name)
             yield subject.finding(path, "robot", message, "declare it under `motors`", found=name, valid=robot.motors)
+
+
+_SETTERS = {"operations": "an operation", "activities": "an activity"}

@@ -9,6 +9,7 @@ from dsc.model.plot import ActionPlot
 GUARDS = (
     "(> ?light 0.5)", "(<= ?light 0.3)", "(= ?bumper true)", "(> ?steps 3)", "(in-state a1)", "(in-state b0)",
     "(and (in-state a0) (< ?wheel 1))", "(or (= ?lamp true) (> ?gear 2))", "(> ?light ?edge)", "(< (/ 1 ?steps) 0.5)",
+    "(= ?blink true)", "(= ?hum ?bumper)",
 )  # fmt: skip
 VALUES = {
     "wheel": ("?edge", "(* 4 ?light)", "(- ?wheel 1.5)", "(/ ?light (- ?steps 5))", -2),
@@ -25,7 +26,8 @@ def grow_robot(seed):
 
     def acts():
         motor = pick(("wheel", "gear", "lamp"))
-        return pick(({"assign": {motor: pick(VALUES[motor])}}, {"perform": pick(("rest", "go"))}))
+        blink = {pick(("start", "stop")): pick(("blink", "hum"))}
+        return pick(({"assign": {motor: pick(VALUES[motor])}}, {"perform": pick(("rest", "go"))}, blink))
 
     def way(to):
         event = {"emit": pick(("ping", "pong"))} if not pick(range(3)) else {}
@@ -61,6 +63,10 @@ def grow_robot(seed):
             },
             "constants": {"edge": 0.4},
             "operations": {"rest": {"wheel": 0, "lamp": False}, "go": {"wheel": "(* 2 ?edge)", "gear": "(+ ?gear 1)"}},
+            "activities": {
+                "blink": {"start": {"lamp": True}, "stop": {"lamp": False, "wheel": "(/ ?light ?steps)"}},
+                "hum": {"start": {"gear": "(/ ?steps 2)", "wheel": "(- ?wheel 1)"}},
+            },
         },
     })  # fmt: skip
 

@@ -43,6 +43,8 @@ from dsc.model.actions import (
     Log,
     Perform,
     Send,
+    StartActivity,
+    StopActivity,
     Switch,
     Tell,
     Trigger,
@@ -521,8 +523,8 @@ class Reference:
                 self.report.modes.append(mode)
             case Assign(assign=terms):
                 instance.variables.update({name: self._value(instance, term) for name, term in terms.items()})
-            case Perform(perform=name):
-                self._act(instance, Assign(assign=instance.plot.operation(name)))
+            case Perform() | StartActivity() | StopActivity():
+                self._move(instance, action)
             case Tell(tell=effect):
                 for fact, is_added in told(effect):
                     (self.facts.add if is_added else self.facts.discard)(fact)
@@ -538,6 +540,10 @@ class Reference:
                 raise NotImplementedError(action)
             case Trigger() | Configure() | Send() | Wire() | Unwire() | Withdraw() | Log():
                 pass  # nothing of a chart without components depends on them
+
+    def _move(self, instance, action):
+        if isinstance(action, Perform) or instance.variables[action.change[0]] is not action.change[1]:
+            self._act(instance, Assign(assign=instance.plot.motor_values(action)))
 
     def _chooses(self, instance, action):
         """A condition that cannot be evaluated is false, and an error (SCXML 5.9.1)."""

@@ -10,6 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dsc import CycleController, Event, LoopClock, Machine, Sequencer, run_simulated
+from dsc.drawing import draw
+from dsc.drawing.captions import action_text
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.errors import RunawayError
@@ -365,3 +367,59 @@ def test_a_sensor_and_a_motor_on_one_device():
     profile = parse_profile("{profile: p, devices: {follower: {left: axle, wheel: axle}}}")
     robot = CycleController(plot(FOLLOWER), profile=profile)
     assert robot.step({"axle": 3, "right": 0}, 0)["axle"] == 1.5
+
+
+BLINKER = """
+plot: p
+robot:
+  sensors: {s: number}
+  motors: {lamp: {type: boolean, initial: true}, count: number}
+  activities: {blink: {start: {lamp: true, count: (+ ?count 1)}, stop: {lamp: false, count: (/ 1 ?s)}}}
+states:
+  a:
+    entry: {start: blink}
+    exit: {stop: blink}
+    on:
+      error: {}
+      cycle:
+        - {when: (= ?s 1), do: [{start: blink}]}
+        - {when: (= ?s 2), do: [{stop: blink}, {stop: blink}]}
+        - {when: (= ?s 3), do: [{stop: blink}, {start: blink}]}
+        - {when: (and (= ?s 4) (= ?blink true)), assign: {count: 40}}
+        - {when: (= ?s 0), do: [{stop: blink}]}
+        - {when: (= ?s 5), to: b}
+  b: {on: {cycle: {to: over, when: (= ?blink false)}}}
+  over: {final: true}
+"""
+
+
+@pytest.mark.parametrize(
+    ("sensors", "lamp", "count"),
+    [
+        ([1], True, 1),  # it is active since the entry
+        ([2], False, 0.5),
+        ([2, 2], False, 0.5),  # the second stop does nothing
+        ([2, 1], True, 1.5),
+        ([3], True, 1 / 3 + 1),
+        ([4], True, 40),
+        ([2, 4], False, 0.5),
+        ([0], True, 1),  # a failed stop
+        ([0, 4], True, 40),
+        ([5], False, 0.2),  # by the exit
+        ([5, 5], True, 0),  # the initial values after the end
+    ],
+)
+def test_activities_by_name(sensors, lamp, count):
+    robot = CycleController(plot(BLINKER))
+    for number, value in enumerate(sensors):
+        found = robot.step({"s": value}, number / 100)
+    assert found == {"lamp": lamp, "count": pytest.approx(count)}
+
+
+def test_the_captions_of_activities():
+    (entry,) = plot(BLINKER).state("a").entry
+    (stop, _) = plot(BLINKER).state("a").on["cycle"][1].do
+    assert [action_text(entry), action_text(stop)] == ["start(blink)", "stop(blink)"]
+    drawn = draw(plot(BLINKER))
+    assert "activity blink start" in drawn
+    assert "stop(blink)" in drawn

@@ -206,6 +206,18 @@ def test_a_sensor_in_its_plot_and_in_profiles(project):
     }
 
 
+def test_an_activity_where_it_starts_and_stops(project):
+    (project / "plots" / "warn.yaml").write_text(
+        "plot: warn\nrobot:\n  activities: {blink: {}}\nstates:\n  a: {entry: {start: blink}, exit: [{stop: blink}]}\n"
+        "  b: {on: {cycle: {when: (= ?blink true), do: [{stop: blink}]}}}\n"
+    )
+    assert rename_in(project, "variable", "warn.blink", "flash")[0] == {
+        "warn: activities: {flash: {}}",
+        "warn: a: {entry: {start: flash}, exit: [{stop: flash}]}",
+        "warn: b: {on: {cycle: {when: (= ?flash true), do: [{stop: flash}]}}}",
+    }
+
+
 def test_types_objects_and_actions(project):
     assert "take: emits: {lost: {what: list of thing}}" in rename_in(project, "type", "item", "thing")[0]
     lines, _ = rename_in(project, "object", "cup", "mug")

@@ -540,6 +540,11 @@ WRONG = [
     # -- robot sections
     ("robot", ROBOT + "  operations:\n    go: {n: 1}\nstates: {a: {on: {cycle: a}}}\n", 7, "'n' is no motor, and an operation sets motors", "`motors`"),
     ("robot", ROBOT + "states:\n  a:\n    entry:\n      - perform: go\n    on: {cycle: a}\n", 9, "no operation 'go'", "`operations`"),
+    ("robot", ROBOT + "  activities:\n    go: {stop: {n: 1}}\nstates: {a: {on: {cycle: a}}}\n", 7, "'n' is no motor, and an activity sets motors", "`motors`"),
+    ("robot", ROBOT + "  activities: {blink: {}}\nstates:\n  a:\n    entry: {start: blnk}\n    on: {cycle: a}\n", 9, "no activity 'blnk'; did you mean 'blink'", "`activities`"),
+    ("robot", ROBOT + "states:\n  a:\n    on:\n      cycle: {do: [{stop: blink}]}\n", 9, "no activity 'blink'", "`activities`"),
+    ("declared-variable", ROBOT + "  activities: {blink: {}}\nstates:\n  a:\n    on:\n      cycle: {assign: {blink: true}}\n", 10, "'blink' is an activity, which the plot only reads", ""),
+    ("value-fits", ROBOT + "  activities:\n    go: {start: {m: 7}}\nstates: {a: {entry: {start: go}, on: {cycle: a}}}\n", 7, "not 7", ""),
     ("robot", ROBOT + "receives:\n  cycle: \nstates: {a: {on: {cycle: a}}}\n", 7, "`robot` declares the event 'cycle'", "another name"),
     ("robot", ROBOT + "states:\n  a:\n    on:\n      cycle: {emit: cycle}\n", 9, "fires 'cycle'", "another name"),
     ("robot", "plot: p\nrobot:\n  motors:\n    m: {type: number to 1, initial: 2}\nstates: {a: {on: {cycle: a}}}\n", 4, "'m' is a number to 1, not 2", ""),
