@@ -51,6 +51,7 @@ WHY = {
     "py-trees": ("behaviour trees as skills", "imported by `dsc.components.behaviour_trees`"),
     "eclipse-zenoh": ("robots in several processes", "imported by `dsc.wire.zenoh_transport`"),
     "mujoco": ("robots that plots drive in cycles", "imported by `domains.robots_in_cycles.rover`"),
+    "pillow": ("films of these robots", "imported by `domains.robots_in_cycles.film`"),
     "pygls": ("the language server `dsc lsp`", "imported by `dsc.editing.server`"),
     "starlette": ("the page's requests", "imported where a page is served"),
     "uvicorn": ("the page's server", "imported where a page is served"),

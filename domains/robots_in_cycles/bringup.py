@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from domains.robots_in_cycles.drives import HOME, Drive, avoid, follow
+from domains.robots_in_cycles.drives import CYCLE, HOME, Course, LineCourse, RoomCourse
+from domains.robots_in_cycles.film import Film
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.outcomes import Outcome
 from dsc.sequencer.run_end import RunEnd
 from dsc.skills import skill
 from dsc.text.plot_files import load_plot
+from knowledge_base.errors import InputError
 from knowledge_base.store import KnowledgeBase
 from planning.robot.bundles import Bundle
 from planning.robot.simulation import Left, Setup, Simulation
@@ -21,30 +24,47 @@ class Driven(Outcome):
     """The end of a drive."""
 
 
+class CannotDrive(Outcome):
+    """There is no drive: something is missing on this machine, the film cannot be made, or the plot has a mistake."""
+
+    reason: str
+
+
 class Rovers(Component):
-    """The component of both robots; a skill simulates a whole drive, then waits for its time."""
+    """The component of both robots, which simulates a drive cycle by cycle."""
 
     name = "rover"
 
     def __init__(self, seed: int) -> None:
         super().__init__()
         self._seed = seed
-        self.drive: Drive | None = None
+        self.course: Course | None = None
 
     @skill
-    async def follow_line(self, call: SkillCall, seconds: float, track: int) -> Driven:
-        """Follow the line of a track."""
-        self.drive = follow(track, self._seed, seconds)
-        return await self._wait(call, seconds)
+    async def follow_line(self, call: SkillCall, seconds: float, track: int, film: str) -> Driven | CannotDrive:
+        """Follow the line of a track; `film` is the file of a film, or empty."""
+        return await self._drive(call, seconds, film, lambda: LineCourse(track, self._seed))
 
     @skill
-    async def avoid_obstacles(self, call: SkillCall, seconds: float) -> Driven:
-        """Drive through the room whose pillars follow from the seed."""
-        self.drive = avoid(self._seed, seconds)
-        return await self._wait(call, seconds)
+    async def avoid_obstacles(self, call: SkillCall, seconds: float, film: str) -> Driven | CannotDrive:
+        """Drive through the room whose pillars follow from the seed; `film` is the file of a film, or empty."""
+        return await self._drive(call, seconds, film, lambda: RoomCourse(self._seed))
 
-    async def _wait(self, call: SkillCall, seconds: float) -> Driven:
-        await call.clock.sleep(seconds)
+    async def _drive(
+        self, call: SkillCall, seconds: float, film: str, start: Callable[[], Course]
+    ) -> Driven | CannotDrive:
+        try:
+            shown = Film(Path(film), seconds) if film else None
+            self.course = start()
+            while self.course.rover.seconds < seconds:
+                self.course.advance()
+                if shown is not None:
+                    shown.watch(self.course)
+                await call.clock.sleep(CYCLE)
+            if shown is not None:
+                shown.save()
+        except InputError as error:
+            return CannotDrive(reason=str(error))
         return Driven()
 
 
@@ -61,17 +81,19 @@ class Tracks(Simulation):
 
     def left(self) -> Sequence[Left] | None:
         """Return the contacts; `None` before a drive."""
-        drive = self._rover.drive
-        if drive is None:
+        course = self._rover.course
+        if course is None:
             return None
+        drive = course.drive
         return [Left("a drive without contact", reason=f"{drive.contacts} contacts")] if drive.contacts else []
 
     def own_report(self, knowledge: KnowledgeBase, end: RunEnd) -> Mapping[str, Any]:
         """Return laps, mean distance from the line, contacts, and the length of the path."""
         del knowledge, end
-        drive = self._rover.drive
-        if drive is None:
+        course = self._rover.course
+        if course is None:
             return {}
+        drive = course.drive
         values = {"laps": drive.laps, "distance_m": drive.distance, "contacts": drive.contacts, "metres": drive.metres}
         return {name: round(value, 4) for name, value in values.items()}
 
@@ -85,7 +107,8 @@ class Tracks(Simulation):
 
 
 def _bundle(name: str, plot: str, about: str) -> Bundle:
-    return Bundle(name, plots=(load_plot(HOME / f"{plot}.yaml"),), about=about, main=plot, simulation=Tracks)
+    plots, failures = (load_plot(HOME / f"{plot}.yaml"),), ("did_not_drive",)
+    return Bundle(name, plots=plots, about=about, main=plot, simulation=Tracks, failures=failures)
 
 
 def line_follower() -> Bundle:

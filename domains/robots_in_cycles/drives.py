@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import random
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -52,32 +53,117 @@ class Drive:
         return sum(math.dist(one, other) for one, other in zip(self.path, self.path[1:], strict=False))
 
 
-def plot_of(name: str) -> Step:
-    """Return the cycle of a new controller with the plot of that name."""
-    return CycleController(load_plot(HOME / "plots" / f"{name}.yaml")).step
+class Course(ABC):
+    """A drive in progress.
+
+    Args:
+        rover: the robot at the start.
+        chance: the noise of the sensors.
+        plot: the name of the plot that is its controller.
+        step: another controller instead of the plot.
+
+    Attributes:
+        rover: the robot.
+    """
+
+    def __init__(self, rover: Rover, chance: random.Random, plot: str, step: Step | None) -> None:
+        self.rover, self._chance = rover, chance
+        self._chart, self._other = controller_of(plot), step
+        self._path = [rover.position]
+
+    def advance(self) -> None:
+        """Execute one cycle: sensors, controller, motors."""
+        step: Step = self._other or self._chart.step
+        motors = step(self._sensors(), self.rover.seconds)
+        self.rover.drive(motors["left_wheel"], motors["right_wheel"], CYCLE)
+        self._path.append(self.rover.position)
+
+    @abstractmethod
+    def _sensors(self) -> dict[str, float]: ...
+
+    @property
+    def states(self) -> list[str]:
+        """The active states of the plot; none with another controller."""
+        return [] if self._other else self._chart.active
+
+    @property
+    def drive(self) -> Drive:
+        """The drive so far."""
+        return Drive(tuple(self._path), contacts=self.rover.contacts)
 
 
-def follow(track: int, seed: int, seconds: float, step: Step | None = None) -> Drive:
-    """Return the drive of the line follower; the seed gives the heading at the start, and the noise.
+class LineCourse(Course):
+    """The line follower on a track; the seed gives the heading at the start, and the noise.
 
     Args:
         track: a position in `TRACKS`.
         seed: the seed.
-        seconds: the time of the drive.
         step: another controller instead of the plot.
     """
-    line, fine = line_of(track), line_of(track, 4000)
-    chance, step = random.Random(seed), step or plot_of("follow_line")  # noqa: S311  heading and noise
-    rover = Rover(_segments(line), float(line[0][0]) - 0.005, -0.06, 90 + chance.uniform(-8, 8))
-    path, off = [rover.position], []
-    while rover.seconds < seconds:
-        values = {name: _light(rover, aside, chance) for name, aside in (("left", 0.012), ("right", -0.012))}
-        motors = step(values, rover.seconds)
-        rover.drive(motors["left_wheel"], motors["right_wheel"], CYCLE)
-        path.append(rover.position)
-        off.append(float(np.min(np.linalg.norm(fine - rover.point(0.06), axis=1))))
-    turned = np.unwrap([math.atan2(y, x) for x, y in path])
-    return Drive(tuple(path), float(turned[-1] - turned[0]) / (2 * math.pi), sum(off) / len(off), rover.contacts)
+
+    def __init__(self, track: int, seed: int, step: Step | None = None) -> None:
+        line, chance = line_of(track), random.Random(seed)  # noqa: S311  heading and noise
+        rover = Rover(_segments(line), float(line[0][0]) - 0.005, -0.06, 90 + chance.uniform(-8, 8))
+        super().__init__(rover, chance, "follow_line", step)
+        self._line, self._off = line_of(track, 4000), list[float]()
+
+    def advance(self) -> None:
+        """Execute one cycle, and measure the distance from the line."""
+        super().advance()
+        self._off.append(float(np.min(np.linalg.norm(self._line - self.rover.point(0.06), axis=1))))
+
+    def _sensors(self) -> dict[str, float]:
+        return {"left": self._light(0.012), "right": self._light(-0.012)}
+
+    def _light(self, aside: float) -> float:
+        dark = self.rover.below(0.06, aside).startswith("line")
+        return min(1023.0, max(0.0, (300.0 if dark else 990.0) + self._chance.gauss(0, 8)))
+
+    @property
+    def drive(self) -> Drive:
+        """The drive so far."""
+        turned = np.unwrap([math.atan2(y, x) for x, y in self._path])
+        laps = float(turned[-1] - turned[0]) / (2 * math.pi)
+        return replace(super().drive, laps=laps, distance=sum(self._off) / max(len(self._off), 1))
+
+
+class RoomCourse(Course):
+    """The obstacle avoider in a room whose pillars follow from its number.
+
+    Args:
+        room: the seed of the pillars and of the noise.
+        step: another controller instead of the plot.
+    """
+
+    def __init__(self, room: int, step: Step | None = None) -> None:
+        chance = random.Random(room)  # noqa: S311  noise
+        rover = Rover(_room(pillars_of(room)), 0.0, 0.0, chance.uniform(0, 360))
+        super().__init__(rover, chance, "avoid_obstacles", step)
+
+    def _sensors(self) -> dict[str, float]:
+        seen = {name: self.rover.distance(angle, 2.0) for name, angle in DIRECTIONS.items()}
+        return {name: min(2.0, max(0.0, far + self._chance.gauss(0, 0.003))) for name, far in seen.items()}
+
+
+def controller_of(name: str) -> CycleController:
+    """Return a new controller with the plot of that name."""
+    return CycleController(load_plot(HOME / "plots" / f"{name}.yaml"))
+
+
+def follow(track: int, seed: int, seconds: float, step: Step | None = None) -> Drive:
+    """Return the drive of the line follower during a time; see `LineCourse`."""
+    return _complete(LineCourse(track, seed, step), seconds)
+
+
+def avoid(room: int, seconds: float, step: Step | None = None) -> Drive:
+    """Return the drive of the obstacle avoider during a time; see `RoomCourse`."""
+    return _complete(RoomCourse(room, step), seconds)
+
+
+def _complete(course: Course, seconds: float) -> Drive:
+    while course.rover.seconds < seconds:
+        course.advance()
+    return course.drive
 
 
 def line_of(track: int, points: int = 240) -> NDArray[np.float64]:
@@ -98,31 +184,6 @@ def _segments(line: NDArray[np.float64]) -> str:
             f'contype="0" conaffinity="0" rgba="0 0 0 1"/>'
         )
     return "".join(made)
-
-
-def _light(rover: Rover, aside: float, chance: random.Random) -> float:
-    dark = rover.below(0.06, aside).startswith("line")
-    return min(1023.0, max(0.0, (300.0 if dark else 990.0) + chance.gauss(0, 8)))
-
-
-def avoid(room: int, seconds: float, step: Step | None = None) -> Drive:
-    """Return the drive of the obstacle avoider in a room whose pillars follow from its number.
-
-    Args:
-        room: the seed of the pillars and of the noise.
-        seconds: the time of the drive.
-        step: another controller instead of the plot.
-    """
-    chance, step = random.Random(room), step or plot_of("avoid_obstacles")  # noqa: S311  pillars and noise
-    rover = Rover(_room(pillars_of(room)), 0.0, 0.0, chance.uniform(0, 360))
-    path = [rover.position]
-    while rover.seconds < seconds:
-        seen = {name: rover.distance(angle, 2.0) for name, angle in DIRECTIONS.items()}
-        values = {name: min(2.0, max(0.0, far + chance.gauss(0, 0.003))) for name, far in seen.items()}
-        motors = step(values, rover.seconds)
-        rover.drive(motors["left_wheel"], motors["right_wheel"], CYCLE)
-        path.append(rover.position)
-    return Drive(tuple(path), contacts=rover.contacts)
 
 
 def pillars_of(room: int) -> list[tuple[float, float]]:

@@ -6,6 +6,8 @@ No other module imports mujoco.
 from __future__ import annotations
 
 import math
+import os
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +17,13 @@ from knowledge_base.errors import InputError
 RADIUS = 0.07
 """Radius of the robot in metres."""
 _STEP = 0.004
+_PICTURE = 240, 320
+"""Rows and columns of a picture."""
 _BODY = """
 <body name="rover" pos="{x} {y} 0.03" euler="0 0 {heading}">
   <freejoint/>
-  <geom name="hull" type="cylinder" size="{radius} 0.015" pos="0 0 0.015" mass="0.6"/>
+  <geom name="hull" type="cylinder" size="{radius} 0.015" pos="0 0 0.015" mass="0.6" rgba="0.85 0.35 0.15 1"/>
+  <geom type="box" size="0.02 0.006 0.002" pos="0.045 0 0.031" mass="0" contype="0" conaffinity="0" rgba="1 1 1 1"/>
   <geom type="sphere" size="0.01" pos="0.055 0 -0.02" condim="1" priority="1" mass="0.02"/>
   <geom type="sphere" size="0.01" pos="-0.055 0 -0.02" condim="1" priority="1" mass="0.02"/>
   <body pos="0 0.055 0">
@@ -34,7 +39,11 @@ _BODY = """
 _WORLD = """
 <mujoco>
   <option timestep="{step}" integrator="implicitfast"/>
-  <worldbody><geom name="floor" type="plane" size="5 5 0.1"/>{scenery}{body}</worldbody>
+  <visual><headlight ambient="0.5 0.5 0.5" diffuse="0.3 0.3 0.3"/></visual>
+  <worldbody>
+    <light pos="0 0 4" dir="0 0 -1" diffuse="0.4 0.4 0.4" castshadow="false"/>
+    <geom name="floor" type="plane" size="5 5 0.1" rgba="0.93 0.93 0.9 1"/>{scenery}{body}
+  </worldbody>
   <actuator><velocity joint="left" kv="0.05"/><velocity joint="right" kv="0.05"/></actuator>
 </mujoco>
 """
@@ -55,9 +64,11 @@ class Rover:
     def __init__(self, scenery: str, x: float, y: float, heading: float) -> None:
         try:
             import mujoco  # noqa: PLC0415  the extra may be missing
-        except ImportError:
+        except ModuleNotFoundError:
             remedy = "pip install 'dynamic-state-charts[physics]'"
             raise InputError(f"this robot needs MuJoCo, which is not installed: {remedy}") from None
+        except Exception as error:  # it loads the library of graphics that MUJOCO_GL names
+            raise _undrawable(error) from error
         self._engine = mujoco
         body = _BODY.format(x=x, y=y, heading=heading, radius=RADIUS)
         self._model = mujoco.MjModel.from_xml_string(_WORLD.format(step=_STEP, scenery=scenery, body=body))
@@ -65,8 +76,19 @@ class Rover:
         self._rover, self._hull = self._model.body("rover").id, self._model.geom("hull").id
         self._floor = self._model.geom("floor").id
         self._touches = False
+        self._camera: _Camera | None = None
         self.contacts = 0
         mujoco.mj_forward(self._model, self._data)
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Return what a camera above and behind the robot sees: rows, columns, and red, green and blue.
+
+        Raises:
+            InputError: MuJoCo cannot draw on this machine.
+        """
+        if self._camera is None:
+            self._camera = _Camera(self._engine, self._model, self._rover)
+        return self._camera.take(self._data)
 
     @property
     def position(self) -> tuple[float, float]:
@@ -120,3 +142,29 @@ class Rover:
         seen = np.array([1, 1, 1, 1, 0, 0], dtype=np.uint8)
         start, way = np.array(start, dtype=float), np.array(way, dtype=float)
         return float(self._engine.mj_ray(self._model, self._data, start, way, seen, 1, self._rover, hit))
+
+
+class _Camera:
+    """A camera that follows a body."""
+
+    def __init__(self, engine: Any, model: Any, body: int) -> None:
+        try:
+            self._renderer = engine.Renderer(model, *_PICTURE)
+        except Exception as error:  # each library of graphics has own classes
+            raise _undrawable(error) from error
+        self._camera, self._visible = engine.MjvCamera(), engine.MjvOption()
+        self._camera.type, self._camera.trackbodyid = engine.mjtCamera.mjCAMERA_TRACKING, body
+        self._camera.distance, self._camera.elevation, self._camera.azimuth = 1.3, -50, 90
+        self._visible.geomgroup[4] = 1  # the wheels, which rays pass
+
+    def take(self, data: Any) -> NDArray[np.uint8]:
+        """Return the picture of a moment."""
+        self._renderer.update_scene(data, self._camera, self._visible)
+        picture: NDArray[np.uint8] = self._renderer.render()
+        return picture
+
+
+def _undrawable(error: Exception) -> InputError:
+    library = os.environ.get("MUJOCO_GL", "not set")
+    remedy = "set it to `egl` or `osmesa`, or with a display to `glfw`, and install that library"
+    return InputError(f"MuJoCo cannot draw on this machine: {error}; MUJOCO_GL is {library}: {remedy}")

@@ -57,7 +57,11 @@ class RunEnd(Generic[Outputs]):
         for event in reversed(self.emitted):
             if event.name in {NO_PLAN, GAVE_UP}:
                 return f"{event.name}: {event.attributes.get('reason', 'no reason')}"
-        return f"the plot ended with '{self.emitted[-1].name}'" if self.emitted else "the plot reached its end"
+        if not self.emitted:
+            return "the plot reached its end"
+        last = self.emitted[-1]
+        said, reason = f"the plot ended with '{last.name}'", last.attributes.get("reason")
+        return f"{said}: {reason}" if reason else said
 
     @property
     def reached(self) -> bool:

@@ -95,8 +95,10 @@ class Report:
         ):
             if counts:
                 lines.append(f"  {title}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
-        if self.outputs:
-            lines.append("  outputs: " + ", ".join(f"{name} {dumps(one)}" for name, one in self.outputs.items()))
+        own = {} if self.judge == "world" else self.own  # a world that judges has a headline of its own
+        for title, values in (("outputs", self.outputs), (self.robot, own)):
+            if values:
+                lines.append(f"  {title}: " + ", ".join(f"{name} {dumps(one)}" for name, one in values.items()))
         if self.faults and not self.skill_failures:
             lines.append(f"  {len(self.faults)} faults were drawn, and no skill reported a failure")
         return lines

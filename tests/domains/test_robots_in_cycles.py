@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import shutil
 import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install 'dynamic-state-charts[physics]'")
 
+import numpy as np
+from PIL import Image, ImageSequence
+
 from domains.robots_in_cycles import avoid, follow, line_follower, obstacle_avoider
-from domains.robots_in_cycles.drives import HOME, TRACKS, plot_of
+from domains.robots_in_cycles.drives import HOME, TRACKS, RoomCourse, controller_of
+from domains.robots_in_cycles.film import Film
 from domains.robots_in_cycles.picture import draw_avoid, draw_follow
 from dsc import load_plot
 from dsc.controllers import build_controller
 from knowledge_base import InputError
 from planning import deploy
 
-CC = shutil.which("cc")
+CC, ROOT = shutil.which("cc"), Path(__file__).parents[2]
 
 
 def generated(name):
@@ -97,7 +104,7 @@ def test_the_generated_c_controllers_drive_the_same_path(track, tmp_path):
 
 def test_another_speed_drives_another_path():
     """The comparison of paths sees a difference of one part in a million."""
-    drive = plot_of("follow_line")
+    drive = controller_of("follow_line").step
     assert (
         follow(1, 0, 10).path
         != follow(1, 0, 10, lambda *given: {k: v * (1 + 1e-6) for k, v in drive(*given).items()}).path
@@ -133,3 +140,43 @@ def test_the_pictures_of_the_page():
         ("obstacle_avoider", draw_avoid(avoid(3, 120), 3)),
     ):
         assert svg.count("<") == (pictures / f"{name}.svg").read_text("utf-8").count("<")
+
+
+def test_a_film_of_a_drive(tmp_path):
+    words = ("run", "obstacle-avoider", "--with", "seconds=2", "--with", "film=drive.webp")
+    run = subprocess.run(
+        [sys.executable, "-c", "from planning.cli.command import main; main()", *words],
+        cwd=tmp_path, env={**os.environ, "MUJOCO_GL": "egl", "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+        timeout=120, check=False,
+    )  # fmt: skip
+    if "cannot draw on this machine" in run.stdout:
+        pytest.skip(run.stdout)
+    assert run.returncode == 0, run.stdout + run.stderr
+    with Image.open(tmp_path / "drive.webp") as film:
+        frames = [one.convert("RGB").tobytes() for one in ImageSequence.Iterator(film)]
+        assert (film.size, len(frames), len(set(frames))) == ((320, 240), 32, 32)
+
+
+@pytest.mark.parametrize(
+    ("film", "said"),
+    [
+        ("drive.mp4", "a film is a file with one of the suffixes .webp, .gif, .png, but was 'drive.mp4'"),
+        ("missing/drive.gif", "the folder of the film 'missing/drive.gif' does not exist: create it, or"),
+    ],
+)
+@pytest.mark.parametrize("bundle", [line_follower, obstacle_avoider])
+def test_refused_films(bundle, film, said):
+    with deploy(bundle()) as robot:
+        end = robot.run(bundle().main, {"film": film})
+    assert not end
+    assert end.reason.startswith(f"the plot ended with 'did_not_drive': {said}")
+
+
+def test_the_frames_of_a_long_film(monkeypatch):
+    """A film has at most 600 frames."""
+    film = Film(HOME / "drive.gif", 3600)
+    course = RoomCourse(0, lambda *_: {"left_wheel": 0, "right_wheel": 0})
+    monkeypatch.setattr(course.rover, "picture", lambda: np.zeros((240, 320, 3), np.uint8))
+    for _ in range(3 * 188):
+        film.watch(course)
+    assert len(film._frames) == 3

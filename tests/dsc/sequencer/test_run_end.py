@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dsc import Component, Library, Outcome, RunEnd, Sequencer, SkillCall, parse_plot, skill
+from dsc.events import Event
 from dsc.sequencer.clock import LoopClock, run_simulated
 from knowledge_base import KnowledgeBase, Schema
 
@@ -61,3 +62,9 @@ def test_an_end_is_reached_or_names_the_reason(case: str) -> None:
 def test_the_failure_of_an_end_is_its_last_outcome() -> None:
     end = end_of(PLOTS["a failure"])
     assert (end.finished, end.failure, end.reason) == (True, "stuck", "the plot ended with 'stuck'")
+
+
+def test_the_reason_of_an_outcome() -> None:
+    said = Event("stuck", {"reason": "a wheel is blocked"})
+    assert RunEnd(finished=True, emitted=(said,)).reason == "the plot ended with 'stuck': a wheel is blocked"
+    assert RunEnd(finished=True, emitted=(Event("stuck", {"reason": ""}),)).reason == "the plot ended with 'stuck'"
