@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dsc.trees.blackboard import Board
 from dsc.trees.kinds import INTEGER, KEY, KINDS, SCRIPT, STATUS
 from dsc.trees.model import Node, TreeFile
-from dsc.trees.running import branches, decorators, leaves, parallels, sequences, timers
+from dsc.trees.running import branches, decorators, leaves, navigation, parallels, sequences, timers
 from dsc.trees.running.node import Run, RunningNode
 from dsc.trees.running.ports import key_of
 from knowledge_base.errors import InputError
@@ -43,6 +43,10 @@ _CLASSES: Mapping[str, type[RunningNode]] = {
     "Delay": timers.Delay,
     "Timeout": timers.Timeout,
     "Sleep": timers.Sleep,
+    "RecoveryNode": navigation.RecoveryNode,
+    "PipelineSequence": navigation.PipelineSequence,
+    "RoundRobin": navigation.RoundRobin,
+    "RateController": navigation.RateController,
     "AlwaysSuccess": leaves.Constant,
     "AlwaysFailure": leaves.Constant,
     "Script": leaves.ScriptNode,

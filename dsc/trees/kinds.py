@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from dsc.trees.model import Port, Role
 
-INTEGER, BOOLEAN, TEXT, SCRIPT, STATUS, KEY = "int", "bool", "text", "script", "status", "key"
+INTEGER, NUMBER, BOOLEAN, TEXT, SCRIPT, STATUS, KEY = "int", "double", "bool", "text", "script", "status", "key"
 """Types of the ports of supported kinds; a port of type `script` or `status` contains no key of the blackboard."""
 
 
@@ -38,6 +38,13 @@ def _switch(cases: int) -> Kind:
     return _control(*ports, least=cases + 1, most=cases + 1)
 
 
+OF_NAV2: Mapping[str, Kind] = {
+    "RecoveryNode": _control(("number_of_retries", INTEGER, "1"), least=2, most=2),
+    "PipelineSequence": _control(),
+    "RoundRobin": _control(("wrap_around", BOOLEAN, "false")),
+    "RateController": _decorator(("hz", NUMBER, "10.0")),
+}
+"""The kinds of Nav2 that are supported, by name."""
 KINDS: Mapping[str, Kind] = {
     **{
         name: _control()
@@ -71,6 +78,7 @@ KINDS: Mapping[str, Kind] = {
     "SetBlackboard": Kind("action", _ports(("value", TEXT, None), ("output_key", KEY, None))),
     "UnsetBlackboard": Kind("action", _ports(("key", KEY, None))),
     "ScriptCondition": Kind("condition", _ports(("code", SCRIPT, None))),
+    **OF_NAV2,
 }
 """The supported kinds by name."""
 SCRIPTS = ("_failureIf", "_successIf", "_skipIf", "_while", "_onSuccess", "_onFailure", "_onHalted", "_post")
@@ -91,5 +99,13 @@ NO_COUNTERPART: Mapping[str, str] = {
     "BlackboardCheckString": "write Precondition with a comparison",
     "BlackboardCheckBool": "write Precondition with a comparison",
     "FallbackStar": "write Fallback",
+    "NonblockingSequence": "write Parallel",
+    "PersistentSequence": "write Switch on an entry of the blackboard, and count it in a Script",
+    "PauseResumeController": "write WhileDoElse with a condition that tells whether the robot is paused",
+    "GoalUpdater": "write an action that updates the goal, in a Sequence before the child",
+    "GoalUpdatedController": "write Fallback with a condition that the goal is unchanged, before the child",
+    "DistanceController": "write Fallback with a condition that the robot has not yet driven so far, before the child",
+    "SpeedController": "write Fallback with a condition that the child is not yet due, before the child",
+    "PathLongerOnApproach": "write Sequence with a condition that the path is longer, before the child",
 }
-"""Remedies for the kinds of BehaviorTree.CPP that have no counterpart here."""
+"""Remedies for the kinds of BehaviorTree.CPP and of Nav2 that have no counterpart here."""

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from hypothesis import strategies as st
 
 from dsc.trees import Node, NodeModel, Port, Tree, TreeFile
-from dsc.trees.kinds import BOOLEAN, INTEGER, KEY, KINDS, SCRIPT, SCRIPTS, STATUS
+from dsc.trees.kinds import BOOLEAN, INTEGER, KEY, KINDS, NUMBER, SCRIPT, SCRIPTS, STATUS
 
 NAMES = st.sampled_from(["cup", "hall", "über", "a b", 'quo"te', "<&>", "line\nend", "tab\t", "'one'"])
 KEYS = st.sampled_from(["{item}", "{=}", "{@all}", "{place}"])
@@ -22,6 +22,7 @@ CODE = st.sampled_from(
 )
 TEXTS = {
     INTEGER: st.one_of(st.integers(-9, 99).map(str), KEYS),
+    NUMBER: st.one_of(st.floats(-9, 99).map(str), KEYS),
     BOOLEAN: st.one_of(st.sampled_from(["true", "false", "0", "1"]), KEYS),
     SCRIPT: CODE,
     STATUS: st.sampled_from(["SUCCESS", "FAILURE", "SKIPPED", "RUNNING"]),

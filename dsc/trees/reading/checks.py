@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
-from dsc.trees.kinds import BOOLEAN, INTEGER, KINDS, SCRIPT, STATUS, Kind
+from dsc.trees.kinds import BOOLEAN, INTEGER, KINDS, NUMBER, SCRIPT, STATUS, Kind
 from dsc.trees.model import Node, Port, TreeFile
 from dsc.trees.running.ports import TRUTH, key_of
 from dsc.trees.script import parse_script
@@ -91,6 +92,9 @@ def _check_text(node: Node, port: Port, text: str) -> None:
     elif port.type == INTEGER and not _is_integer(text):
         message = f"{node.element}: the port '{port.name}' is an integer or a {{key}}, not '{text}'"
         raise InputError(message, place=node.place, found=text)
+    elif port.type == NUMBER and not _is_number(text):
+        message = f"{node.element}: the port '{port.name}' is a number or a {{key}}, not '{text}'"
+        raise InputError(message, place=node.place, found=text)
     elif port.type == BOOLEAN and text not in TRUTH:
         message = f"{node.element}: the port '{port.name}' is true, false or a {{key}}, not '{text}'"
         raise InputError(message, place=node.place, found=text)
@@ -98,6 +102,13 @@ def _check_text(node: Node, port: Port, text: str) -> None:
 
 def _is_integer(text: str) -> bool:
     return text.removeprefix("-").isdecimal() and text.isascii()
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def _check_script(node: Node, attribute: str, text: str) -> None:

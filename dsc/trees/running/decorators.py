@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dsc.trees.evaluation import evaluate_script, is_true
 from dsc.trees.running.node import COMPLETE, Decorator, Status, at_node, reset
-from dsc.trees.running.ports import boolean_of, integer_port, read_port, text_of_port
+from dsc.trees.running.ports import integer_port, text_of_port, truth_port
 from dsc.trees.script import parse_script
-from knowledge_base.errors import InputError
-from knowledge_base.language.checking.inputs import shown
 
 FOREVER = -1
 """The number of cycles or attempts without end."""
@@ -120,21 +118,13 @@ class RunOnce(Decorator):
     def tick(self) -> Status:
         """Tick the child until its first end."""
         if self.end is not None:
-            return Status.SKIPPED if self._skips() else self.end
+            return Status.SKIPPED if truth_port(self.node, "then_skip", self.board) else self.end
         self.status = Status.RUNNING
         status = self.child.execute()
         if status in COMPLETE:
             self.end = status
             reset(self.child)
         return status
-
-    def _skips(self) -> bool:
-        value = read_port(self.node, "then_skip", text_of_port(self.node, "then_skip") or "", self.board)
-        truth = boolean_of(value)
-        if truth is None:
-            message = f"{self.node.element}: the port 'then_skip' is true or false, not {shown(value)}"
-            raise InputError(message, place=self.node.place)
-        return truth
 
 
 class Precondition(Decorator):

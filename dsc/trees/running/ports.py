@@ -45,17 +45,53 @@ def integer_port(node: Node, port: str, board: Board) -> int:
     Raises:
         InputError: the port is missing, or has no integer.
     """
+    number = _number(_value(node, port, board))
+    if number is None or not number.is_integer():
+        raise _of_another_type(node, port, board, "an integer")
+    return int(number)
+
+
+def number_port(node: Node, port: str, board: Board) -> float:
+    """Return the number of a port of a supported kind.
+
+    Raises:
+        InputError: the port is missing, or has no number.
+    """
+    number = _number(_value(node, port, board))
+    if number is None:
+        raise _of_another_type(node, port, board, "a number")
+    return number
+
+
+def truth_port(node: Node, port: str, board: Board) -> bool:
+    """Return the truth value of a port of a supported kind.
+
+    Raises:
+        InputError: the port is missing, or has no truth value.
+    """
+    truth = boolean_of(_value(node, port, board))
+    if truth is None:
+        raise _of_another_type(node, port, board, "true or false")
+    return truth
+
+
+def _value(node: Node, port: str, board: Board) -> object:
     text = text_of_port(node, port)
     if text is None:
         raise InputError(f"{node.element} needs the port '{port}'", place=node.place)
-    value = read_port(node, port, text, board)
+    return read_port(node, port, text, board)
+
+
+def _of_another_type(node: Node, port: str, board: Board, wanted: str) -> InputError:
+    message = f"{node.element}: the port '{port}' is {wanted}, not {shown(_value(node, port, board))}"
+    return InputError(message, place=node.place)
+
+
+def _number(value: object) -> float | None:
     try:
-        number = float(value) if isinstance(value, int | float | str) else None
+        return float(value) if isinstance(value, int | float | str) else None
     except ValueError:
-        number = None
-    if number is None or not number.is_integer():
-        raise InputError(f"{node.element}: the port '{port}' is an integer, not {shown(value)}", place=node.place)
-    return int(number)
+        return None
 
 
 TRUTH = {"0": False, "1": True} | {

@@ -80,15 +80,14 @@ def test_all_kinds_without_a_counterpart_are_reported(tmp_path):
     file.write_text(
         """<root main_tree_to_execute="Main"><BehaviorTree ID="Main">
 <RecoveryNode number_of_retries="6">
-<PipelineSequence>
-<RateController hz="1.0"><ComputePathToPose goal="{goal}" path="{path}"/></RateController>
-<FollowPath path="{path}"/>
-</PipelineSequence>
-<ReactiveFallback><GoalUpdated/><Wait wait_duration="5"/></ReactiveFallback>
+<DistanceController distance="0.5"><ComputePathToPose goal="{goal}" path="{path}"/></DistanceController>
+<SpeedController>
+<GoalUpdater input_goal="{goal}" output_goal="{goal}"><FollowPath path="{path}"/></GoalUpdater>
+</SpeedController>
 </RecoveryNode>
 </BehaviorTree></root>""",
         "utf-8",
     )
     found = json.loads(dsc("check", file, "--json").stdout)
     lines = [(one["line"], one["found"]) for one in found]
-    assert lines == [(2, "RecoveryNode"), (3, "PipelineSequence"), (4, "RateController")]
+    assert lines == [(3, "DistanceController"), (4, "SpeedController"), (5, "GoalUpdater")]
