@@ -131,6 +131,8 @@ class _Writer:
         yield f"    timed_out = {one.timed_out}"
         kinds = (f'"{name}": {_TYPES[kind]}' for name, kind in one.attributes.items())
         yield f"    attributes = {{{', '.join(kinds)}}}"
+        defaults = (f'"{self.data[name]}": {each.default is not None}' for name, each in one.parameters.items())
+        yield f"    parameters = {{{', '.join(defaults)}}}"
         yield f"    scxml = {one.scxml}"
         yield f"    queue_capacity = {self.queue}"
 

@@ -14,6 +14,7 @@ from dsc.controllers.runtime.tables import (
     AT_LEAST,
     EVERY,
     MAX_EVENTS,
+    MAX_NOW,
     NO_DATA,
     WITHIN,
     Host,
@@ -21,6 +22,8 @@ from dsc.controllers.runtime.tables import (
     Status,
 )
 from dsc.controllers.runtime.values import INT64_MAX, INT64_MIN, OVERFLOW, Failure
+
+_WORDS = {int: "an integer", float: "a number", bool: "true or false"}
 
 
 class Interpreter(Microsteps):
@@ -31,9 +34,18 @@ class Interpreter(Microsteps):
         raise NotImplementedError
 
     def init(self, host: Host, now_ns: int = 0, **parameters: Any) -> Status:
-        """Enter the initial states; the status has `FAILED` if a parameter or an initial value does not fit."""
+        """Enter the initial states; the status has `FAILED` if a parameter or an initial value does not fit.
+
+        Raise `ValueError` for a parameter that is unknown, or that is missing and has no default.
+        """
+        self._check_now(now_ns)
+        for name in (*parameters, *self.parameters):
+            if name not in self.parameters:
+                raise ValueError(f"there is no parameter {name!r}; the parameters are {[*self.parameters]}")
+            if name not in parameters and not self.parameters[name]:
+                raise ValueError(f"the parameter {name!r} has no default: pass it to `init`")
         self.reset()
-        self.host, self.clock = host, now_ns
+        self.host, self.clock, self.begun = host, now_ns, True
         failure = self.fill(**parameters)
         if failure is not None:
             self.ended = True
@@ -54,6 +66,8 @@ class Interpreter(Microsteps):
 
     def step(self, now_ns: int) -> Status:
         """Handle the timers due until `now_ns`, in order, then the queued events."""
+        self._require_init()
+        self._check_now(now_ns)
         self.status = Status.OK
         for _ in range(MAX_EVENTS):
             if self.ended:
@@ -75,6 +89,9 @@ class Interpreter(Microsteps):
         return [index for index, node in enumerate(self.nodes) if self.active[index] and node.state]
 
     def _queue(self, event: int, run: int, data: Mapping[str, Any]) -> Status:
+        self._require_init()
+        if not isinstance(event, int):
+            raise ValueError(f"an event is one of `Events`, not {event!r}")
         data = self._convert(data)
         if self.ended or not self.first_event <= event < len(self.event_names) or not all(map(isfinite, data.values())):
             return Status.UNKNOWN
@@ -84,13 +101,21 @@ class Interpreter(Microsteps):
         self.queue.append(Occurrence(event, data, run=run))
         return Status.OK
 
+    def _require_init(self) -> None:
+        if not self.begun:
+            raise ValueError("call `init` before `step`, `post`, `end` and `cycle`")
+
+    def _check_now(self, now_ns: int) -> None:
+        if type(now_ns) is not int or abs(now_ns) > MAX_NOW:
+            raise ValueError(f"the time is an integer of nanoseconds from -2**62 to 2**62, not {now_ns!r}")
+
     def _convert(self, data: Mapping[str, Any]) -> Mapping[str, Any]:
         for name, value in data.items():
-            wanted = self.attributes.get(name)
-            if wanted is None or (isinstance(value, bool) is not (wanted is bool)) or isinstance(value, str):
-                raise ValueError(f"'{name}' cannot be {value!r}; the attributes are {self.attributes}")
-            if wanted is int and not isinstance(value, int):
-                raise ValueError(f"'{name}' is an integer, not {value!r}")
+            if name not in self.attributes:
+                raise ValueError(f"there is no attribute {name!r}; the attributes are {[*self.attributes]}")
+            wanted: Any = self.attributes[name]
+            if type(value) is not wanted and not (wanted is float and type(value) is int):
+                raise ValueError(f"{name!r} is {_WORDS[wanted]}, not {value!r}")
             if wanted is int and not INT64_MIN <= value <= INT64_MAX:
                 raise ValueError(f"'{name}' has more than 64 bits: {value}")
         return {name: self.attributes[name](value) for name, value in data.items()}

@@ -35,6 +35,7 @@ class ControllerState:
     error_events: ClassVar[frozenset[int]]
     timed_out: ClassVar[int]
     attributes: ClassVar[Mapping[str, type]]
+    parameters: ClassVar[Mapping[str, bool]]
     scxml: ClassVar[bool]
     queue_capacity: ClassVar[int] = 16
     internal_capacity: ClassVar[int] = 64
@@ -59,7 +60,7 @@ class ControllerState:
         self.kept: list[Occurrence] = []
         self.event: Mapping[str, Any] = NO_DATA
         self.turn = self.macrostep = self.microsteps = self.runs = self.armed = self.dropped = self.lost = 0
-        self.ended = self.finished = self.failed = self.cycled = False
+        self.begun = self.ended = self.finished = self.failed = self.cycled = False
 
     def _fire(self, occurrence: Occurrence) -> None:
         if len(self.internal) >= self.internal_capacity:

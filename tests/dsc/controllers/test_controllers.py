@@ -142,8 +142,26 @@ def test_parameters_out_of_range_and_events_of_the_controller():
     assert controller.post(names.Events.DONE) == names.Status.UNKNOWN
     with pytest.raises(ValueError, match="'by' is an integer"):
         controller.post(names.Events.ADD, {"by": 1.5})
-    with pytest.raises(TypeError, match="limit"):
-        names.Controller().init(Log())
+
+
+@pytest.mark.parametrize(
+    ("misuse", "said"),
+    [
+        (lambda new, _: new.init(Log()), "the parameter 'limit' has no default: pass it to `init`"),
+        (lambda new, _: new.init(Log(), limit=5, nix=3), r"there is no parameter 'nix'; .* \['step', 'limit'\]"),
+        (lambda new, _: new.init(Log(), 0.5, limit=5), "the time is an integer of nanoseconds"),
+        (lambda new, _: new.step(0), "call `init` before"),
+        (lambda new, _: new.post(3), "call `init` before"),
+        (lambda _, begun: begun.step(0.5), "the time is an integer of nanoseconds"),
+        (lambda _, begun: begun.post("add"), "an event is one of `Events`, not 'add'"),
+        (lambda _, begun: begun.post(3, {"bye": 1}), r"there is no attribute 'bye'; the attributes are .*'by'"),
+        (lambda _, begun: begun.post(3, {"by": "1"}), "'by' is an integer, not '1'"),
+    ],
+)
+def test_misuse_of_a_generated_controller(misuse, said):
+    begun, names, _, _ = counter()
+    with pytest.raises(ValueError, match=said):
+        misuse(names.Controller(), begun)
 
 
 def test_refused_forms_together_with_their_lines():

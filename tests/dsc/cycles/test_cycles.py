@@ -14,7 +14,7 @@ from dsc.drawing import draw
 from dsc.drawing.captions import action_text
 from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
-from dsc.errors import RunawayError
+from dsc.errors import PlotError, RunawayError
 from dsc.text.plot_files import parse_plot
 from dsc.text.profiles import parse_profile
 from dsc.validation import review_plot
@@ -423,3 +423,9 @@ def test_the_captions_of_activities():
     drawn = draw(plot(BLINKER))
     assert "activity blink start" in drawn
     assert "stop(blink)" in drawn
+
+
+def test_a_variable_that_an_entry_assigns():
+    text = "{plot: p, robot: {motors: {w: number}}, variables: {n: {type: number, initial: 0}}, states: {a: {entry: {assign: {n: 1}}}}}"
+    with pytest.raises(PlotError, match=r"assign only motors here; move the rest to a transition, e\.g\. under `do`"):
+        CycleController(parse_plot(text))
