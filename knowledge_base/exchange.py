@@ -22,7 +22,7 @@ from knowledge_base.language.checking.vocabulary import Signature
 from knowledge_base.language.syntax.expression import TypedVariable
 from knowledge_base.language.syntax.text import parse_condition, to_text
 from knowledge_base.pddl.files import read_text
-from knowledge_base.world.derived import Axiom
+from knowledge_base.world.axioms import Axiom
 from knowledge_base.world.overlay import check_delta
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.schema_compatibility import missing_constants, require_extension

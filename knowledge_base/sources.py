@@ -10,15 +10,17 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import count
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from knowledge_base.conditions.installed import Installed
 from knowledge_base.conditions.notification import Notifier
 from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.facts import Content, Fact, require_content
-from knowledge_base.world.graph import WorldGraph
 from knowledge_base.world.overlay import check_fluent
 from knowledge_base.world.state import WorldState
+
+if TYPE_CHECKING:
+    from knowledge_base.world.graph import WorldGraph
 
 
 class DataSource:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
+from typing import TYPE_CHECKING
 
 from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.exchange import to_json
@@ -18,11 +19,13 @@ from knowledge_base.notebook import svg_by
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.pddl.writer import problem_to_text
 from knowledge_base.questions import Binding, Prepared, Questions
-from knowledge_base.world.graph import Graph, WorldGraph
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.schema import Schema
 from knowledge_base.world.state import WorldState
+
+if TYPE_CHECKING:
+    from knowledge_base.world.graph import Graph, WorldGraph
 
 _TOGETHER = 100
 """Number of answers that a stream computes during one acquisition of the lock."""
@@ -63,6 +66,8 @@ class View:
         """
         with self._lock:
             if self._graph is None:
+                from knowledge_base.world.graph import WorldGraph  # noqa: PLC0415  loads networkx
+
                 self._graph = WorldGraph(self._state)
             return self._graph.view
 

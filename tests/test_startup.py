@@ -41,6 +41,19 @@ def test_importing_the_packages_loads_nothing_heavy():
     assert done.stdout.strip() == "[]"
 
 
+def test_a_run_without_the_libraries_of_graphs_and_terminals():
+    """Their 30,000 objects would be visited by each full garbage collection of the program."""
+    code = (
+        "import sys\nfrom dsc import parse_plot\nfrom planning import PlanningDomain, Robot\n"
+        "domain = PlanningDomain.parse('(define (domain d) (:predicates (p)) (:action a :parameters () :effect (p)))')\n"
+        "plot = parse_plot('{plot: a, implements: a, states: {s: {always: {to: e, tell: (p)}}, e: {final: true}}}')\n"
+        "with Robot(domain, [plot], [], clock='simulated') as robot: assert robot.achieve('(p)')\n"
+        "print([name for name in ('networkx', 'rich') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 @pytest.mark.parametrize("package", ["dsc", "dsc.testing", "planning", "knowledge_base", "domains.clean_up_table"])
 def test_every_public_name_can_be_imported(package):
     code = f"import {package} as p\nfor name in p.__all__: getattr(p, name)"

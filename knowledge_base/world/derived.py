@@ -1,15 +1,12 @@
-"""Derived predicates (PDDL 2.2 axioms): their definitions, and conditions with definitions in place of predicates."""
+"""Derived predicates (PDDL 2.2): conditions with definitions in place of predicates."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
 
-import networkx as nx
-
-from knowledge_base.errors import Place, SchemaError
-from knowledge_base.language.checking.check import check, check_arity, check_parameters
-from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature, Vocabulary
+from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature
 from knowledge_base.language.syntax.expression import (
     TRUE,
     And,
@@ -22,38 +19,11 @@ from knowledge_base.language.syntax.expression import (
     substitute,
 )
 from knowledge_base.language.syntax.identity_cache import IdentityCache
-from knowledge_base.language.syntax.rewriting import denied, inside, names_of, with_atoms
-from knowledge_base.pddl.domain_text import AxiomText
+from knowledge_base.language.syntax.rewriting import inside, with_atoms
+from knowledge_base.world.axioms import Axiom
 
-
-@dataclass(frozen=True, slots=True)
-class Axiom:
-    """Definition of a derived predicate (PDDL 2.2).
-
-    The predicate holds for the arguments for which the condition holds. Several axioms of one predicate are
-    alternatives.
-    """
-
-    predicate: str
-    parameters: tuple[TypedVariable, ...]
-    condition: Expression
-    place: Place | None = field(default=None, compare=False, repr=False)
-
-
-def checked_axiom(axiom: AxiomText, schema: Vocabulary) -> Axiom:
-    """Return the axiom of a parsed axiom, checked against the schema.
-
-    A parameter without a type receives the type that the predicate declares.
-    """
-    head = axiom.head
-    signature = schema.predicate(head.name, head.place)
-    check_arity(signature, len(head.parameters), head.place)
-    declared = zip(head.parameters, signature.parameters, strict=True)
-    parameters = tuple(own if own.types else replace(own, types=theirs.types) for own, theirs in declared)
-    variables = check_parameters(parameters, schema)
-    check(Atom(head.name, tuple(Variable(p.name) for p in parameters), place=head.place), schema, variables)
-    check(axiom.condition, schema, variables, objects=schema.constants)
-    return Axiom(head.name, parameters, axiom.condition, head.place)
+if TYPE_CHECKING:
+    from knowledge_base.world.dependencies import Dependencies
 
 
 class Definitions:
@@ -79,10 +49,15 @@ class Definitions:
             self.axioms.setdefault(axiom.predicate, []).append(axiom)
         self._predicates = predicates
         self._typed = typed
-        self._graph = self._dependencies()
-        self.circles = [circle for circle in _strata(self._graph) if _is_circle(circle, self._graph)]
+        self.circles = self._dependencies.circles if self.axioms else []
         self.recursive = frozenset[str]().union(*self.circles)
         self._expanded: IdentityCache[Expression, Expression] = IdentityCache(size=256)
+
+    @cached_property
+    def _dependencies(self) -> Dependencies:
+        from knowledge_base.world.dependencies import Dependencies  # noqa: PLC0415  loads networkx
+
+        return Dependencies(self.axioms)
 
     def expanded(self, e: Expression) -> Expression:
         """Return the condition with each non-recursive derived predicate replaced by its definition."""
@@ -93,7 +68,7 @@ class Definitions:
 
     def inputs(self, name: str) -> set[str]:
         """Return the names from which a derived predicate follows, and its own name."""
-        return {name, *nx.descendants(self._graph, name)}
+        return self._dependencies.inputs(name)
 
     def recursive_part(self, e: Expression) -> Atom | None:
         """Return the first recursive predicate in a condition, if any; definitions may contain it."""
@@ -118,36 +93,8 @@ class Definitions:
         condition = substitute(axiom.condition, terms)
         return And((*tests, condition)) if tests else condition
 
-    def _dependencies(self) -> nx.DiGraph[str]:
-        """Return the graph with an edge from each predicate to each of its inputs."""
-        graph: nx.DiGraph[str] = nx.DiGraph()
-        axioms = [axiom for those in self.axioms.values() for axiom in those]
-        for axiom in axioms:
-            graph.add_node(axiom.predicate)
-            graph.add_edges_from((axiom.predicate, name) for name in names_of(axiom.condition))
-        for axiom in axioms:
-            for atom in denied(axiom.condition, wanted=True):
-                if atom.predicate in graph and nx.has_path(graph, atom.predicate, axiom.predicate):
-                    raise SchemaError(
-                        f"the derived predicate '{axiom.predicate}' follows from its own negation, through"
-                        f" '{atom.predicate}'",
-                        place=atom.place or axiom.place,
-                    )
-        return graph
-
 
 def type_test(parameter: TypedVariable, term: Term) -> Expression:
     """Return the test that a term has the parameter's type; the types of values need no test."""
     types = [one for one in parameter.types or (ROOT_TYPE,) if one not in VALUE_TYPES]
     return Or(tuple(Atom(one, (term,)) for one in types)) if types else TRUE
-
-
-def _strata(graph: nx.DiGraph[str]) -> Iterator[frozenset[str]]:
-    """Yield the strongly connected sets of predicates, each after its inputs."""
-    components = nx.condensation(graph)
-    for number in reversed(list(nx.topological_sort(components))):
-        yield frozenset(components.nodes[number]["members"])
-
-
-def _is_circle(component: frozenset[str], graph: nx.DiGraph[str]) -> bool:
-    return len(component) > 1 or any(graph.has_edge(name, name) for name in component)

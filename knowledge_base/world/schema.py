@@ -15,8 +15,9 @@ from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, 
 from knowledge_base.language.syntax.expression import KEYWORDS, Expression
 from knowledge_base.language.syntax.sexpr import TypedName
 from knowledge_base.pddl.domain_text import DeclarationText, DomainText, parse_domain, read_domain
+from knowledge_base.world.axioms import Axiom, checked_axiom
 from knowledge_base.world.computation import Computed, in_reading_order
-from knowledge_base.world.derived import Axiom, Definitions, checked_axiom
+from knowledge_base.world.derived import Definitions
 
 MAX_TYPES = 10_000
 MAX_TYPE_DEPTH = 100

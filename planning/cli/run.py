@@ -348,7 +348,8 @@ def _followed(
     from dsc.components.hooks import unawaited_coroutines
     from dsc.trace import header, write_to
     from planning.robot.garbage import settled
-    from planning.robot.progress import LiveProgress, PlainProgress, Tally
+    from planning.robot.progress import LiveProgress, PlainProgress
+    from planning.robot.tally import Tally
 
     with ExitStack() as stack:
         if trace is not None:

@@ -16,7 +16,7 @@ from knowledge_base.pddl.action_text import ActionText
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from knowledge_base.world.derived import Axiom
+    from knowledge_base.world.axioms import Axiom
     from knowledge_base.world.schema import Schema
 
 

@@ -35,7 +35,7 @@ from knowledge_base.language.syntax.sexpr import TypedName
 from knowledge_base.pddl.action_text import ActionText, united
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.pddl.writer import action_to_text, axiom_to_text, domain_to_text
-from knowledge_base.world.derived import Axiom, checked_axiom
+from knowledge_base.world.axioms import Axiom, checked_axiom
 from knowledge_base.world.schema import Schema, agreed_names
 from planning.model.actions import PlanningAction, action_of, check_action, refuse_changed
 

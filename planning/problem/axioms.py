@@ -20,7 +20,7 @@ from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, Fo
 from knowledge_base.language.syntax.expression import Atom, Exists, Expression, Or, TypedVariable, Variable
 from knowledge_base.language.syntax.rewriting import denied, names_of
 from knowledge_base.pddl.problem_text import Metric
-from knowledge_base.world.derived import Axiom
+from knowledge_base.world.axioms import Axiom
 from planning.model.actions import PlanningAction
 from planning.model.cancellable_work import WorkLimit
 from planning.model.domain import PlanningDomain

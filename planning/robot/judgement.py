@@ -17,9 +17,9 @@ from planning.analysis.explanation import unmet
 from planning.model.domain import PlanningDomain
 from planning.problem.derived import derivation
 from planning.robot.bundles import Bundle
-from planning.robot.progress import Tally
 from planning.robot.report import Judge, Report, reason_of_end, summarise
 from planning.robot.simulation import Left, Simulation
+from planning.robot.tally import Tally
 from planning.robot.task import Task
 
 

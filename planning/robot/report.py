@@ -10,8 +10,8 @@ from typing import Any, Literal
 from dsc.sequencer.clock import ClockKind
 from dsc.sequencer.run_end import RunEnd
 from knowledge_base.notebook import text
-from planning.robot.progress import Tally
 from planning.robot.simulation import Fault, Left
+from planning.robot.tally import Tally
 
 Judge = Literal["world", "knowledge", "outcome"]
 """The source of `goal_reached`: the true state of a simulated world, the knowledge base, or the outcome of the plot."""

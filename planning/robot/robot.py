@@ -32,10 +32,10 @@ from planning.problem.construction import check_goal
 from planning.robot.judgement import Judgement
 from planning.robot.observations import record_observations
 from planning.robot.program import RobotProgram
-from planning.robot.progress import Tally
 from planning.robot.report import Report
 from planning.robot.run import Run, require_loop, require_no_loop
 from planning.robot.simulation import SceneWriter, scene_of
+from planning.robot.tally import Tally
 from planning.robot.task import Task
 
 Prepare = Callable[[Sequencer], object]

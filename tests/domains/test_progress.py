@@ -6,7 +6,8 @@ import pytest
 from rich.console import Console
 
 from dsc.trace import Record
-from planning.robot.progress import LiveProgress, PlainProgress, Tally
+from planning.robot.progress import LiveProgress, PlainProgress
+from planning.robot.tally import Tally
 
 
 def record(seq, type_, **data):

@@ -13,7 +13,7 @@ from planning import Plan, PlanStep, Robot
 from planning.execution.search import MAX_REJECTED
 from planning.model.plan import PlanFound, PlanningOutcome
 from planning.model.problem import Problem
-from planning.robot.progress import Tally
+from planning.robot.tally import Tally
 
 DOMAIN = """
 (define (domain house)
