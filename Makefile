@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: house mistakes lively controllers soak-robots soak-signals soak-days soak-suspensions soak-hosts help demo test test-long test-engines test-all check types limits conformance oracle-trees sweep-pddl soak kill-kb kill-runs soak-kb memory sweep-files fuzz lower-bounds corrupt-stores mutation
-.PHONY: bench-startup bench-broken bench-editor bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-choice bench-learned-costs bench-transforms bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
+.PHONY: bench-startup bench-broken bench-editor bench-calls bench-engine bench-planning bench-kb bench-viewer bench-run bench-choice bench-learned-costs bench-transforms bench-standstill bench-wire test-wire pictures viewer lock-viewer test-viewer screenshots docs clean
 
 help:   ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/'
@@ -181,6 +181,9 @@ bench-engine: $(BENCH)/.peers   ## what an event costs: a table by hand, this en
 
 bench-planning: $(VENV)/.engines   ## tables of 5 to 50 items: each engine alone, the race, and the parts (QUICK=1, WRITE=1 writes the docs)
 	$(BIN)/python benchmarks/planners.py $(if $(QUICK),--quick) $(if $(WRITE),--write)
+
+bench-standstill: $(VENV)/.run   ## how long a program's event loop stands still at most while a robot of 60 to 360 steps runs
+	$(BIN)/python benchmarks/standstill.py
 
 bench-kb: $(BENCH)/.peers   ## what facts, questions, updates and conditions cost: an index by hand, this knowledge base, four peers (WRITE=1 writes the docs)
 	$(BENCH)/bin/python benchmarks/kb.py $(if $(WRITE),--write)

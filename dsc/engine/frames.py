@@ -94,11 +94,12 @@ class Frame:
         return found
 
     def frozen(self) -> FrameState:
-        """Return the frame as an immutable value: the original object if no part has changed."""
+        """End the frame and return it as an immutable value: the original object if no part has changed."""
         now = (
             self.serial, self.compiled, self.configuration, self.variables, self.activations,
             self._frozen_children() if self.children else self.resting, self.kept,
         )  # fmt: skip
+        self.children = {}  # otherwise each step leaves circles of frames to the garbage collection
         return self.was if all(map(is_, now, self.was)) else FrameState(*now)
 
     def _frozen_children(self) -> Mapping[str, FrameState]:

@@ -145,7 +145,7 @@ class ScheduledCall:
         gives_way: whether the call was late and waits.
     """
 
-    __slots__ = ("_call", "_due", "_handle", "_loop", "gives_way")
+    __slots__ = ("_due", "_handle", "_loop", "gives_way")
     LATE = 0.1
     """Seconds after which a call is late."""
     GRACE = 0.05
@@ -154,20 +154,19 @@ class ScheduledCall:
     def __init__(self, loop: asyncio.AbstractEventLoop, due: float, call: Callable[[], object]) -> None:
         self._loop = loop
         self._due = max(due, loop.time())
-        self._call = call
         self.gives_way = False
-        self._handle = loop.call_at(due, self._fire)
+        self._handle = loop.call_at(due, self._fire, call)  # the handle alone, which forgets it when cancelled
 
     def cancel(self) -> None:
         """Prevent the call."""
         self._handle.cancel()
 
-    def _fire(self) -> None:
+    def _fire(self, call: Callable[[], object]) -> None:
         if self.gives_way or self._loop.time() - self._due < self.LATE:
-            self._call()
+            call()
             return
         self.gives_way = True
-        self._handle = self._loop.call_later(self.GRACE, self._fire)
+        self._handle = self._loop.call_later(self.GRACE, self._fire, call)
 
 
 @contextmanager

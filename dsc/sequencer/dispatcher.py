@@ -150,7 +150,7 @@ class Dispatcher:
 
     def running(self) -> tuple[tuple[RunningSkill, str], ...]:
         """Return the running skills, each with the component that it waits for as text; empty if it executes."""
-        return tuple([(one, one.missing()) for one in [*self._running.values()]])  # also for other threads
+        return tuple([(one, one.missing) for one in [*self._running.values()]])  # also for other threads
 
     @property
     def in_use(self) -> frozenset[str]:
@@ -283,6 +283,7 @@ class Dispatcher:
         ended = self._running.pop(start.action_id, None)
         if ended is not None and ended.claim is not None:
             self._free(ended.claim)
+            ended.claim = None  # it refers to the skill
         if start.component in self.activation.concerned:
             self.activation.look()
         component = self.components.get(start.component)
@@ -299,8 +300,7 @@ class Dispatcher:
 
     def dismiss(self, start: steps.Start) -> None:
         """Stop a skill that counts as ended: its time is over, it was preempted, or it failed by an invalid report."""
-        running = self._running.get(start.action_id)
-        if running is not None:
+        if (running := self._running.get(start.action_id)) is not None:
             running.disbelieve()
         self.stop(start)
 
@@ -441,7 +441,7 @@ class Dispatcher:
     async def _execute(self, component: Component, running: RunningSkill, interrupted: InterruptedSkill | None) -> None:
         active_component.set(component.name)
         dependencies = SkillDependencies(self.activation, component)
-        running.missing = lambda: dependencies.missing or self._missing(running, component)
+        running.waits_for = lambda one: dependencies.missing or self._missing(one, component)
         try:
             outcome = await self._outcome(component, running, dependencies, interrupted)
         except BaseException as error:

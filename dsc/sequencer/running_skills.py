@@ -6,6 +6,7 @@ import asyncio
 import math
 import threading
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -88,7 +89,7 @@ class RunningSkill:
         due: second of run time of the deadline; `math.inf` means no deadline.
         begun: whether the skill may begin, since it has the turn of its component.
         credible: whether observations after the end are posted; false after an invalid report.
-        missing: returns, as text, the component that the skill waits for; empty if it waits for none.
+        waits_for: returns, as text, the component that the given skill waits for; empty if it waits for none.
     """
 
     task: asyncio.Task[None]
@@ -117,7 +118,7 @@ class RunningSkill:
         self.claim: Claim | None = None
         self.begun = True
         self.credible = True
-        self.missing: Callable[[], str] = str
+        self.waits_for: Callable[[RunningSkill], str] = lambda _: ""
         self._turn: asyncio.Future[None] | None = None
         self._clock = clock
         self._post = post
@@ -239,6 +240,11 @@ class RunningSkill:
         self._holder = holder or None
 
     @property
+    def missing(self) -> str:
+        """The component that the skill waits for, as text; empty if it waits for none."""
+        return self.waits_for(self)
+
+    @property
     def holder(self) -> str | None:
         """The skill whose end this skill waits for; empty if the component is free, and `None` without a wait."""
         if self.begun or self.claim is None:
@@ -278,7 +284,7 @@ class RunningSkill:
             self._timer.cancel()
 
     def _expire(self) -> None:
-        missing, place = self.missing(), waits_at(self.task.get_coro())
+        missing, place = self.missing, waits_at(self.task.get_coro())
         waited = f"for {missing}" if missing else f"at {place}" if place else ""
         self.answer(late(self.start, self.within, waited), continues=True)
         cancel_once(self.task)
@@ -319,6 +325,8 @@ class PendingCleanups:
                     del self.pending[component]
                 if skill.claim is not None:
                     skill.claim.leave()
+                    skill.claim = None  # it refers to the skill
+                _forget_cancellation(task)
                 self._say(component)
 
         def abandon() -> None:
@@ -331,3 +339,10 @@ class PendingCleanups:
     def tasks(self) -> Iterable[asyncio.Task[None]]:
         """Return the tasks that have not stopped."""
         return [task for of_component in self.pending.values() for task in of_component]
+
+
+def _forget_cancellation(task: asyncio.Task[None]) -> None:
+    """Take the error out of a cancelled task: its traceback has the frames of the skill, which refer to the task."""
+    if task.cancelled():
+        with suppress(asyncio.CancelledError):
+            task.exception()

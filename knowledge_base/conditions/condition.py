@@ -73,7 +73,8 @@ class Condition:
         notifier: Notifier,
         remove: Callable[[Condition], None],
     ) -> None:
-        rise, _ = self.rows = rows
+        rise, _ = rows
+        self.rows: tuple[ConditionRow, ...] = rows
         self.text = text
         self.number = number
         self.truth = rise.truth
@@ -217,6 +218,7 @@ class Condition:
         if self._installed:
             self._installed = False
             self._remove(self)
+            self.rows = ()  # the latest cancelled conditions stay for inspection, without their compiled parts
 
     # --- firing: determined under the lock, delivered in order after its release
 

@@ -160,6 +160,7 @@ class Installed:
                 row.relation.drop(row)
                 if not row.relation.rows:
                     self._joins.pop(row.relation.shape, None)
+                    row.relation.close()
         self._cancelled.append(condition)
 
     def _row(self, found: Lifted) -> ConditionRow:

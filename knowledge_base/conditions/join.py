@@ -280,6 +280,10 @@ class Join:
         self._list(row, is_open=False)
         del self.rows[row.key]
 
+    def close(self) -> None:
+        """Release the delta joins, which refer to this join: a join without rows needs no garbage collection."""
+        self._triggers = ()
+
     def loses(self, row: ConditionRow, witness: Args) -> bool:
         """Remove the witness if it is no longer valid; return whether the row then needs a new search."""
         try:
