@@ -118,6 +118,20 @@ def test_a_slice_that_takes_too_long_leaves_time_for_the_whole():
     assert not found.reproducible  # real time decided which problem was solved
 
 
+def test_a_plan_of_a_slice_found_in_time_is_reproducible():
+    sliced = Problem("d", {}, (START,), (GOAL,), (FIRST, SECOND), unsliced=lambda: PROBLEM)
+    assert outcome(answering('{"actions": [0, 1]}'), sliced).reproducible
+
+
+def test_the_time_of_a_slice_is_not_given_to_the_whole_again():
+    sliced = Problem("d", {}, (START,), (GOAL,), (FIRST, SECOND), unsliced=lambda: PROBLEM)
+    assert outcome(HANGING, sliced, seconds=0.4).seconds == pytest.approx(0.2)
+
+
+def test_the_translation_is_a_part_of_the_time_of_a_plan():
+    assert outcome(answering('{"actions": [0, 1], "translated": 0.25}')).translated == 0.25
+
+
 def test_a_slice_without_a_plan_proves_nothing():
     script = READY + (
         "for line in sys.stdin:\n"

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from collections import Counter
 
 import pytest
 from errands import DOMAIN
@@ -10,12 +11,12 @@ from test_carrying_out import Run
 from knowledge_base import Delta, KnowledgeBase, UnknownNameError, fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning import PlanStep
-from planning.execution.attempt import Attempt
+from planning.execution.attempt import Attempt, Failure
 from planning.execution.link_monitor import Broken, GoalReached, Shorter
 from planning.execution.outcomes import Withdrawn
 from planning.execution.plan_progress import PlanProgress
 from planning.execution.plan_run import PlanRun, PlanState, Successor
-from planning.execution.plan_runs import PlanRuns
+from planning.execution.plan_runs import MOST_UNMONITORED, PlanRuns
 from planning.problem.derived import derivation
 
 GOAL = parse_condition("(at c)")
@@ -170,6 +171,28 @@ def test_what_is_remembered_of_a_plan_is_plain_data_and_is_recalled(state):
     again = PlanRun.from_json(form, derivation(DOMAIN).at(world), Attempt())
     assert again.to_json() == form
     assert (again.state, again.successor, again.news) == (run.state, run.successor, run.news)
+
+
+def test_an_attempt_as_plain_data():
+    attempt = Attempt(3, 1, 2, 4, Counter({Failure(STEPS[0], "failed", "here"): 2}), Counter({STEPS[1]: 3}))
+    assert Attempt.from_json(json.loads(json.dumps(attempt.to_json()))) == attempt
+
+
+def test_no_attempt_after_the_goal():
+    runs = PlanRuns()
+    runs.attempt("task", None)
+    runs.conclude("task")
+    assert runs.interrupted("task") is None
+
+
+def test_the_oldest_plans_without_a_monitor_give_way():
+    monitored = plan_run("plan_0")
+    runs = kept(monitored)
+    runs.begin(monitored)
+    monitored.on_begin = print
+    for number in range(1, MOST_UNMONITORED + 3):
+        runs.add(plan_run(f"plan_{number}"))
+    assert names(runs) == ["plan_0", *(f"plan_{number}" for number in range(2, MOST_UNMONITORED + 3))]
 
 
 def test_a_step_that_begins_before_its_monitor_is_back_is_not_forgotten():

@@ -145,6 +145,19 @@ def test_a_quantified_goal_of_many_moves_stays_shallow():
     assert len(to_text(condition)) < 400
 
 
+TANK = PlanningDomain.parse("""
+(define (domain tank) (:functions (level) (rate))
+  (:action fill :parameters () :effect (increase (level) (rate))))
+""")
+
+
+@pytest.mark.parametrize(("steps", "readable"), [(90, True), (120, False)])
+def test_a_need_that_is_too_deep_for_a_query(steps, readable):
+    """The plan is then validated as a whole at each change; see `CausalNeeds.before`."""
+    found = needed_before([PlanStep("fill")] * steps, parse_condition("(> (level) 1)"), TANK)
+    assert (found is not None) is readable
+
+
 EQUALITIES = st.builds(
     Comparison, st.just("="), st.sampled_from([Variable("x"), Variable("y")]), st.sampled_from([*map(Constant, "ab")])
 )
