@@ -3,10 +3,13 @@
 `python benchmarks/learned_costs.py [--runs N] [--learned N] [--items N] [--engine NAME] [--patience S] [--json]`: each
 plan is the best that the engine finds in some seconds of real time, since only improved plans regard costs. The runs of
 learning are not among those of the comparison. Each run has other faults, with probability 0.2 for each skill call.
+The figures of each run go to standard error, pair by pair, so that a run cut short leaves them.
 """
 
 import argparse
+import itertools
 import json
+import sys
 import time
 from collections.abc import Sequence
 from contextlib import aclosing, suppress
@@ -83,10 +86,13 @@ def main() -> None:
     experience = Experience()
     for seed in range(10_000, 10_000 + options.learned):
         experience = experience.plus(tries_in(ran(scenario, seed, *how, Experience()), steps=True))
-    found = {}
-    for name, known in (("each step costs 1", Experience()), ("learned costs", experience)):
-        runs = [counted(ran(scenario, seed, *how, known)) for seed in range(options.runs)]
-        found[name] = {what: figures([one[what] for one in runs]) for what in runs[0]}
+        print(f"learned from seed {seed}", file=sys.stderr, flush=True)
+    costs = {"each step costs 1": Experience(), "learned costs": experience}
+    runs: dict[str, list[dict[str, float]]] = {name: [] for name in costs}
+    for seed, (name, known) in itertools.product(range(options.runs), costs.items()):
+        runs[name].append(counted(ran(scenario, seed, *how, known)))
+        print(f"seed {seed}, {name}: {runs[name][-1]}", file=sys.stderr, flush=True)
+    found = {name: {what: figures([one[what] for one in some]) for what in some[0]} for name, some in runs.items()}
     if options.json:
         print(json.dumps({"runs": options.runs, "costs": found}))
         return

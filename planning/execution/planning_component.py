@@ -56,8 +56,8 @@ if TYPE_CHECKING:
     from knowledge_base.language.syntax.expression import Expression
     from knowledge_base.store import KnowledgeBase
     from planning.engines.planner import Planner
+    from planning.execution.foresight import Foresight
     from planning.execution.goals import GoalQueue
-    from planning.execution.search import Foresight
     from planning.execution.search_results import Found
     from planning.model.domain import PlanningDomain
 

@@ -12,14 +12,17 @@ import math
 from collections import deque
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from dsc.components.hooks import contained
 from knowledge_base.errors import InputError
-from knowledge_base.language.checking.inputs import require, shown
+from knowledge_base.facts import Delta
 from knowledge_base.world.overlay import Overlay
 from planning.analysis.explanation import why_unsolvable
 from planning.analysis.validation import Validation, validate
 from planning.engines.registry import timing
+from planning.execution.foresight import Foresight, names_read, require_verdict
+from planning.execution.foresight_world import ForesightWorld
 from planning.execution.plan_ends import leads_to
 from planning.execution.plan_progress import PlanProgress, local_repair
 from planning.execution.planner_call import Answer, PlannerCalls
@@ -54,22 +57,6 @@ if TYPE_CHECKING:
     from planning.execution.step_costs import StepCosts
     from planning.model.domain import PlanningDomain
     from planning.model.problem import Problem
-
-
-class Foresight(Protocol):
-    """A simulation that models more than the planning domain does, e.g. the physics of a ready world (S1.10).
-
-    An attribute `reads`, which is optional, names predicates and functions: if others change their facts or values, the
-    coming steps of a running plan are simulated again.
-    """
-
-    def foresee(self, plan: Plan, world: World) -> Validation:
-        """Simulate the plan from `world`, the state of the world that the robot believes, and return the result.
-
-        The search rejects an invalid plan and excludes the failing step from the next plan. This method runs in a
-        separate thread; it must end, and must not change any state.
-        """
-        ...
 
 
 _Result = TypeVar("_Result")
@@ -455,45 +442,38 @@ class Search:
 
     @property
     def reads(self) -> frozenset[str]:
-        """The predicates and functions that the simulation reads, as its attribute `reads` tells."""
-        return frozenset(getattr(self._foresight, "reads", ()))
+        """The predicates and functions that the simulation reads."""
+        return names_read(self._foresight)
 
     async def foresee_coming(self, progress: PlanProgress) -> Validation:
         """Simulate the coming steps of a running plan, from the world after its running steps.
 
         Raises:
-            InputError: the simulation returns another value than a `Validation`.
+            ProgrammingError: the simulation fails, or returns another value than a `Validation`.
         """
-        world = _ahead(self._running(progress), self._domain, self._knowledge.snapshot())
-        return Validation(valid=True) if world is None else await self._foresee(Plan(progress.coming()), world)
+        ahead = _ahead(self._running(progress), self._domain, self._knowledge.snapshot())
+        if ahead is None:
+            return Validation(valid=True)
+        return await self._foresee(Plan(progress.coming()), ahead.delta if isinstance(ahead, Overlay) else Delta())
 
-    async def _foresee(self, plan: Plan, world: World) -> Validation:
+    async def _foresee(self, plan: Plan, expected: Delta) -> Validation:
+        """Simulate a plan in the present world with the expected changes."""
         foresight = self._foresight
         if foresight is None:
             return Validation(valid=True)
-        verdict = await self.aside(lambda: foresight.foresee(plan, world))
-        _require_verdict(verdict, len(plan.steps))
+        world = ForesightWorld(self._knowledge, expected)
+        with contained(f"{type(foresight).__name__}.foresee"):
+            verdict = await self.aside(lambda: foresight.foresee(plan, world))
+            require_verdict(verdict, plan, foresight)
         return verdict
 
     async def _foreseen(self, found: Found) -> Validation:
         plan = found.answer.plan
-        verdict = await self._foresee(plan, self._knowledge.snapshot())
+        verdict = await self._foresee(plan, Delta())
         if not verdict.valid:
             step = None if verdict.failing_step is None else plan.steps[verdict.failing_step]
             self._records.rejected(step, verdict.why, found.answer.engine)
         return verdict
-
-
-def _require_verdict(verdict: object, steps: int) -> None:
-    """Raise `InputError` unless a foresight has returned a `Validation` about a plan with that number of steps."""
-    require(verdict, Validation, "a foresight returns a Validation")
-    for name in ("failing_step", "costliest_step"):
-        number = getattr(verdict, name)
-        if number is not None and not (isinstance(number, int) and 0 <= number < steps):
-            raise InputError(f"a foresight names a step by its number from 0 to {steps - 1}: `{name}={shown(number)}`")
-    cost = getattr(verdict, "cost", None)
-    if cost is not None and (isinstance(cost, bool) or not isinstance(cost, int | float) or not math.isfinite(cost)):
-        raise InputError(f"the cost of a plan is a finite number, not {shown(cost)}")
 
 
 def _only_wrong(plans: Sequence[WrongPlan], found: Found) -> NotFound:

@@ -26,7 +26,7 @@ from knowledge_base.errors import InputError, Place, UnknownNameError, described
 from knowledge_base.facts import Delta
 from knowledge_base.language.checking.inputs import require, shown
 from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
-from planning.execution.search import Foresight
+from planning.execution.foresight import Foresight
 from planning.execution.shipped_plots import shipped_plots
 from planning.model.domain import PlanningDomain
 from planning.robot.simulation import Simulation

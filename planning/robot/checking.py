@@ -34,6 +34,7 @@ from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.analysis.explanation import proven_reasons
 from planning.engines.registry import able, installed, refusal
+from planning.execution.foresight import require_foresight
 from planning.execution.goal_skills import planner_services
 from planning.execution.planning_component import PlanningComponent
 from planning.execution.shipped_plots import shipped_plots
@@ -308,8 +309,10 @@ class _Robot:
         return {name: kind for file in self._files for name, kind in objects_in(file, schema).items()}
 
     def _check_task(self, world: KnowledgeBase) -> None:
-        """Check the goal and the main plot."""
+        """Check the goal, the main plot and the foresight."""
         bundle = self._bundle
+        with tolerated():
+            require_foresight(bundle.foresight, world.schema)
         if bundle.goal is not None:
             with tolerated():
                 check_goal(parse_condition(bundle.goal, f"goal of '{bundle.name}'"), world)

@@ -37,10 +37,10 @@ from knowledge_base.world.schema_compatibility import require_extension
 from planning.engines.planner import Planner
 from planning.engines.race import CachingPlanner, PlannerRace
 from planning.engines.registry import repeatable
+from planning.execution.foresight import Foresight, require_foresight
 from planning.execution.goal_skills import planner_services
 from planning.execution.goals import GoalQueue
 from planning.execution.planning_component import PlanningComponent
-from planning.execution.search import Foresight
 from planning.execution.shipped_plots import shipped_plots
 from planning.model.domain import PlanningDomain
 from planning.robot.bundles import (
@@ -106,7 +106,7 @@ class RobotProgram:
         resources: Mapping[str, float] | None = None,
         experience: Experience | None = None,
     ) -> None:
-        require_parts(knowledge, planner, foresight, store)
+        require_parts(knowledge, planner, store)
         self.components = require_instances(components)
         configure(self.components)
         choose_sources(self.components, wiring or {})
@@ -143,6 +143,7 @@ class RobotProgram:
         self._closed = False
         self.origin = origin
         self._schema = self.domain.schema if knowledge is None else knowledge.schema
+        require_foresight(foresight, self._schema)
         self._require_sound(self.library)
         self._checked = self.library.plots
         if knowledge is not None:

@@ -15,8 +15,8 @@ from dsc.errors import Finding
 from dsc.sensing.condition_handler import ConditionHandler
 from dsc.skills import SkillSignature, signatures
 from dsc.validation import raise_findings, validate_library
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.checking.inputs import require, shown
+from knowledge_base.errors import SchemaError, UnknownNameError
+from knowledge_base.language.checking.inputs import require, require_able
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.execution.planning_component import PlanningComponent
@@ -118,20 +118,10 @@ def require_sound(
     _sound[key] = parts
 
 
-def require_parts(knowledge: object, planner: object, foresight: object, store: object) -> None:
+def require_parts(knowledge: object, planner: object, store: object) -> None:
     """Raise `InputError` if a part is not `None` and lacks its declared type."""
     if knowledge is not None:
         require(knowledge, KnowledgeBase, "the knowledge is a KnowledgeBase")
     if store is not None:
         require(store, (str, Path), "a store is named by a text or a Path")
-    _require_able(planner, "solve", "a planner")
-    _require_able(foresight, "foresee", "a foresight")
-
-
-def _require_able(part: object, method: str, what: str) -> None:
-    if part is None:
-        return
-    if isinstance(part, type):
-        raise InputError(f"{what} is an object, not a class; an instance is made by {part.__name__}()")
-    if not callable(getattr(part, method, None)):
-        raise InputError(f"{what} needs a method '{method}', which {shown(part)[:60]} lacks")
+    require_able(planner, "solve", "a planner")

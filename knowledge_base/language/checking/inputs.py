@@ -37,6 +37,16 @@ def require_several(value: object, what: str) -> None:
         raise InputError(f"{what} are given as a list, not as {shown(value)[:60]}")
 
 
+def require_able(part: object, method: str, what: str) -> None:
+    """Raise `InputError` unless `part` is `None` or an object with that method; `what` is its word in the message."""
+    if part is None:
+        return
+    if isinstance(part, type):
+        raise InputError(f"{what} is an object, not a class; an instance is made by {part.__name__}()")
+    if not callable(getattr(part, method, None)):
+        raise InputError(f"{what} needs a method '{method}', which {shown(part)[:60]} lacks")
+
+
 def require_condition(text: object) -> None:
     """Raise `InputError` unless `text` is a text or an expression; neither is parsed or checked here."""
     if isinstance(text, Fact):

@@ -116,25 +116,6 @@ def test_no_alternative_is_cheaper(seed):
     assert costs[driven[0]] == min(costs[place] for place in ("mud", "road", "lake"))
 
 
-@pytest.mark.parametrize(
-    ("answer", "said"),
-    [
-        (None, "a foresight returns a Validation, not None"),
-        (Validation(valid=True, cost=float("nan")), "the cost of a plan is a finite number, not nan"),
-        (Validation(valid=True, cost=1, costliest_step=7), "`costliest_step=7`"),
-        (Validation(valid=False, failing_step=-1), "`failing_step=-1`"),
-    ],
-)
-def test_wrong_answers_of_a_simulation(answer, said):
-    class Wrong:
-        def foresee(self, plan, world):
-            return answer
-
-    end, driven, _ = drive(Wrong())
-    assert driven == []
-    assert said in end.emitted[-1].attributes["reason"]
-
-
 class Blocked:
     """Blocked ways, which are facts that the planning domain does not read."""
 
