@@ -34,13 +34,20 @@ def wrong_facts(files: Iterable[Path], schema: Schema) -> Iterator[Finding]:
     """Yield a finding for each `fact(...)` with an undeclared name, or with another number of arguments."""
     for file in files:
         try:
-            tree = ast.parse(file.read_text("utf-8"))
+            tree = _tree(file.read_text("utf-8"))
         except (OSError, SyntaxError, ValueError):  # another finding reports it
             continue
         for call in ast.walk(tree):
             if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "fact":
                 mistake = _mistake(call, schema, Place(str(file), call.lineno, call.col_offset + 1))
                 yield from () if mistake is None else (Finding(mistake, "fact"),)
+
+
+def _tree(text: str) -> ast.Module:
+    try:
+        return ast.parse(text)
+    except SystemError:  # finalizers that run during it confuse its counter (CPython issue 106905)
+        return ast.parse(text)
 
 
 def _mistake(call: ast.Call, schema: Schema, place: Place) -> InputError | None:
