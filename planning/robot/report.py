@@ -95,7 +95,7 @@ class Report:
         ):
             if counts:
                 lines.append(f"  {title}: " + ", ".join(f"{name} {n}" for name, n in counts.items()))
-        own = {} if self.judge == "world" else self.own  # a world that judges has a headline of its own
+        own = {} if self.judge == "world" else self.own  # its headline has them
         for title, values in (("outputs", self.outputs), (self.robot, own)):
             if values:
                 lines.append(f"  {title}: " + ", ".join(f"{name} {dumps(one)}" for name, one in values.items()))
