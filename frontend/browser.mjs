@@ -14,15 +14,20 @@ export const OTHER_NAME = "rebound.example";
 const FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
   "--disable-background-networking", "--disable-component-update", "--disable-sync", `--host-resolver-rules=MAP ${OTHER_NAME} 127.0.0.1`];
 
-/** Start `dsc` with these arguments; answers the address that it prints, and `stop`. */
+/** Start `dsc` with these arguments; answers the address that it prints, its lines of errors, and `stop`. */
 export async function serve(...args) {
-  const program = spawn(DSC, args, { stdio: ["ignore", "pipe", "inherit"] });
+  const program = spawn(DSC, args, { stdio: ["ignore", "pipe", "pipe"] });
   const lines = createInterface({ input: program.stdout });
+  const errors = [];
+  createInterface({ input: program.stderr }).on("line", (line) => {
+    console.error(line);
+    errors.push(line);
+  });
   const ended = new Promise((done) => program.once("exit", done));
   for await (const line of lines) {
     if (!line.startsWith("http://")) continue;
     lines.on("line", () => {}); // what else it prints must not fill the pipe
-    return { url: line, stop: () => stop(program, ended) };
+    return { url: line, errors, stop: () => stop(program, ended) };
   }
   throw new Error(`dsc ${args.join(" ")} ended without an address`);
 }

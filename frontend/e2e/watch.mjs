@@ -1,4 +1,4 @@
-// Development in the browser: the author of the plots adds a rule and mends a plot, and the robot goes on with them.
+// Development in the browser: the author of the plots adds a rule, makes a mistake and mends a plot; the robot goes on.
 import assert from "node:assert/strict";
 import { mkdtempSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -44,6 +44,11 @@ let folder, program, browser, page;
 const write = (name, text) => writeFileSync(join(folder, name), text);
 const state = (name) => page.locator(`.react-flow__node[data-id$="${name}"] > .state.active`).first();
 
+const goesOn = async () => {
+  const seq = Number(await page.getByLabel("Moment", { exact: true }).inputValue());
+  await page.waitForFunction((seq) => Number(document.querySelector("input[type=range]").value) > seq + 10, seq);
+};
+
 before(async () => {
   folder = mkdtempSync(join(tmpdir(), "dsc-"));
   write("robot.py", ROBOT);
@@ -69,10 +74,15 @@ test("a rule is added, and the running plot uses its response", { timeout: 60_00
   await state("back").waitFor();
 });
 
+test("a plot with a mistake is refused with its place, and the robot goes on", { timeout: 60_000 }, async () => {
+  write("part.yaml", PART.replace("moved: end", "mved: end"));
+  while (!program.errors.some((line) => /part\.yaml:4:\d+: .*'mved'.*'moved'/.test(line))) await page.waitForTimeout(100);
+  await goesOn();
+});
+
 test("a plot is mended, and the robot goes on in the new state", { timeout: 60_000 }, async () => {
   write("part.yaml", PART.replace("reach: {", "near: {").replace("to: corner", "to: middle"));
   await state("near").waitFor();
-  const before = Number(await page.getByLabel("Moment", { exact: true }).inputValue());
-  await page.waitForFunction((seq) => Number(document.querySelector("input[type=range]").value) > seq + 10, before);
+  await goesOn();
   assert.equal(await page.getByRole("banner").getByText("live", { exact: true }).count(), 1);
 });
