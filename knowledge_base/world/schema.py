@@ -274,6 +274,9 @@ class Schema:
             if name in self.types:
                 said = f"'{name}' is a type, which a condition tests of one thing: ({name} THING)"
                 raise SchemaError(f"{said}; a new thing gets its type with its name", place=place)
+            if ":" in name and not relation_names():
+                message = f"'{name}' is a relation of a running program, and here is only the state of a world"
+                raise SchemaError(message, place=place, found=name)
             own = (*self.predicates, *self.computed, *self.types)
             every = (*own, *KEYWORDS, *relation_names())
             valid = every if nearest(name, every) is not None or not own else own

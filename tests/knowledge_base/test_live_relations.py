@@ -109,3 +109,9 @@ def test_mistakes_are_refused(write, said):
     kb, _ = room("left")
     with pytest.raises((SchemaError, UnknownNameError, InputError), match=said):
         write(kb)
+
+
+def test_a_relation_where_no_program_has_declared_any(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_declared", {})
+    with pytest.raises(SchemaError, match="'dsc:active' is a relation of a running program"):
+        KnowledgeBase(Schema()).query("(dsc:active ?s)")
