@@ -70,6 +70,11 @@ def value_text(value: str | float | tuple[float, ...], *, quoted: bool = False) 
     return f'"{escaped}"'
 
 
+def number_text(number: int, noun: str) -> str:
+    """Return a number with its noun: `1 place`, `2 places`."""
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
 def text_inside(quoted: str) -> str:
     """Return the text that `value_text` writes as this text in quotes."""
     return _ESCAPE.sub(lambda found: _ENDS.get(found[1], found[1]), quoted[1:-1])

@@ -19,6 +19,7 @@ from knowledge_base.notebook import svg_by
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.pddl.writer import problem_to_text
 from knowledge_base.questions import Binding, Prepared, Questions
+from knowledge_base.spelling import number_text
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.schema import Schema
@@ -300,7 +301,7 @@ class View:
             return True
         parameters = (declared or self.schema.predicate)(name).parameters
         if len(parameters) != len(args):
-            raise SchemaError(f"'{name}' has {len(parameters)} arguments, not {len(args)}", found=name)
+            raise SchemaError(f"'{name}' has {number_text(len(parameters), 'argument')}, not {len(args)}", found=name)
         self._checked.add((name, len(args)))
         return False
 

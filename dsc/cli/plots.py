@@ -14,6 +14,7 @@ from dsc.cli.renaming import rename_command
 from dsc.errors import Finding
 from knowledge_base.cli.console import print_json
 from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.spelling import number_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -90,7 +91,7 @@ def check(
     neighbours = Neighbours()
     components = None if robot is None else _components_of(robot)
     every = [(file, finding) for file in files for finding in _findings(file, domain, neighbours, components)]
-    nothing = f"{len(files)} plot{'s' * (len(files) != 1)} checked, no mistakes found"
+    nothing = f"{number_text(len(files), 'plot')} checked, no mistakes found"
     wrong = report(every, nothing, json=json, sarif=sarif, selection=select, strict=strict)
     raise typer.Exit(BAD_INPUT if wrong else 0)
 

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from knowledge_base.cli.console import print_json
+from knowledge_base.spelling import number_text
 
 
 def rename_command(
@@ -44,7 +45,7 @@ def rename_command(
         print_json({"files": {str(file): lines for file, lines in shown.items()}, **left})
         return
     for file, edits in found.edits.items():
-        typer.echo(shown[file] if dry_run else f"{file}: {len(edits)} places", nl=not dry_run)
+        typer.echo(shown[file] if dry_run else f"{file}: {number_text(len(edits), 'place')}", nl=not dry_run)
     for file, line in found.in_python:
         typer.echo(f"{file}:{line}: Python code has this name, too; change it there yourself")
     for file, line in found.in_texts:

@@ -9,6 +9,7 @@ import typer
 
 from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, report
 from knowledge_base.cli.console import print_json
+from knowledge_base.spelling import number_text
 
 app = typer.Typer(
     name="tree",
@@ -36,7 +37,7 @@ def check(
     from dsc.trees.findings import check_trees
 
     every = [(file, finding) for file in files for finding in check_trees(file)]
-    nothing = f"{len(files)} file{'s' * (len(files) != 1)} checked, no mistakes found"
+    nothing = f"{number_text(len(files), 'file')} checked, no mistakes found"
     wrong = report(every, nothing, json=json, sarif=sarif, selection=select, strict=strict)
     raise typer.Exit(_WRONG if wrong else 0)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from dsc.components.demands import Demand
 from dsc.deployment.model import Deployment
 from knowledge_base import svg
+from knowledge_base.spelling import number_text
 
 LINE = 17.0
 """Height of a line of text in pixels; all lengths are in pixels."""
@@ -112,7 +113,7 @@ def _host_text(deployment: Deployment, host: str) -> str:
     platform = deployment.platforms[found.platform]
     parts = [
         found.platform,
-        f"{platform.cores} core{'s' * (platform.cores != 1)}",
+        number_text(platform.cores, "core"),
         platform.scheduling.replace("_", " "),
     ]
     return ", ".join([*parts, *(deployment.amount(*one) for one in deployment.capacity(host).items())])

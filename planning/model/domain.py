@@ -35,6 +35,7 @@ from knowledge_base.language.syntax.sexpr import TypedName
 from knowledge_base.pddl.action_text import ActionText, united
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.pddl.writer import action_to_text, axiom_to_text, domain_to_text
+from knowledge_base.spelling import number_text
 from knowledge_base.world.axioms import Axiom, checked_axiom
 from knowledge_base.world.schema import Schema, agreed_names
 from planning.model.actions import PlanningAction, action_of, check_action, refuse_changed
@@ -246,7 +247,9 @@ class PlanningDomain:
     def _filled(self, step: PlanStep) -> tuple[PlanningAction, dict[str, str]]:
         action = self.action(step)
         if len(action.parameters) != len(step.args):
-            raise InputError(f"'{step.action}' takes {len(action.parameters)} arguments, {step} has {len(step.args)}")
+            raise InputError(
+                f"'{step.action}' takes {number_text(len(action.parameters), 'argument')}, {step} has {len(step.args)}"
+            )
         return action, {p.name: arg for p, arg in zip(action.parameters, step.args, strict=True)}
 
 

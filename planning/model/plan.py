@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from knowledge_base.errors import InputError
 from knowledge_base.notebook import table
+from knowledge_base.spelling import number_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,10 +77,12 @@ class Plan:
     def _repr_html_(self) -> str:
         numbered = enumerate(self.steps, start=1)
         if not self.schedule:
-            return table(f"plan, {len(self.steps)} steps", ("", "step"), numbered)
+            return table(f"plan, {number_text(len(self.steps), 'step')}", ("", "step"), numbered)
         times = [(f"{timing.start:g} s", f"{timing.duration:g} s") for timing in self.schedule]
         rows = [(*step, *time) for step, time in zip(numbered, times, strict=True)]
-        return table(f"plan, {len(self.steps)} steps, {self.seconds:g} s", ("", "step", "start", "duration"), rows)
+        return table(
+            f"plan, {number_text(len(self.steps), 'step')}, {self.seconds:g} s", ("", "step", "start", "duration"), rows
+        )
 
 
 @dataclass(frozen=True, slots=True)

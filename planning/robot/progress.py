@@ -13,10 +13,11 @@ from rich.text import Text
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.model.rules import REPLAN
 from dsc.trace import Record
+from knowledge_base.spelling import number_text
 from planning.robot.tally import Tally
 
 _SAYS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
-    "plan.found": lambda data: f"plan with {len(data['steps'])} steps ({data['engine']})",
+    "plan.found": lambda data: f"plan with {number_text(len(data['steps']), 'step')} ({data['engine']})",
     "plan.none": lambda data: f"no plan, {data['kind']}: {data['reason']}",
     "plan.broken": lambda data: f"the plan no longer holds: {data['reason']}",
     "plan.failed": lambda data: f"failed: {' or '.join(data['steps'])}: {data['why']}",

@@ -52,7 +52,7 @@ RECORDS = [
     record(15, "end", finished=False, problem="nobody handles 'x'"),
 ]
 LINES = [
-    "look", "plan with 1 steps (fake)", "rule  slipped: pick, retry  at (pick cup)", "step   1  (pick cup)",
+    "look", "plan with 1 step (fake)", "rule  slipped: pick, retry  at (pick cup)", "step   1  (pick cup)",
     "no plan, timed_out: no plan within 5 s", "the plan no longer holds: (on cup) is false", "failed: (pick cup): no_path",
     "the plan resumes at (pick cup): no_path", "skipped (pick cup), (put cup): the goal holds",
     "(pick cup) is excluded for 120 s: no_path", "(pick cup) may be planned again: there is no plan without",

@@ -265,7 +265,7 @@ TELLS = [
     (Delta(replaced=(fact("on", "cup1", "shelv"),)), UnknownNameError, "'shelf'"),
     (Delta(added=(fact("on", "cup1", ("a", "b")),)), SchemaError, r"not \('a', 'b'\)"),  # type: ignore[arg-type]
     (Delta(added=(fact("level", "cup1", float("inf")),)), InputError, "finite"),
-    (Delta(values={fact("weight", "cup1", "cup2"): 1}), SchemaError, "takes 1 arguments"),
+    (Delta(values={fact("weight", "cup1", "cup2"): 1}), SchemaError, "takes 1 argument"),
     (Delta(values={fact("distance", "shelf", "hom"): 1}), UnknownNameError, "'home'"),
     (Delta(values={fact("time"): "late"}), SchemaError, "not 'late'"),
     (Delta(values={fact("time"): (1.0, 2.0)}), SchemaError, r"not \(1.0, 2.0\)"),
@@ -310,7 +310,7 @@ def test_transaction_verbs() -> None:
         (lambda kb: kb.match("onn", (None,)), UnknownNameError, "did you mean 'on'"),
         (lambda kb: kb.estimate("onn", (None,)), UnknownNameError, "did you mean 'on'"),
         (lambda kb: kb.holds("on", ("cup1",)), SchemaError, "'on' has 2 arguments, not 1"),
-        (lambda kb: kb.value("weight", ()), SchemaError, "'weight' has 1 arguments, not 0"),
+        (lambda kb: kb.value("weight", ()), SchemaError, "'weight' has 1 argument, not 0"),
         (lambda kb: kb.value("wieght", ("cup1",)), UnknownNameError, "did you mean 'weight'"),
     ],
 )

@@ -102,7 +102,7 @@ def test_an_ended_provision_leaves_no_rows():
     [
         (lambda kb: kb.apply(Delta(added=(fact("test:on", "left"),)), author="test"), "read-only"),
         (lambda kb: kb.query("(test:onn ?lamp)"), "did you mean 'test:on'"),
-        (lambda kb: kb.query("(test:on ?lamp ?other)"), r"takes 1 arguments, as in \(test:on \?lamp\); found 2"),
+        (lambda kb: kb.query("(test:on ?lamp ?other)"), r"takes 1 argument, as in \(test:on \?lamp\); found 2"),
     ],
 )
 def test_mistakes_are_refused(write, said):

@@ -30,6 +30,7 @@ from knowledge_base.language.syntax.expression import (
     Variable,
 )
 from knowledge_base.language.syntax.rewriting import opposite
+from knowledge_base.spelling import number_text
 
 Free = Literal["error", "answers"]
 
@@ -119,7 +120,7 @@ def check_arity(signature: Signature, count: int, place: Place | None = None) ->
     """Raise `SchemaError` unless `signature` has `count` parameters."""
     if signature.arity != count:
         raise SchemaError(
-            f"'{signature.name}' takes {signature.arity} arguments, as in {signature}; found {count}",
+            f"'{signature.name}' takes {number_text(signature.arity, 'argument')}, as in {signature}; found {count}",
             place=place,
         )
 

@@ -82,7 +82,7 @@ def check(skill, condition, values="cup: ?cup"):
             "no value for '?cpu' in `values`",
         ),
         ("conditions.watch_truth", "(or (held ?cpu) (silent hand.pose 1))", "no value for '?cpu' in `values`"),
-        ("conditions.watch_truth", "(< hand.pose.x (limit cup1 3))", "'limit' takes 1 arguments"),
+        ("conditions.watch_truth", "(< hand.pose.x (limit cup1 3))", "'limit' takes 1 argument"),
         ("conditions.watch_truth", "(< hand.pose 1)", "a port, whose values are hand.pose.x, hand.pose.place"),
         ("conditions.watch_truth", "(< hand.pose.name 1)", "needs numbers, and hand.pose.name is of type text"),
         ("conditions.watch_truth", "(< (distance hand.pose.x (pose cup1)) 1)", "a list of numbers"),

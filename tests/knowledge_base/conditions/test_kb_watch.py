@@ -159,7 +159,7 @@ def test_a_watcher_whose_loop_is_closed_disturbs_nobody(kb) -> None:
     [
         ("(hevy ?o)", 1, "did you mean 'heavy'"),
         ("(on ?o)", 1, "takes 2 arguments"),
-        ("(weight)", 1, "takes 1 arguments"),
+        ("(weight)", 1, "takes 1 argument"),
         ("(and (quiet))", 1, "a pattern is one predicate"),
         ("(quiet)", 0, "at least one change"),
     ],

@@ -206,7 +206,7 @@ def test_the_function_takes_what_is_read() -> None:
         ("(forall ?t - thing)", (), SchemaError, "'forall' is in use"),
         ("(far ?t - thin)", (), SchemaError, "unknown type 'thin'.*'thing'"),
         ("(far ?t - thing)", ("(z ?t)",), UnknownNameError, "no function 'z'"),
-        ("(far ?t - thing)", ("(x ?t ?t)",), SchemaError, "takes 1 arguments"),
+        ("(far ?t - thing)", ("(x ?t ?t)",), SchemaError, "takes 1 argument"),
         ("(far ?t - thing)", ("(on ?t)",), SchemaError, "takes 2 arguments"),
         ("(far ?n - number)", ("(x ?n)",), SchemaError, r"'\?n' is of type number"),
         ("(far ?n - number)", ("(clean ?n)",), SchemaError, r"'\?n' is of type number"),

@@ -70,7 +70,7 @@ class Asking:
         (lambda world: world.match("weight", (None,)), "'weight' is a function"),
         (lambda world: world.value("wieght", ("crate1",)), "there is no function 'wieght'; did you mean 'weight'?"),
         (lambda world: world.value("on", ("crate1",)), "there is no function 'on'; valid: label, weight"),
-        (lambda world: world.value("weight", ()), "'weight' has 1 arguments, not 0"),
+        (lambda world: world.value("weight", ()), "'weight' has 1 argument, not 0"),
         (lambda world: world.value("weight", ("crate",)), "there is no object 'crate', which '?c' of 'weight'"),
         (lambda world: world.holds("on", ("crate1", "lefft")), "there is no object 'lefft', which '?s' of 'on'"),
         (lambda world: world.match("on", (None, 3)), "there is no object 3"),

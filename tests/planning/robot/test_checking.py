@@ -388,7 +388,7 @@ def test_an_object_without_the_value_that_others_have_is_named(project):
     ("right", "wrong", "said"),
     [
         ('removed=(fact("robot-in", before),)', 'removed=(fact("robot_in", before),)', "no predicate or function 'robot_in'; did you mean 'robot-in'?"),
-        ('removed=(fact("robot-in", before),)', 'removed=(fact("robot-in"),)', "'robot-in' takes 1 arguments, as in (robot-in ?r - room); found 0"),
+        ('removed=(fact("robot-in", before),)', 'removed=(fact("robot-in"),)', "'robot-in' takes 1 argument, as in (robot-in ?r - room); found 0"),
         ('removed=(fact("robot-in", before),)', 'removed=(fact("robot-in", *[before]),)', None),
     ],
 )  # fmt: skip
