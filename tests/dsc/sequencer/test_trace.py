@@ -107,7 +107,8 @@ def test_a_step_is_told_with_what_was_taken_left_and_entered():
 def test_a_decision_is_told_with_its_reasons():
     heard, _ = traced()
     (decision,) = [r.data for r in heard if r.type == "decision"]
-    assert (decision["state"], decision["chosen"]) == ("h", "q")
+    assert (decision["state"], decision["chosen"], decision["satisfied"]) == ("h", "q", False)
+    assert "by" not in decision  # of a choice by order
     assert decision["candidates"] == [
         {"plot": "q", "fits": True, "reason": "(p) is true", "condition": {"text": "(p)", "truth": True}}
     ]
@@ -120,6 +121,7 @@ def test_actions_are_told_and_timers_are_not():
     assert actions[0]["skill"] == "c.s"
     assert actions[0]["arguments"] == {"x": 1}
     assert actions[1]["port"] == "c.y"
+    assert actions[2] == {"action": "switch", "component": "c", "mode": "up"}
 
 
 def test_a_skill_that_is_cancelled_is_told_once_and_one_that_ended_is_not():
