@@ -10,6 +10,7 @@ from typing import Any, Literal
 from dsc.sequencer.clock import ClockKind
 from dsc.sequencer.run_end import RunEnd
 from knowledge_base.notebook import text
+from knowledge_base.spelling import number_text
 from planning.robot.simulation import Fault, Left
 from planning.robot.tally import Tally
 
@@ -100,7 +101,8 @@ class Report:
             if values:
                 lines.append(f"  {title}: " + ", ".join(f"{name} {dumps(one)}" for name, one in values.items()))
         if self.faults and not self.skill_failures:
-            lines.append(f"  {len(self.faults)} faults were drawn, and no skill reported a failure")
+            drawn = number_text(len(self.faults), "fault")
+            lines.append(f"  {drawn} drawn, and no outcome of a skill is one of the bundle's `failures`")
         return lines
 
     def _repr_html_(self) -> str:
