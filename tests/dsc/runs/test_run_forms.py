@@ -9,7 +9,15 @@ import pytest
 
 from dsc.engine.steps import SendLater, SendMessage, SetParameter, Start, StartTimer, SwitchMode
 from dsc.events import Event
-from dsc.messages import KnowledgeMessage, LateMessage, ParameterMessage, PlotsMessage, SkillMessage, TimerMessage
+from dsc.messages import (
+    KnowledgeMessage,
+    LateMessage,
+    ParameterMessage,
+    PlotsMessage,
+    SkillMessage,
+    TimerMessage,
+    WireMessage,
+)
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
 from dsc.runs.encoding import (
@@ -61,6 +69,8 @@ def test_a_plot_among_values_is_put_away_once_and_found_again(forms, short):
         Event("go", WITH_PLOT, to=3, exact=True, number=1, frame=2),
         KnowledgeMessage(TOLD, "eve"),
         PlotsMessage({"made": ActionPlot.model_validate({"plot": "made", "states": {"s": {}}}), "gone": None}, "keep"),
+        PlotsMessage({}, "keep", {"arm": {"skills": {"move": {}}}}),
+        WireMessage("robot.source", None),
         ParameterMessage("robot", "speed", 2.5, of_plot=False),
         SkillMessage(START, Outcome("did", WITH_PLOT, TOLD), final=True),
         SkillMessage(START, Outcome("progress"), final=False, conflated=4),

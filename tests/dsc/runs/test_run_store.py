@@ -465,6 +465,22 @@ def test_plots_that_the_run_cannot_reach_may_change(tmp_path, now, difference):
         Run(folder, now, done=done, resume=True)
 
 
+PLANNING = [
+    "{plot: p, states: {s: {entry: {trigger: robot.work}, on: {did: a}}, a: {use: helper, on: {done: b}}, b: {dynamic: [], goal: (told), on: {done: e, FAILURE: e}}, e: {final: true}}}",
+    "{plot: achieve, parameters: {goal: text}, states: {z: {final: true}}}",
+    "{plot: walk, implements: go, states: {z: {final: true}}}",
+    "{plot: helper, states: {z: {final: true}}}",
+]
+
+
+@pytest.mark.parametrize("name", ["helper", "achieve", "walk"])
+def test_changed_plots_of_a_run_that_plans(tmp_path, name):
+    _, done, folder = Crashes(tmp_path, *PLANNING).copies[1]
+    changed = [text.replace("z:", "y:") if f"plot: {name}," in text else text for text in PLANNING]
+    with pytest.raises(ChangedError, match=f"the plot '{name}' has changed"):
+        Run(folder, changed, done=done, resume=True)
+
+
 def test_the_error_about_changes_names_the_choices(tmp_path):
     _, done, folder = Crashes(tmp_path, TWICE).copies[2]
     with pytest.raises(ChangedError, match=r"resume it with the earlier version, or end it: .*dsc runs end"):
