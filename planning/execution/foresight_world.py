@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 from knowledge_base.errors import SchemaError, UnknownNameError
@@ -12,12 +12,15 @@ from knowledge_base.language.checking.relations import relation, relation_names
 from knowledge_base.language.syntax.expression import And, Atom, Constant, TypedVariable, Variable
 from knowledge_base.view import View
 from knowledge_base.world.derived import type_test
+from planning.problem.derived import derivation
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from knowledge_base.facts import Content, Delta, Value
+    from knowledge_base.language.evaluation.world_protocol import World
     from knowledge_base.store import KnowledgeBase
+    from planning.model.domain import PlanningDomain
 
 
 class ForesightWorld(View):
@@ -27,24 +30,31 @@ class ForesightWorld(View):
     that are derived, computed, or provided by the running program.
 
     Args:
+        domain: the domain, whose axioms define the derived predicates.
         knowledge: the knowledge of the robot.
         expected: the changes that the running steps will cause.
     """
 
-    def __init__(self, knowledge: KnowledgeBase, expected: Delta) -> None:
+    def __init__(self, domain: PlanningDomain, knowledge: KnowledgeBase, expected: Delta) -> None:
         state = knowledge.snapshot()
         state.commit(expected)
         live = [one for one in map(relation, relation_names()) if one is not None]
         state.provide({one.name: partial(knowledge.match, one.name, (None,) * one.arity) for one in live})
         super().__init__(state, knowledge.version)
         self._without_facts = {*state.schema.computed, *(axiom.predicate for axiom in state.schema.axioms)}
+        self._derivation = derivation(domain)
+
+    @cached_property
+    def _complete(self) -> World:
+        """The world with the facts of recursive predicates."""
+        return self._derivation.complete(self._state)
 
     def holds(self, predicate: str, args: tuple[Value, ...]) -> bool:
         """Return whether the fact is true; the name of a type asks for the type of an object.
 
         Raises:
             UnknownNameError: there is no such predicate, type or object.
-            SchemaError: a wrong number of arguments, an object of a wrong type, or a recursive derived predicate.
+            SchemaError: a wrong number of arguments, or an object of a wrong type.
             InputError: the arguments are not a tuple.
         """
         found = super().holds(predicate, args)
@@ -82,6 +92,8 @@ class ForesightWorld(View):
 
     def _answers(self, predicate: str, pattern: tuple[Value | None, ...]) -> list[tuple[Value, ...]]:
         """Return the arguments for which a derived or computed predicate is true."""
+        if predicate in self._derivation.recursive:
+            return list(self._complete.match(predicate, pattern))
         declared = list(zip(self.schema.predicate(predicate).parameters, pattern, strict=True))
         terms = tuple(Variable(one.name) if value is None else Constant(value) for one, value in declared)
         tests = (type_test(one, Variable(one.name)) for one, value in declared if value is None)

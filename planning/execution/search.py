@@ -461,7 +461,7 @@ class Search:
         foresight = self._foresight
         if foresight is None:
             return Validation(valid=True)
-        world = ForesightWorld(self._knowledge, expected)
+        world = ForesightWorld(self._domain, self._knowledge, expected)
         with contained(f"{type(foresight).__name__}.foresee"):
             verdict = await self.aside(lambda: foresight.foresee(plan, world))
             require_verdict(verdict, plan, foresight)

@@ -107,9 +107,9 @@ class Derivation:
         return not all(name in fixed or self._schema.is_type(name, 1) for name in names_of(e))
 
     @property
-    def recursive(self) -> bool:
-        """Whether a derived predicate is recursive, so that its replacement depends on the world."""
-        return bool(self._definitions.recursive)
+    def recursive(self) -> frozenset[str]:
+        """The recursive predicates; their replacement depends on the world."""
+        return self._definitions.recursive
 
     def why(self, name: str) -> str:
         """Return why a predicate is not supported, and which planners support it."""

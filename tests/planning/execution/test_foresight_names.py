@@ -6,7 +6,8 @@ import pytest
 
 from dsc import Component, Outcome, SkillCall, primitive_plot, skill
 from knowledge_base import Delta, InputError, KnowledgeBase, computed, fact
-from planning import PlanningDomain, Robot, Validation
+from knowledge_base.language.syntax.text import parse_condition
+from planning import PlanningDomain, Robot, Validation, validate
 from planning.execution.foresight_world import ForesightWorld
 from planning.robot.checking import check_project
 
@@ -76,7 +77,6 @@ class Asking:
         (lambda world: world.match("on", (None, 3)), "there is no object 3"),
         (lambda world: world.match("on", ("left", None)), "'left' is of type shelf, but '?c' of 'on' is of type crate"),
         (lambda world: world.match("free", ("crate1",)), "'crate1' is of type crate, but '?s' of 'free'"),
-        (lambda world: world.match("reach", (None, None)), "'reach' is a recursive derived predicate"),
         (lambda world: world.objects("crat"), "there is no type 'crat'; did you mean 'crate'?"),
         (lambda world: world.query("(onn ?c ?s)"), "there is no predicate 'onn'; did you mean 'on'?"),
     ],
@@ -120,7 +120,7 @@ def test_a_computed_predicate_in_a_foresight():
 
     knowledge = KnowledgeBase(DOMAIN.schema.with_computed(heavy))
     knowledge.apply(WORLD, author="me")
-    world = ForesightWorld(knowledge, Delta())
+    world = ForesightWorld(DOMAIN, knowledge, Delta())
     assert world.match("heavy", (None,)) == [("crate1",)]
     assert not world.holds("heavy", ("crate2",))
 
@@ -128,7 +128,7 @@ def test_a_computed_predicate_in_a_foresight():
 def test_expected_changes_in_the_world_of_a_foresight():
     knowledge = KnowledgeBase(DOMAIN.schema)
     knowledge.apply(WORLD, author="me")
-    world = ForesightWorld(knowledge, Delta(added=(fact("on", "crate1", "left"),)))
+    world = ForesightWorld(DOMAIN, knowledge, Delta(added=(fact("on", "crate1", "left"),)))
     assert world.match("free", (None,)) == [("dock",)]
     assert not knowledge.holds("on", ("crate1", "left"))
 
@@ -210,3 +210,21 @@ def test_names_in_reads_of_a_bundle(tmp_path):
     (found,) = [one for one in check_project(str(file)) if "weigth" in one.text]
     assert "did you mean 'weight'?" in found.text
     assert (found.place.source, found.place.line) == (str(file), 3)
+
+
+class Playing:
+    """A foresight that validates the plan in its world, whose shelves are near each other."""
+
+    def foresee(self, plan, world):
+        assert sorted(world.match("reach", ("left", None))) == [("left", "dock"), ("left", "right")]
+        assert world.holds("reach", ("left", "dock"))
+        assert not world.holds("reach", ("dock", "left"))
+        goal = parse_condition("(and (stored crate1) (reach left dock))")
+        return validate(plan, DOMAIN, world, goal)
+
+
+def test_a_recursive_predicate_in_a_foresight():
+    with loader(Playing()) as robot:
+        robot.knowledge.apply(Delta(added=(fact("near", "left", "right"), fact("near", "right", "dock"))), author="me")
+        end = robot.achieve("(stored crate1)")
+    assert end.reached, end.reason
