@@ -57,29 +57,28 @@ before(async () => {
 
 after(() => browser?.close());
 
-async function event(...options) {
+async function event(test, ...options) {
   const program = await serve("view", join(folder, "run.jsonl"), "--no-open", ...options);
+  test.after(() => program.stop());
   const { page, complaints } = await open(browser, program.url);
   await loaded(page, 5);
   await page.getByRole("tab", { name: "Why" }).click();
   await page.getByRole("button", { name: /seen from/ }).first().click();
-  return { page, complaints, program };
+  return { page, complaints };
 }
 
-test("a record shows its picture and its scan", { timeout: 60_000 }, async () => {
-  const { page, complaints, program } = await event("--data", join(folder, "data"));
+test("a record shows its picture and its scan", { timeout: 60_000 }, async (test) => {
+  const { page, complaints } = await event(test, "--data", join(folder, "data"));
   const picture = page.locator("img.datum").first();
   await picture.waitFor();
-  assert.equal(await picture.evaluate((it) => it.naturalWidth), 200);
+  await page.waitForFunction(() => document.querySelector("img.datum").naturalWidth === 200);
   await page.getByRole("img", { name: /720 numbers/ }).first().waitFor();
   await page.getByText("720 numbers, 1.00 to 3.00").first().waitFor();
   if (process.env.SHOT) await page.screenshot({ path: process.env.SHOT });
   assert.deepEqual(complaints, []);
-  await program.stop();
 });
 
-test("without the folder, the reference is shown as text", { timeout: 60_000 }, async () => {
-  const { page, program } = await event();
+test("without the folder, the reference is shown as text", { timeout: 60_000 }, async (test) => {
+  const { page } = await event(test);
   await page.getByText(/not in the folder of data/).first().waitFor();
-  await program.stop();
 });
