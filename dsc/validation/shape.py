@@ -216,7 +216,7 @@ def _dialect(subject: Subject) -> Iterator[Finding]:
     """Yield findings about features that exist only in dialect `scxml`."""
     for path, what in _foreign(subject):
         fix = "write `dialect: scxml` if the plot is to be an SCXML chart"
-        if path[-1] in _BLOCKS:
+        if path[-1] in _BLOCKS and path[-2] != "states":
             move = "move it" if subject.plot.robot is None else "assign only motors here; move the rest"
             fix = f"{move} to a transition, e.g. under `do`, or {fix}"
         yield subject.finding(path, "dialect", f"{what}, which only dialect scxml has", fix)

@@ -107,6 +107,21 @@ def test_an_event_ends_with_the_state_that_activated_it():
     assert [one["name"] for one in done.of_type("event")] == ["after", "ran"]
 
 
+def test_an_event_in_the_states_inside_the_one_that_activated_it():
+    done = ran("""
+        plot: p
+        states:
+          work:
+            entry: {trigger: battery.low}
+            regions:
+              drain: {states: {use: {entry: {trigger: battery.run}, on: {low: saved}}, saved: {final: true}}}
+            on: {done: e}
+          e: {final: true}
+    """)
+    assert done.end.finished
+    assert done.of_type("event")[0]["name"] == "low"
+
+
 def test_a_value_said_before_counts_for_who_comes_later():
     battery = Battery()
     battery.update("low", 3.0)
