@@ -250,10 +250,8 @@ def _action_because(action: WrittenAction, reason: Terms) -> WrittenAction:
             return Assign(assign=filled(action.assign, reason))
         case Emit():
             return action.model_copy(update={"arguments": filled(action.arguments, reason)})
-        case (
-            Perform() | StartActivity() | StopActivity() | Withdraw() | Log() | Choose() | Block()
-        ):  # without a reason, or of dialect scxml
-            return action
+        case Perform() | StartActivity() | StopActivity() | Withdraw() | Log() | Choose() | Block():
+            return action  # without a reason, or of dialect scxml
 
 
 def _joined(rule: Rule, guard: lang.Expression | None, counting: Terms, after: Transition) -> Transition:

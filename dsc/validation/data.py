@@ -218,10 +218,8 @@ class _Data:
         match action:
             case actions.Tell(tell=effect):
                 yield from self._effect(effect, scope, (*path, "tell"))
-            case (
-                actions.Bind() | actions.Perform() | actions.StartActivity() | actions.StopActivity()
-            ):  # see `_bindings` and `check_robot`
-                pass
+            case actions.Bind() | actions.Perform() | actions.StartActivity() | actions.StopActivity():
+                pass  # see `_bindings` and `check_robot`
             case actions.Assign(assign=values):
                 for name in values:
                     yield from self._variable(name, (*path, "assign", name))

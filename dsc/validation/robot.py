@@ -96,9 +96,8 @@ def _check_operations(subject: Subject) -> Iterator[Finding]:
                 try:
                     subject.plot.motor_values(action)
                 except InputError as error:
-                    fix = (
-                        f"declare it under `{'operations' if isinstance(action, Perform) else 'activities'}` of `robot`"
-                    )
+                    group = "operations" if isinstance(action, Perform) else "activities"
+                    fix = f"declare it under `{group}` of `robot`"
                     yield subject.caught(error, (*path, number, first_key(type(action))), "robot", fix)
 
 

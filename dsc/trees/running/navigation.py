@@ -112,12 +112,10 @@ class RoundRobin(RunningNode):
 class RateController(Decorator):
     """`RateController`: begins the child at the first tick, and again a period after its last success."""
 
-    period = 0.0
-    start: float | None = None
+    period = start = 0.0
 
     def halt(self) -> None:
         """Halt the child, and stop the timer."""
-        self.start = None
         self.run.due.pop(self, None)
         super().halt()
 
@@ -127,7 +125,7 @@ class RateController(Decorator):
         if begins:
             self.period, self.start = 1 / self._rate(), self.run.now()
         self.status = Status.RUNNING
-        is_due = begins or self.start is None or self.run.now() >= self.start + self.period
+        is_due = begins or self.run.now() >= self.start + self.period
         if not is_due and self.child.status is not Status.RUNNING:
             return Status.RUNNING
         self.run.due.pop(self, None)

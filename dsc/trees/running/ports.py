@@ -45,9 +45,10 @@ def integer_port(node: Node, port: str, board: Board) -> int:
     Raises:
         InputError: the port is missing, or has no integer.
     """
-    number = _number(_value(node, port, board))
+    value = _value(node, port, board)
+    number = _number(value)
     if number is None or not number.is_integer():
-        raise _of_another_type(node, port, board, "an integer")
+        raise _of_another_type(node, port, value, "an integer")
     return int(number)
 
 
@@ -57,9 +58,10 @@ def number_port(node: Node, port: str, board: Board) -> float:
     Raises:
         InputError: the port is missing, or has no number.
     """
-    number = _number(_value(node, port, board))
+    value = _value(node, port, board)
+    number = _number(value)
     if number is None:
-        raise _of_another_type(node, port, board, "a number")
+        raise _of_another_type(node, port, value, "a number")
     return number
 
 
@@ -69,9 +71,10 @@ def truth_port(node: Node, port: str, board: Board) -> bool:
     Raises:
         InputError: the port is missing, or has no truth value.
     """
-    truth = boolean_of(_value(node, port, board))
+    value = _value(node, port, board)
+    truth = boolean_of(value)
     if truth is None:
-        raise _of_another_type(node, port, board, "true or false")
+        raise _of_another_type(node, port, value, "true or false")
     return truth
 
 
@@ -82,9 +85,8 @@ def _value(node: Node, port: str, board: Board) -> object:
     return read_port(node, port, text, board)
 
 
-def _of_another_type(node: Node, port: str, board: Board, wanted: str) -> InputError:
-    message = f"{node.element}: the port '{port}' is {wanted}, not {shown(_value(node, port, board))}"
-    return InputError(message, place=node.place)
+def _of_another_type(node: Node, port: str, value: object, wanted: str) -> InputError:
+    return InputError(f"{node.element}: the port '{port}' is {wanted}, not {shown(value)}", place=node.place)
 
 
 def _number(value: object) -> float | None:
