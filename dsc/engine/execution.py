@@ -5,19 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
+from dsc.engine.automaton import CompiledReaction, Configuration, Exit, ReactionPart, StateEntry, configuration_of
 from dsc.engine.exclusion import failures_of, with_end
 from dsc.engine.frames import Frame
-from dsc.engine.machine_state import NOTHING, Configuration, FrameState, configuration_of
+from dsc.engine.machine_state import NOTHING, FrameState
 from dsc.engine.performing import Performer, fill_parameters
-from dsc.engine.reaction import (
-    CompiledReaction,
-    Exit,
-    ReactionPart,
-    StateEntry,
-    continuing_reaction,
-    initial_reaction,
-    leaving_reaction,
-)
+from dsc.engine.reaction import continuing_reaction, initial_reaction, leaving_reaction
 from dsc.engine.situation import Chart, Decision
 from dsc.engine.steps import Cancel, DecisionMade, PlotBound
 from dsc.engine.tables import CompiledPlot

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from dsc.engine.automaton import Choice, CompiledReaction, Question
 from dsc.engine.binding import find_values
-from dsc.engine.machine_state import NOTHING, FrameState, MachineState, idle_state
+from dsc.engine.idle_state import IdleState, idle_state
+from dsc.engine.machine_forms import read_state
+from dsc.engine.machine_state import NOTHING, FrameState, MachineState
 from dsc.engine.macrostep import Macrostep
 from dsc.engine.plot_changes import ActivePlots, keep_plots
-from dsc.engine.reaction import CompiledReaction
-from dsc.engine.reaction_choice import Choice, Question
+from dsc.engine.reaction_choice import follow
 from dsc.engine.sensing import read_sensors
 from dsc.engine.situation import Chart, Situation
 from dsc.engine.steps import NO_CHANGE, Microstep, SendMessage, Step
@@ -25,26 +27,29 @@ _new = tuple.__new__
 
 def move(state: MachineState, root: FrameState, event: Event, situation: Situation) -> Step | None:
     """Return a cached step, or a step that changes only the configuration; `None` if a full macrostep is required."""
-    before = root.configuration
-    known: Step | None = before.steps.get(event.name)
-    if known is not None and known.event is event and before.bare is state:
-        return known
-    choice: Choice | None = before.choices.get(event.name)
+    idle = state if isinstance(state, IdleState) else None
+    if idle is not None:
+        known = idle.steps.get(event.name)
+        if known is not None and known.event is event:
+            return known
+    choices = root.configuration.reactions.choices
+    choice = choices.get(event.name)
     if isinstance(choice, Question):
         choice = _answered(choice, root, event, situation)
     if not isinstance(choice, CompiledReaction) or not choice.still or root.children:
         return None
     following = choice.following
-    if before.bare is state:
-        after = following.bare or idle_state(root._replace(configuration=following), state.serials)
+    after: MachineState
+    if idle is not None:
+        after = idle_state(root, state.serials, following)
     else:
         serial, compiled, _, variables, activations, children, kept = root
         frame = _new(FrameState, (serial, compiled, following, variables, activations, children, kept))
         after = _new(MachineState, (frame, state.serials, False))
     micro = _new(Microstep, (event, choice.taken, choice.exited, choice.entered, ()))
     step = _new(Step, (after, event, True, (micro,), (), NO_CHANGE, (), (), (), NOTHING, ()))
-    if before.bare is state and before.choices[event.name] is choice:
-        before.steps[event.name] = step
+    if idle is not None and choices[event.name] is choice:
+        idle.steps[event.name] = step
     return step
 
 
@@ -55,9 +60,9 @@ def _answered(question: Question, root: FrameState, event: Event, situation: Sit
         try:
             bind = choice.edge.bind
             if bind is None:
-                choice = choice.follow(situation.holds(choice.condition, bindings))
+                choice = follow(choice, situation.holds(choice.condition, bindings))
             else:
-                choice = choice.follow(find_values(bind, situation, bindings) is not None)
+                choice = follow(choice, find_values(bind, situation, bindings) is not None)
         except InputError:  # the full macrostep evaluates the guard again and reports the error
             return None
     return choice
@@ -141,7 +146,7 @@ class Machine:
         form = self.state.to_json()
         if form["root"] is None:
             return Step(self.state, None, handled=False)
-        state = MachineState.from_json({**form, "root": keep_plots(form["root"], before)}, library)
+        state = read_state({**form, "root": keep_plots(form["root"], before)}, library)
         done = Step(state, None, handled=True)
         if active != "at_next_entry":
             done = Macrostep(self.chart, situation, state).replace_plots(before, active)

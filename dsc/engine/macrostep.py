@@ -8,17 +8,20 @@ from itertools import repeat
 from operator import attrgetter
 from typing import Any
 
+from dsc.engine.automaton import CompiledReaction, Question, ReactionPart, configuration_of
 from dsc.engine.execution import Execution
 from dsc.engine.frames import Frame
-from dsc.engine.machine_state import FrameState, MachineState, configuration_of, idle_state
+from dsc.engine.idle_state import state_between
+from dsc.engine.machine_state import FrameState, MachineState
 from dsc.engine.performing import Performer
 from dsc.engine.plot_changes import ActivePlots, replace_plots
-from dsc.engine.reaction import CompiledReaction, ReactionPart, reaction_of, report
-from dsc.engine.reaction_choice import Question, choice_of, settle_guard
+from dsc.engine.reaction import reaction_of
+from dsc.engine.reaction_choice import choice_of, follow, settle_guard
 from dsc.engine.situation import Chart, Situation
 from dsc.engine.steps import Note, SendMessage, Step
-from dsc.engine.tables import TransitionEdge
-from dsc.engine.transition_selection import Addressed, Enabled, Trigger, select
+from dsc.engine.tables import Addressed, TransitionEdge, Trigger
+from dsc.engine.taken import report
+from dsc.engine.transition_selection import Enabled, select
 from dsc.errors import RunawayError
 from dsc.events import AT_LEAST, ERRORS, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event, for_all_plots, goes_outwards
 from dsc.model.actions import Send
@@ -94,7 +97,7 @@ class Macrostep:
             self._leave()
             state = MachineState(None, done.serials, execution.finished)
         else:
-            state = idle_state(self._root.frozen(), done.serials)
+            state = state_between(self._root.frozen(), done.serials)
         return Step(
             state, event, handled, tuple(done.microsteps), tuple(done.decisions), done.knowledge, tuple(done.output),
             tuple(done.emitted), tuple(done.errors), execution.outputs, tuple(done.bugs),
@@ -207,7 +210,7 @@ class Macrostep:
     def _take_alone(self, frame: Frame, trigger: Trigger, event: Event | None) -> bool:
         choice = choice_of(frame, trigger)
         while isinstance(choice, Question):
-            choice = choice.follow(self._holds(frame, choice.edge, choice.condition))
+            choice = follow(choice, self._holds(frame, choice.edge, choice.condition))
         if choice is None:
             return False
         kept = bool(choice.keeps) and self._keep(frame, choice.keeps, event)

@@ -15,6 +15,7 @@ from dsc.engine.frames import Frame
 from dsc.engine.machine_state import NOTHING
 from dsc.engine.situation import Situation
 from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
+from dsc.engine.taken import Taken
 from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event
 from dsc.model.actions import (
     Assign,
@@ -87,7 +88,7 @@ class Performer:
         self.entered: list[str] = []
         self.bound: list[steps.PlotBound] = []
 
-    def end_microstep(self, event: Event | None, taken: tuple[steps.Taken, ...]) -> None:
+    def end_microstep(self, event: Event | None, taken: tuple[Taken, ...]) -> None:
         """Record a microstep with all exits, entries and bindings since the previous microstep."""
         bound = tuple(self.bound)
         self.microsteps.append(steps.Microstep(event, taken, tuple(self.exited), tuple(self.entered), bound))

@@ -8,13 +8,19 @@ microstep, computeExitSet, exitStates, enterStates.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
 from typing import TypeVar
 
-from dsc.engine.machine_state import Configuration, configuration_of
+from dsc.engine.automaton import (
+    CompiledReaction,
+    Configuration,
+    Exit,
+    ReactionPart,
+    StateEntry,
+    configuration_of,
+)
 from dsc.engine.membership import settle
-from dsc.engine.steps import Taken
 from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
+from dsc.engine.taken import Taken, report
 from dsc.engine.transition_selection import EntrySet, domain, left_by
 from dsc.events import DONE
 from dsc.model.actions import (
@@ -30,132 +36,16 @@ from dsc.model.actions import (
 from dsc.model.states import DynamicState, FinalState, HistoryState, State
 
 _AnyAction = TypeVar("_AnyAction", bound=ExternalAction | Internal)
-Action = ExternalAction | Internal
-MOST_REPORTS = 64
-"""Upper bound of the host paths for which a reaction caches its report."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Exit:
-    """A node to exit, with its exit actions.
-
-    Attributes:
-        node: the node to exit.
-        actions: the exit actions of the node.
-        cancels: whether the node may have skills, timers or wires, which the exit ends.
-    """
-
-    node: StateNode
-    actions: tuple[Action, ...]
-    cancels: bool
-
-    @property
-    def quiet(self) -> bool:
-        """Whether the exit has no exit actions and no activation to end."""
-        return not self.actions and not self.node.addressed
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StateEntry:
-    """A node to enter, with its entry actions.
-
-    Attributes:
-        node: the node to enter.
-        actions: the entry actions of the node.
-        after: effect of the history default that leads to the node, executed as a separate block (appendix D).
-        completes: indices of the nodes whose content this entry completes; 0 for the plot itself.
-        emits: action that fires the outcome event of a final state; `None` without outcome.
-    """
-
-    node: StateNode
-    actions: tuple[Action, ...]
-    after: tuple[Action, ...]
-    completes: tuple[int, ...]
-    emits: Emit | None = None
-
-    @property
-    def quiet(self) -> bool:
-        """Whether the entry has no actions, completes no node and starts no activation."""
-        acts = self.actions or self.after or self.emits
-        return not acts and not self.completes and not self.node.addressed
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ReactionPart:
-    """Internal actions and entries of one transition.
-
-    Attributes:
-        edge: the transition; `None` for the initial entry of a plot.
-        effect: the internal actions, in order.
-        entrances: the nodes to enter, in order.
-        acts: whether the transition has internal actions or passes arguments to its target.
-    """
-
-    edge: TransitionEdge | None
-    effect: tuple[Action, ...]
-    entrances: tuple[StateEntry, ...]
-    acts: bool
-
-    @property
-    def quiet(self) -> bool:
-        """Whether the part only enters nodes, without any action."""
-        return not self.acts and all(entrance.quiet for entrance in self.entrances)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CompiledReaction:
-    """The effect of one microstep on one plot.
-
-    Attributes:
-        parts: a part for each transition, in order of execution.
-        exits: all exits, in order.
-        following: the configuration after the microstep.
-        continues: indices of the nodes whose plots continue in the plots that replace them.
-        candidate_ends: transitions from dynamic states that exclude failed candidates.
-        keeps: names of states that keep the event until their least time has passed.
-        taken, exited, entered: the reaction's report if the plot is the outermost one: transitions and state names.
-        silent: whether the reaction only exits states, without any action.
-        still: whether the reaction only changes the configuration and enables no transition without trigger.
-        reports: cached reports of the taken transitions for inner plots, by the path of the host state.
-    """
-
-    parts: tuple[ReactionPart, ...]
-    exits: tuple[Exit, ...]
-    following: Configuration
-    keeps: tuple[str, ...] = ()
-    taken: tuple[Taken, ...] = ()
-    exited: tuple[str, ...] = ()
-    entered: tuple[str, ...] = ()
-    silent: bool = False
-    still: bool = False
-    continues: tuple[int, ...] = ()
-    candidate_ends: tuple[TransitionEdge, ...] = ()
-    reports: dict[str, tuple[Taken, ...]] = field(default_factory=dict)
-
-    def taken_in(self, compiled: CompiledPlot, prefix: str) -> tuple[Taken, ...]:
-        """Return the report of the taken transitions; `prefix` is the beginning of the paths of the plot's states."""
-        found = self.reports.get(prefix)
-        if found is None:
-            if len(self.reports) >= MOST_REPORTS:
-                self.reports.clear()
-            found = self.reports[prefix] = tuple([report(p.edge, compiled, prefix) for p in self.parts if p.edge])
-        return found
-
-
-def report(edge: TransitionEdge, compiled: CompiledPlot, prefix: str = "") -> Taken:
-    """Return the report of one taken transition; `prefix` is the beginning of the paths of the plot's states."""
-    nodes = compiled.nodes
-    target = prefix + nodes[edge.targets[0]].name if edge.targets else None
-    return Taken(prefix + nodes[edge.source].name, edge.trigger, target, edge.rule, compiled.plot.name, edge.place)
 
 
 def reaction_of(
     configuration: Configuration, edges: tuple[TransitionEdge, ...], keeps: tuple[str, ...] = ()
 ) -> CompiledReaction:
     """Return the reaction that takes `edges` in a configuration; the states in `keeps` keep the event."""
-    found: CompiledReaction | None = configuration.reactions.get((edges, keeps))
+    known = configuration.reactions.taking
+    found = known.get((edges, keeps))
     if found is None:
-        found = configuration.reactions[edges, keeps] = _Work(configuration).taking(edges, keeps)
+        found = known[edges, keeps] = _Work(configuration).taking(edges, keeps)
     return found
 
 
@@ -175,9 +65,9 @@ def continuing_reaction(compiled: CompiledPlot, targets: Collection[int]) -> Com
 
 def leaving_reaction(configuration: Configuration) -> CompiledReaction:
     """Return the reaction that interrupts a plot: it exits all states with their actions for interruption."""
-    found: CompiledReaction | None = configuration.reactions.get(None)
+    found = configuration.reactions.leaving
     if found is None:
-        found = configuration.reactions[None] = _Work(configuration).leaving()
+        found = configuration.reactions.leaving = _Work(configuration).leaving()
     return found
 
 

@@ -13,4 +13,4 @@ def read_sensors(state: MachineState, event: Event) -> MachineState:
     if root is None or robot is None:
         return state
     readings = {name: value for name, value in event.attributes.items() if name in robot.sensors}
-    return state._replace(root=root._replace(variables={**root.variables, **readings}))
+    return MachineState(root._replace(variables={**root.variables, **readings}), state.serials, state.finished)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from dsc.engine.machine_state import NOTHING, MachineState
 from dsc.engine.situation import Decision
+from dsc.engine.taken import Taken
 from dsc.events import AFTER, Event
 from dsc.model.plot import ActionPlot
 from dsc.rank import ORDINARY, Rank
@@ -133,26 +134,6 @@ class Note:
 
 Output = Start | Cancel | SetParameter | SwitchMode | SendMessage | SetWire | StartTimer | SendLater | Revoke | Note
 """One output of the machine: an external action, a timer, a delayed event or an entry for the trace."""
-
-
-@dataclass(frozen=True, slots=True)
-class Taken:
-    """Report of a taken transition.
-
-    Attributes:
-        source, target: paths of the transition's states; `target` is `None` if no state was entered.
-        trigger: the event, `after` or `always`.
-        rule: label of the contingency rule whose expansion made the transition; `None` for any other transition.
-        plot: name of the plot that contains the transition.
-        place: keys of the transition in its source state, e.g. `("on", "grasped", 0)`.
-    """
-
-    source: str
-    trigger: str
-    target: str | None
-    rule: str | None = None
-    plot: str = ""
-    place: tuple[str | int, ...] = ()
 
 
 class PlotBound(NamedTuple):

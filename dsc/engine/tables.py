@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, combinations, islice
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dsc.conversions import Conversions
 from dsc.data_types import NO_RECORDS, Records, data_type
@@ -54,6 +54,32 @@ class TransitionEdge:
     interrupts: bool = False
     bind: Bind | None = None
     asks: bool = False
+
+
+class Addressed(NamedTuple):
+    """A trigger for one state.
+
+    Attributes:
+        event: name of the event.
+        node: index of the addressed state.
+        exact: whether only transitions of this state are considered, and not those of outer states.
+        number: position of the timer among the state's timers of this event; `None` for any other event.
+        inside: whether transitions of the states inside are considered, too.
+    """
+
+    event: str
+    node: int
+    exact: bool
+    number: int | None
+    inside: bool = False
+
+
+Trigger = str | Addressed | None
+"""Trigger of a plot's transitions.
+
+A string is an event for all states, and `Addressed` is an event for one state. `None` selects transitions without
+trigger.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +212,7 @@ class CompiledPlot:
         exact: by name, the classes of which each value has the type.
         records: the records of the plot's library, which later plots may extend.
         conversions: the functions that terms may call.
-        cache: cached configurations and the initial reaction (see `machine_state`).
+        cache: cached configurations and the initial reaction (see `automaton`).
     """
 
     plot: ActionPlot

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from dsc.engine.frames import Frame
-from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
+from dsc.engine.tables import Addressed, CompiledPlot, StateNode, TransitionEdge, Trigger
 from dsc.events import AFTER, EVERY, PREEMPTED
 from dsc.model.actions import Internal
 
@@ -19,32 +18,6 @@ Guard = Callable[[Frame, TransitionEdge], bool]
 """Function that returns whether the guard of an edge is true in a frame."""
 Remembered = Mapping[int, tuple[int, ...]]
 """Nodes that were active at the last exit of a history's parent, by history node."""
-
-
-class Addressed(NamedTuple):
-    """A trigger for one state.
-
-    Attributes:
-        event: name of the event.
-        node: index of the addressed state.
-        exact: whether only transitions of this state are considered, and not those of outer states.
-        number: position of the timer among the state's timers of this event; `None` for any other event.
-        inside: whether transitions of the states inside are considered, too.
-    """
-
-    event: str
-    node: int
-    exact: bool
-    number: int | None
-    inside: bool = False
-
-
-Trigger = str | Addressed | None
-"""Trigger of a plot's transitions.
-
-A string is an event for all states, and `Addressed` is an event for one state. `None` selects transitions without
-trigger.
-"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from dsc.dynamic.experience import NO_EXPERIENCE, Experience
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
 from dsc.dynamic.steps import offers_for
+from dsc.engine.machine_forms import read_state
 from dsc.engine.machine_state import MachineState
 from dsc.errors import ChangedError
 from dsc.events import Event
@@ -134,7 +135,7 @@ def read(runs: RunArchive, run: RunRow, library: Library) -> Kept:
         run=run,
         number=last.number,
         time=last.time,
-        state=MachineState.from_json(state, library),
+        state=read_state(state, library),
         emitted=events_of(reactor["emitted"], find),
         in_vain=frozenset((activation, index) for activation, index in reactor["in_vain"]),
         problem=reactor["problem"],

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from dsc.dynamic.library import Library
-from dsc.engine.steps import Microstep, Step, Taken
+from dsc.engine.steps import Microstep, Step
+from dsc.engine.taken import Taken
 from dsc.model.plot import ActionPlot, Path
 from dsc.model.states import HistoryState
 from dsc.model.transitions import TransitionSource

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Protocol
 
-from dsc.engine.steps import Microstep, SetParameter, Start, Step, SwitchMode, Taken
+from dsc.engine.steps import Microstep, SetParameter, Start, Step, SwitchMode
+from dsc.engine.taken import Taken
 from dsc.events import AFTER, EVERY
 from dsc.model.actions import Trigger, flat
 from dsc.model.plot import ActionPlot

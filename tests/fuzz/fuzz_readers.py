@@ -30,7 +30,7 @@ from dsc.dynamic.knowledge_situation import KnowledgeSituation
 from dsc.dynamic.library import Library
 from dsc.editing.surgery import Add, Edit, Move, Remove, RenameState, apply, differences, patch
 from dsc.engine.machine import Machine
-from dsc.engine.machine_state import MachineState
+from dsc.engine.machine_forms import read_state
 from dsc.errors import NotExpressibleError, RunawayError
 from dsc.events import Event
 from dsc.model.plot import ActionPlot
@@ -169,7 +169,7 @@ def _run(plot: ActionPlot, plots: Library) -> None:
         if machine.state.finished:
             return
     form = json.loads(json.dumps(machine.state.to_json()))
-    if MachineState.from_json(form, plots) != machine.state:
+    if read_state(form, plots) != machine.state:
         raise AssertionError("the machine's state is another one after JSON")
 
 
@@ -242,13 +242,13 @@ def read_scenario(data: bytes, folder: Path) -> None:
         table.knowledge.to_json()
 
 
-def read_state(data: bytes, folder: Path) -> None:
+def read_machine(data: bytes, folder: Path) -> None:
     """The state of a machine as JSON."""
     try:
         form = json.loads(data)
     except (ValueError, RecursionError):
         return
-    MachineState.from_json(form, LIBRARY)
+    read_state(form, LIBRARY)
 
 
 # -- PDDL and the language -------------------------------------------------------------------------------
@@ -628,7 +628,7 @@ READERS = (
     Target("deployment", read_deployment, ("examples/strangers/lab.yaml",), share=3),
     Target("monitoring", read_monitoring, ("examples/strangers/monitor.yaml",), share=1),
     Target("scenario", read_scenario, (), share=2),
-    Target("state", read_state, (), "json", share=3),
+    Target("state", read_machine, (), "json", share=3),
     Target(
         "domain", read_domain, ("domains/*/domain.pddl", "examples/*.pddl", "tests/support/broken/domain.pddl"), share=5
     ),

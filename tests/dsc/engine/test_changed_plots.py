@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_charts import Played, happenings, libraries
 
+from dsc.engine.machine_forms import read_state
 from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import Step
 from dsc.errors import RunawayError
@@ -56,7 +57,7 @@ def test_a_machine_continues_in_any_other_plots(plots, others, happened, later, 
     except (InputError, RunawayError):
         assert played.machine.state is before
         return
-    assert MachineState.from_json(played.machine.state.to_json(), played.library) == played.machine.state
+    assert read_state(played.machine.state.to_json(), played.library) == played.machine.state
     active_now = [frame.compiled for frame in played.machine.state.root.frames()] if played.machine.state.root else []
     if active != "at_next_entry":
         assert all(one.form is None or one.plot.name not in forms for one in active_now)

@@ -13,7 +13,7 @@ from random_charts import EVENTS, SENT_IN_SCXML, libraries
 
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
-from dsc.engine.machine_state import MachineState
+from dsc.engine.machine_forms import read_state
 from dsc.engine.steps import Cancel, Start, StartTimer
 from dsc.errors import RunawayError
 from dsc.events import AFTER, AT_LEAST, EVERY
@@ -70,7 +70,7 @@ class Books(RuleBasedStateMachine):
     def it_is_stored_and_read_by_another_program(self):
         stored = json.dumps(self.run.machine.state.to_json())
         self.run.library = Library(self.plots)
-        restored = MachineState.from_json(json.loads(stored), self.run.library)
+        restored = read_state(json.loads(stored), self.run.library)
         assert restored == self.run.machine.state
         assert json.dumps(restored.to_json()) == stored
         self.run.machine = Machine(self.run.library, restored)

