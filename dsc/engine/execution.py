@@ -12,7 +12,7 @@ from dsc.engine.machine_state import NOTHING, FrameState
 from dsc.engine.performing import Performer, fill_parameters
 from dsc.engine.reaction import continuing_reaction, initial_reaction, leaving_reaction
 from dsc.engine.situation import Chart, Decision
-from dsc.engine.steps import Cancel, DecisionMade, PlotBound
+from dsc.engine.steps import Cancel
 from dsc.engine.tables import CompiledPlot
 from dsc.errors import RunawayError
 from dsc.events import DONE, DONE_STATE, NO_CANDIDATE, Event
@@ -63,9 +63,8 @@ class Execution:
         if parent is not None and parent.depth >= MAX_NESTING:
             raise RunawayError(f"plots nested deeper than {MAX_NESTING}", [path])
         variables = fill_parameters(compiled, arguments, performer.situation)
-        performer.bound.append(PlotBound(path, compiled.plot))
-        performer.serials += 1
-        state = FrameState(performer.serials, compiled, initial.following, variables)
+        performer.results.bind(path, compiled.plot)
+        state = FrameState(performer.results.number(), compiled, initial.following, variables)
         frame = Frame(state, parent, host)
         for entrance in initial.parts[0].entrances:
             self._enter(frame, entrance, NOTHING)
@@ -154,7 +153,7 @@ class Execution:
             if node.holds_plot:
                 self._empty(frame, name)
             if node.state is not None:
-                self.performer.exited.append(frame.prefix + name)
+                self.performer.results.exit(frame.prefix + name)
             if node.addressed:
                 self._exit_addressed(frame, one)
             elif one.actions:
@@ -166,7 +165,8 @@ class Execution:
         if resting is not None and not resting.children:
             reaction = leaving_reaction(resting.configuration)
             if reaction.silent:
-                self.performer.exited += [f"{frame.prefix}{host}/{name}" for name in reaction.exited]
+                for name in reaction.exited:
+                    self.performer.results.exit(f"{frame.prefix}{host}/{name}")
                 frame.forget(host)
                 return
         inner = frame.child(host)
@@ -179,7 +179,7 @@ class Execution:
         name = one.node.name
         activation = frame.activations[name]
         if one.cancels:
-            self.performer.output.append(Cancel(activation))
+            self.performer.results.put(Cancel(activation))
         if one.actions:
             self.performer.act(frame, name, one.actions, activation, first=len(one.node.entry))
         activations = {**frame.activations}
@@ -194,10 +194,10 @@ class Execution:
         performer, node, state = self.performer, entrance.node, entrance.node.state
         activation = 0
         if node.addressed:
-            activation = performer.serials = performer.serials + 1
+            activation = performer.results.number()
             frame.activations = {**frame.activations, node.name: activation}
         if state is not None:
-            performer.entered.append(frame.prefix + node.name)
+            performer.results.enter(frame.prefix + node.name)
         if entrance.actions:
             performer.act(frame, node.name, entrance.actions, activation)
         if entrance.after:
@@ -276,9 +276,9 @@ class Execution:
         before.gone = True
         self._exit(before, [one for one in exits if one.node.name not in staying])
         now = before.frozen()
-        performer.bound.append(PlotBound("" if parent is None else parent.prefix + before.host, compiled.plot))
+        performer.results.bind("" if parent is None else parent.prefix + before.host, compiled.plot)
         if serial is None:
-            serial = performer.serials = performer.serials + 1
+            serial = performer.results.number()
         activations = {name: own for name, own in now.activations.items() if name in staying}
         children = {host: inner for host, inner in now.children.items() if host in staying}
         events = tuple([one for one in now.kept if one[0] in staying])
@@ -303,14 +303,14 @@ class Execution:
         decision = self.performer.situation.choose(
             state, frame.compiled.plot.name, bindings, failed, frame.activations.get(name, 0)
         )
-        self.performer.decisions.append(DecisionMade(frame.prefix + name, decision))
+        self.performer.results.decide(frame.prefix + name, decision)
         return decision
 
     def _bind_decision(self, frame: Frame, name: str, decision: Decision) -> None:
         if decision.satisfied:
             self._done(frame, frame.compiled.index[name], {})
         elif decision.chosen is None:
-            self.performer.internal.append(Event(NO_CANDIDATE, to=frame.activations[name]))
+            self.performer.results.fire(Event(NO_CANDIDATE, to=frame.activations[name]))
         else:
             self.enter_plot(self.chart.compiled(decision.chosen), decision.arguments, frame, name)
 
@@ -331,9 +331,9 @@ class Execution:
     def _done(self, frame: Frame, index: int, outputs: Mapping[str, Any]) -> None:
         node = frame.compiled.nodes[index]
         if frame.compiled.scxml:
-            self.performer.internal.append(Event(DONE_STATE + node.name, outputs, frame=frame.serial))
+            self.performer.results.fire(Event(DONE_STATE + node.name, outputs, frame=frame.serial))
         elif DONE in node.edges:
-            self.performer.internal.append(Event(DONE, outputs, to=frame.activations[node.name], exact=True))
+            self.performer.results.fire(Event(DONE, outputs, to=frame.activations[node.name], exact=True))
 
 
 def _kept_values(before: Frame, compiled: CompiledPlot) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from dsc.engine.plot_changes import ActivePlots, replace_plots
 from dsc.engine.reaction import reaction_of
 from dsc.engine.reaction_choice import choice_of, follow, settle_guard
 from dsc.engine.situation import Chart, Situation
+from dsc.engine.step_builder import StepBuilder
 from dsc.engine.steps import Note, SendMessage, Step
 from dsc.engine.tables import Addressed, TransitionEdge, Trigger
 from dsc.engine.taken import report
@@ -40,12 +41,13 @@ class Macrostep:
     `Execution` takes the selected transitions, and `Performer` executes their actions.
     """
 
-    __slots__ = ("_broken_guards", "_execution", "_performer", "_root", "_turn")
+    __slots__ = ("_broken_guards", "_execution", "_performer", "_results", "_root", "_turn")
 
     _root: Frame
 
     def __init__(self, chart: Chart, situation: Situation, state: MachineState) -> None:
-        self._performer = Performer(situation, state.serials)
+        self._results = StepBuilder(state.serials)
+        self._performer = Performer(situation, self._results)
         self._execution = Execution(chart, self._performer)
         self._broken_guards: set[tuple[int, TransitionEdge, int]] = set()
         self._turn = 0
@@ -55,7 +57,7 @@ class Macrostep:
     def start(self, plot: str, arguments: Mapping[str, Any]) -> Step:
         """Enter the outermost plot; raise `InputError` if the plot is unknown or its arguments do not fit."""
         self._root = self._execution.enter_plot(self._execution.chart.compiled(plot), arguments)
-        self._performer.end_microstep(None, ())
+        self._results.end_microstep(None, ())
         self._rest()
         return self._step(None, handled=True)
 
@@ -75,8 +77,7 @@ class Macrostep:
     def replace_plots(self, names: Collection[str], active: ActivePlots) -> Step:
         """Replace the running plots of these names, and run to completion; errors as for the function."""
         self._root = replace_plots(self._root, self._execution, names, active)
-        if self._performer.bound:
-            self._performer.end_microstep(None, ())
+        self._results.end_replacement()
         return self.react(None)
 
     def entry_messages(self) -> tuple[SendMessage, ...]:
@@ -85,34 +86,31 @@ class Macrostep:
             for index in frame.configuration.active:
                 node = frame.compiled.nodes[index]
                 self._performer.act(frame, node.name, [one for one in node.entry if isinstance(one, Send)])
-        return tuple(one for one in self._performer.output if isinstance(one, SendMessage))
+        return tuple(one for one in self._step(None, handled=False).output if isinstance(one, SendMessage))
 
     def leave(self) -> Step:
         """Exit all active states of all plots and return this last step."""
         return self._step(None, handled=False, left=True)
 
     def _step(self, event: Event | None, *, handled: bool, left: bool = False) -> Step:
-        done, execution = self._performer, self._execution
+        results, execution = self._results, self._execution
         if left or execution.finished:
             self._leave()
-            state = MachineState(None, done.serials, execution.finished)
+            state = MachineState(None, results.serials, execution.finished)
         else:
-            state = state_between(self._root.frozen(), done.serials)
-        return Step(
-            state, event, handled, tuple(done.microsteps), tuple(done.decisions), done.knowledge, tuple(done.output),
-            tuple(done.emitted), tuple(done.errors), execution.outputs, tuple(done.bugs),
-        )  # fmt: skip
+            state = state_between(self._root.frozen(), results.serials)
+        return results.step(state, event, handled=handled, outputs=execution.outputs)
 
     def _leave(self) -> None:
         self._execution.leave_plot(self._root)
-        self._performer.end_microstep(None, ())
-        for event in self._performer.internal:
+        self._results.end_microstep(None, ())
+        for event in self._results.internal:
             if event.name in ERRORS:
                 self._unhandled(event)
 
     def _rest(self) -> None:
         """Take transitions without trigger, then handle internal events, until neither is left."""
-        internal = self._performer.internal
+        internal = self._results.internal
         while not self._execution.finished:
             if self._take_in(self._root.that(_is_spontaneous), None, None):
                 continue
@@ -138,7 +136,7 @@ class Macrostep:
         ended = any(isinstance(plot.states.get(name), FinalState) for name in inner.configuration.names)
         if ended and event.name in plot.emits:
             state = frame.prefix + state
-            self._performer.errors.append(f"state '{state}' does not handle '{event.name}' of plot '{plot.name}'")
+            self._results.add_error(f"state '{state}' does not handle '{event.name}' of plot '{plot.name}'")
 
     def _unhandled(self, error: Event) -> None:
         """Record an error event that no transition handles.
@@ -148,9 +146,11 @@ class Macrostep:
         # A chart may itself fire an `error` event without the attribute `reason`.
         reason = str(error.attributes.get("reason", "the chart fired 'error' without a reason"))
         if error.name == EXECUTION_ERROR or any(one.compiled.scxml for one in self._root.that(_is_frame(error.frame))):
-            self._performer.output.append(Note(error.name, reason))
+            self._results.put(Note(error.name, reason))
+        elif error.name == PROGRAMMING_ERROR:
+            self._results.add_bug(reason)
         else:
-            (self._performer.bugs if error.name == PROGRAMMING_ERROR else self._performer.errors).append(reason)
+            self._results.add_error(reason)
 
     # -- one event ---------------------------------------------------------------------------------------
 
@@ -216,11 +216,11 @@ class Macrostep:
         kept = bool(choice.keeps) and self._keep(frame, choice.keeps, event)
         if not choice.parts:
             return kept
-        if len(self._performer.microsteps) >= MAX_MICROSTEPS:
+        if len(self._results.microsteps) >= MAX_MICROSTEPS:
             raise self._runaway()
         self._execution.take([(frame, choice)], [*zip(repeat(frame), choice.parts, strict=False)])
         taken = choice.taken_in(frame.compiled, frame.prefix) if frame.prefix else choice.taken
-        self._performer.end_microstep(event, taken)
+        self._results.end_microstep(event, taken)
         return True
 
     def _take_together(self, trigger: Trigger, event: Event | None) -> bool:
@@ -229,7 +229,7 @@ class Macrostep:
         kept = [self._keep(one.frame, (one.frame.compiled.nodes[one.edge.source].name,), event) for one in late]
         if not taken:
             return any(kept)
-        if len(self._performer.microsteps) >= MAX_MICROSTEPS:
+        if len(self._results.microsteps) >= MAX_MICROSTEPS:
             raise self._runaway()
         by_frame: dict[Frame, list[TransitionEdge]] = {}
         for one in taken:
@@ -238,11 +238,11 @@ class Macrostep:
         parts = [(one.frame, _part_of(one, reactions[one.frame])) for one in taken]
         reports = tuple([report(one.edge, one.frame.compiled, one.frame.prefix) for one in taken])
         self._execution.take([*reactions.items()], parts)
-        self._performer.end_microstep(event, reports)
+        self._results.end_microstep(event, reports)
         return True
 
     def _runaway(self) -> RunawayError:
-        trail = [path for micro in self._performer.microsteps[-6:] for path in micro.entered]
+        trail = [path for micro in self._results.microsteps[-6:] for path in micro.entered]
         return RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round", trail)
 
     # -- guards ------------------------------------------------------------------------------------------
@@ -281,7 +281,9 @@ class Macrostep:
         waiting = before.waiting - {frame.compiled.index[state]}
         frame.configuration = configuration_of(frame.compiled, before.active, waiting, before.history)
         own = frame.activations[state]
-        self._performer.internal.extend(kept._replace(to=own, exact=True) for name, kept in frame.kept if name == state)
+        for name, kept in frame.kept:
+            if name == state:
+                self._results.fire(kept._replace(to=own, exact=True))
         frame.kept = tuple([one for one in frame.kept if one[0] != state])
         return True
 

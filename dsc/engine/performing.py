@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -14,8 +13,8 @@ from dsc.engine.binding import find_values
 from dsc.engine.frames import Frame
 from dsc.engine.machine_state import NOTHING
 from dsc.engine.situation import Situation
+from dsc.engine.step_builder import StepBuilder
 from dsc.engine.tables import CompiledPlot, StateNode, TransitionEdge
-from dsc.engine.taken import Taken
 from dsc.events import AFTER, AT_LEAST, ERROR, EVERY, EXECUTION_ERROR, PROGRAMMING_ERROR, Event
 from dsc.model.actions import (
     Assign,
@@ -57,42 +56,20 @@ SHORTEST_PERIOD = 0.001
 
 
 class Performer:
-    """Executor of actions; collects the results that the step returns.
+    """Executor of actions.
 
     Attributes:
         situation: the knowledge that conditions and terms read.
+        results: collects what the actions do.
         event: the current event, whose attributes the actions read.
-        serials: the last assigned serial number.
-        internal: pending internal events, oldest first.
-        exited, entered, bound: paths of states and bound plots of the current microstep.
     """
 
-    __slots__ = (
-        "bound", "bugs", "decisions", "emitted", "entered", "errors", "event", "exited", "internal", "knowledge",
-        "microsteps", "output", "serials", "situation",
-    )  # fmt: skip
+    __slots__ = ("event", "results", "situation")
 
-    def __init__(self, situation: Situation, serials: int) -> None:
+    def __init__(self, situation: Situation, results: StepBuilder) -> None:
         self.situation = situation
+        self.results = results
         self.event: Event | None = None
-        self.serials = serials
-        self.internal: deque[Event] = deque()
-        self.microsteps: list[steps.Microstep] = []
-        self.decisions: list[steps.DecisionMade] = []
-        self.output: list[steps.Output] = []
-        self.emitted: list[Event] = []
-        self.errors: list[str] = []
-        self.bugs: list[str] = []
-        self.knowledge = steps.NO_CHANGE
-        self.exited: list[str] = []
-        self.entered: list[str] = []
-        self.bound: list[steps.PlotBound] = []
-
-    def end_microstep(self, event: Event | None, taken: tuple[Taken, ...]) -> None:
-        """Record a microstep with all exits, entries and bindings since the previous microstep."""
-        bound = tuple(self.bound)
-        self.microsteps.append(steps.Microstep(event, taken, tuple(self.exited), tuple(self.entered), bound))
-        self.exited, self.entered, self.bound = [], [], []
 
     def fail(self, frame: Frame, place: str, error: InputError) -> None:
         """Fire an error event in the plot after a failed evaluation; for an exception of user code, another event."""
@@ -100,7 +77,7 @@ class Performer:
         if isinstance(error, UserCodeError) and not frame.compiled.scxml:
             name = PROGRAMMING_ERROR
             _LOG.error("%s: %s\n%s", place, error, whole_traceback(error))
-        self.internal.append(Event(name, {"reason": f"{place}: {error}"}, frame=frame.serial))
+        self.results.fire(Event(name, {"reason": f"{place}: {error}"}, frame=frame.serial))
 
     # -- values ------------------------------------------------------------------------------------------
 
@@ -150,7 +127,7 @@ class Performer:
                 if isinstance(action, Internal):
                     self._perform(frame, state, action)
                 else:
-                    self.output.append(self._output_of(frame, state, action, activation, number))
+                    self.results.put(self._output_of(frame, state, action, activation, number))
             except InputError as error:
                 self.fail(frame, f"{frame.prefix}{state}", error)
                 if frame.compiled.scxml or isinstance(action, Bind):  # later actions read what it binds
@@ -173,7 +150,7 @@ class Performer:
         except InputError as error:
             self.fail(frame, f"{frame.prefix}{node.name}", error)
         else:
-            self.output.append(steps.StartTimer(activation, index, delay, event))
+            self.results.put(steps.StartTimer(activation, index, delay, event))
 
     def _output_of(
         self, frame: Frame, state: str, action: ExternalAction, activation: int, number: int
@@ -218,8 +195,7 @@ class Performer:
                     raise InputError(f"a transition of this step ended what was found for {', '.join(names)}")
                 _set_variables(frame, dict(found))
             case Tell(tell=effect):
-                told = self.situation.tell(effect, self.bindings(frame))
-                self.knowledge = self.knowledge.then(told)
+                self.results.tell(self.situation.tell(effect, self.bindings(frame)))
             case Emit():
                 attributes = self.values(frame, action.arguments)
                 if action.delay is None:
@@ -227,10 +203,10 @@ class Performer:
                 else:
                     self._emit_later(frame, action, action.delay, attributes)
             case Withdraw(withdraw=term):
-                self.output.append(steps.Revoke(frame.serial, str(self.value(frame, term))))
+                self.results.put(steps.Revoke(frame.serial, str(self.value(frame, term))))
             case Log(log=parts, label=label):
                 text = "".join(_shown(self.value(frame, part)) for part in parts)
-                self.output.append(steps.Note(label, text))
+                self.results.put(steps.Note(label, text))
             case Choose():
                 for inner in action.then if self._chooses(frame, state, action) else action.otherwise:
                     self._perform(frame, state, inner)
@@ -247,11 +223,10 @@ class Performer:
     def _emit_later(self, frame: Frame, action: Emit, delay: TermField, attributes: Mapping[str, Any]) -> None:
         name = "" if action.id is None else str(self.value(frame, action.id))
         if action.into is not None:
-            self.serials += 1
-            name = f"{action.emit}.{self.serials}"
+            name = f"{action.emit}.{self.results.number()}"
             frame.variables = {**frame.variables, action.into: name}
         event = Event(action.emit, attributes, frame=frame.serial)
-        self.output.append(steps.SendLater(event, _delay_of(self.value(frame, delay)), name))
+        self.results.put(steps.SendLater(event, _delay_of(self.value(frame, delay)), name))
 
     def emit(self, frame: Frame, name: str, attributes: Mapping[str, Any]) -> None:
         """Fire an event in a plot; an outcome of the plot is an event of its host, or of the run.
@@ -264,11 +239,11 @@ class Performer:
             attributes = dict(attributes)
             check_all("the attribute '{name}' of '{owner}'", name, attributes, types, frame.compiled.records)
         if name not in frame.compiled.plot.emits:
-            self.internal.append(Event(name, attributes, frame=frame.serial))
+            self.results.fire(Event(name, attributes, frame=frame.serial))
         elif frame.parent is None:
-            self.emitted.append(Event(name, attributes))
+            self.results.emit(Event(name, attributes))
         elif not frame.gone:
-            self.internal.append(Event(name, attributes, to=frame.parent.activations[frame.host]))
+            self.results.fire(Event(name, attributes, to=frame.parent.activations[frame.host]))
         # Otherwise another transition of this microstep exited the host, and the outcome is dropped.
 
 
