@@ -33,7 +33,7 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
             raise unknown_in(profile, "components", "component", name, by_name)
     values = {name: _configured(component, profile) for name, component in by_name.items()}
     for name, component in by_name.items():
-        component.configuration.replace(values[name])
+        component.parameter_values.replace(values[name])
     if profile is not None:
         try:
             choose_sources(by_name.values(), profile.wiring)
@@ -53,7 +53,7 @@ def _configured(component: Component, profile: Profile | None) -> dict[str, Valu
             error.place = None if profile is None else profile.place(("components", component.name, parameter))
             raise
     try:
-        return component.configuration.after(settings)
+        return component.parameter_values.after(settings)
     except InputError as error:
         error.place = None if profile is None else profile.place(("components", component.name))
         raise

@@ -9,7 +9,7 @@ from domains.arm_skills.kinematics import Chain
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.components.declarations import Parameter
-from dsc.components.parameters import Configuration, parameters_of
+from dsc.components.parameters import ParameterValues, parameters_of
 from dsc.outcomes import Outcome
 from dsc.skills import skill
 from knowledge_base.errors import InputError, UnknownNameError
@@ -64,8 +64,8 @@ class Arm(Component):
             declared[f"{joint.name}_most"] = Parameter("number", default=joint.most, changed_by="profile")
             declared[f"{joint.name}_speed"] = Parameter("number", default=joint.speed, least=1.0, changed_by="profile")
         relations = tuple([f"(< ?{joint.name}_least ?{joint.name}_most)" for joint in chain.joints])
-        self.configuration = Configuration(self.name, parameters_of(declared, relations))
-        self.parameters = self.configuration.parameters
+        self.parameter_values = ParameterValues(self.name, parameters_of(declared, relations))
+        self.parameters = self.parameter_values.parameters
 
     @skill
     async def move_joints(self, call: SkillCall, targets: dict[str, float]) -> Reached | OutOfRange | Blocked:

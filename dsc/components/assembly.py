@@ -13,7 +13,7 @@ from pathlib import Path
 from dsc.components.component import ALWAYS, Component
 from dsc.components.hooks import contained
 from dsc.components.life_cycle import NEUTRAL, LifeCycle
-from dsc.components.parameters import Configuration, Parameters
+from dsc.components.parameters import Parameters, ParameterValues
 from dsc.components.ports import EventActivations
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
@@ -146,7 +146,7 @@ def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
 
 
 _OF_EVERY_COMPONENT = {
-    "configuration": Configuration,
+    "parameter_values": ParameterValues,
     "parameters": Parameters,
     "life": LifeCycle,
     "activations": EventActivations,

@@ -15,7 +15,7 @@ from dsc.calls import Ended, SkillCall, Status
 from dsc.components.demands import Demand, read_demands
 from dsc.components.interface import Interface
 from dsc.components.life_cycle import NEUTRAL, Life, LifeCycle
-from dsc.components.parameters import Configuration, Parameters
+from dsc.components.parameters import Parameters, ParameterValues
 from dsc.components.ports import TAKES, EventActivations, messages, plain_methods
 from dsc.components.program_use import program_use
 from dsc.components.requirement import Requirement
@@ -66,7 +66,7 @@ class ComponentHooks:
     period: float | None = None
 
     parameters: Parameters
-    configuration: Configuration
+    parameter_values: ParameterValues
     life: LifeCycle
 
     async def start(self) -> None:
@@ -97,7 +97,7 @@ class ComponentHooks:
             UnknownNameError: the component declares parameters, and `parameter` is not among them.
             InputError: the value violates its declaration or a relation.
         """
-        self.configuration.set(parameter, value)
+        self.parameter_values.set(parameter, value)
 
     async def switch(self, mode: str) -> None:
         """Enter a mode (`neutral` when idle), for the *state* port; override to react."""
@@ -188,8 +188,8 @@ class Component(ComponentHooks, RestartHooks):
 
     def __init__(self, name: str | None = None) -> None:
         self.name = name or self.name or type(self).__name__.lower()
-        self.configuration = Configuration(self.name, self.parameter_class)
-        self.parameters = self.configuration.parameters
+        self.parameter_values = ParameterValues(self.name, self.parameter_class)
+        self.parameters = self.parameter_values.parameters
         self.life = LifeCycle(self)
         self.activations = EventActivations()
         self.turns = Turns()
@@ -295,7 +295,7 @@ class Component(ComponentHooks, RestartHooks):
                 f"component '{self.name}' has no skill '{skill_name}'", found=skill_name, valid=signatures
             )
         check_arguments(signature, arguments)
-        self.configuration.require_bound()
+        self.parameter_values.require_bound()
         body = self._functions.get(skill_name) or getattr(self, skill_name)
         declared: Declared = getattr(body, DECLARED)
         return declared.execute(self, body, call, declared.build(arguments))
@@ -310,7 +310,7 @@ class Component(ComponentHooks, RestartHooks):
             UnknownNameError: the component declares parameters, and a name is not among them.
             InputError: a value violates its declaration or a relation; then no value is set.
         """
-        with self.configuration.as_one_set(values):
+        with self.parameter_values.as_one_set(values):
             for parameter, value in values.items():
                 await self.configure(parameter, value)
 

@@ -161,7 +161,7 @@ def _value(name: str, parameters: Parameters) -> Value:
 _TAKEN = frozenset({*dir(Parameters)})
 
 
-class Configuration:
+class ParameterValues:
     """The values of one component's parameters, and the operations that set them.
 
     Args:

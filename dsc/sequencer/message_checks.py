@@ -320,7 +320,7 @@ def checked_setting(
     require_text(owner, "the name of a component or plot")
     require_text(name, "a parameter's name")
     if owner in components:
-        components[owner].configuration.check(name, value, "operator")
+        components[owner].parameter_values.check(name, value, "operator")
     elif owner in library:
         library.plot(owner).with_default(name, value, "operator")
     else:

@@ -20,7 +20,7 @@ from dsc.components.component import Component
 from dsc.components.frames import encoded
 from dsc.components.hooks import GRACE, abandon, cancel_once, contained, reason_of
 from dsc.components.life_cycle import Life
-from dsc.components.parameters import Configuration
+from dsc.components.parameters import ParameterValues
 from dsc.components.requirement import USUAL
 from dsc.components.turns import turn_of
 from dsc.errors import NotAliveError, PreemptedError, ProgrammingError
@@ -166,7 +166,7 @@ class Host:
             "pushes": pushes,
             "requires": {name: requirement_form(port) for name, port in self._component.requirements.items()},
             "concurrent": self._component.concurrent,
-            "parameters": parameters_form(self._component.configuration),
+            "parameters": parameters_form(self._component.parameter_values),
             "domain": _domain_of(self._component),
             "plots": [plot.to_form() for plot in self._component.plots()],
             "condition": self._condition.newest,
@@ -174,8 +174,8 @@ class Host:
 
     async def _bind(self, _: str, said: dict[str, Any]) -> None:
         """Set parameters by the profile of a client, before the start of the component."""
-        configuration = self._component.configuration
-        configuration.replace(configuration.after(said))
+        values = self._component.parameter_values
+        values.replace(values.after(said))
 
     async def _come_alive(self, _: str, __: Any) -> dict[str, Any]:
         await self._component.life.come_alive()
@@ -237,10 +237,10 @@ class HostedWires:
             self._component.requirements[port].redirect(USUAL)
 
 
-def parameters_form(configuration: Configuration) -> dict[str, Any]:
+def parameters_form(values: ParameterValues) -> dict[str, Any]:
     """Return declarations, relations and values of parameters as plain data."""
-    declared = {name: asdict(parameter) for name, parameter in configuration.declared.items()}
-    return {"declared": declared, "relations": configuration.relations, "values": dict(configuration.parameters)}
+    declared = {name: asdict(parameter) for name, parameter in values.declared.items()}
+    return {"declared": declared, "relations": values.relations, "values": dict(values.parameters)}
 
 
 def _domain_of(component: Component) -> str | None:

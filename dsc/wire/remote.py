@@ -22,7 +22,7 @@ from dsc.components.component import Component
 from dsc.components.declarations import Parameter
 from dsc.components.interface import Interface
 from dsc.components.life_cycle import Life
-from dsc.components.parameters import Configuration, Parameters, parameters_of
+from dsc.components.parameters import Parameters, ParameterValues, parameters_of
 from dsc.errors import NoAnswerError, PreemptedError, ProgrammingError, RefusedError
 from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
@@ -127,9 +127,9 @@ class RemoteComponent(Component):
         """Declare the parameters that the component has at its host, with their present values."""
         declared = {name: _parameter_of(one) for name, one in form["declared"].items()}
         kind = parameters_of(declared, tuple(form["relations"])) if declared else Parameters
-        self.configuration = Configuration(self.name, kind)
-        self.configuration.replace(form["values"])
-        self.parameters = self.configuration.parameters
+        self.parameter_values = ParameterValues(self.name, kind)
+        self.parameter_values.replace(form["values"])
+        self.parameters = self.parameter_values.parameters
         self._values_there = dict(form["values"])
 
     def domain_fragment(self) -> str | None:
@@ -396,15 +396,15 @@ class RemoteComponent(Component):
             RefusedError: the component refuses the value.
         """
         with self._reverted():
-            self.configuration.set(parameter, value)
+            self.parameter_values.set(parameter, value)
             await self._ask("set", {"parameter": parameter, "value": value})
 
     async def configure_all(self, values: Mapping[str, Any]) -> None:
         """Set parameters at the host as one set; raise as `configure`."""
         with self._reverted():
-            with self.configuration.as_one_set(values):
+            with self.parameter_values.as_one_set(values):
                 for parameter, value in values.items():
-                    self.configuration.set(parameter, value)
+                    self.parameter_values.set(parameter, value)
             await self._ask("set all", dict(values))
 
     @contextmanager
@@ -414,7 +414,7 @@ class RemoteComponent(Component):
         try:
             yield
         except BaseException:
-            self.configuration.replace(before)
+            self.parameter_values.replace(before)
             raise
 
     async def change_mode(self, mode: str) -> None:

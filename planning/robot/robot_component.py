@@ -9,7 +9,7 @@ from typing import Any
 
 from dsc.calls import SkillCall
 from dsc.components.component import Component
-from dsc.components.parameters import Configuration, parameters_of
+from dsc.components.parameters import ParameterValues, parameters_of
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.steps import NO_PLAN_KINDS
 from dsc.errors import ProgrammingError, SkillError
@@ -72,8 +72,8 @@ class RobotComponent(Component):
         super().__init__(name)
         self._robot = robot
         plots = own_plots(robot.library)
-        self.configuration = Configuration(name, parameters_of(defaults_of(plots), ()))
-        self.parameters = self.configuration.parameters
+        self.parameter_values = ParameterValues(name, parameters_of(defaults_of(plots), ()))
+        self.parameters = self.parameter_values.parameters
         self._shared = None if private else shared_domain(name, robot.domain)
         self._actions = {} if self._shared is None else plots_of_actions(robot)
         own = {plot.name: plot_signature(name, plot, "sense") for plot in own_plots(robot.library)}
@@ -98,7 +98,7 @@ class RobotComponent(Component):
 
     async def configure(self, parameter: str, value: object) -> None:
         """Set the default of a plot's parameter, also for later entries in present runs; raise as `Component`."""
-        declared = self.configuration.declared
+        declared = self.parameter_values.declared
         if parameter in declared:
             self._set_default(parameter, declared[parameter].default if value is None else value)
         await super().configure(parameter, value)
