@@ -175,10 +175,11 @@ def _effect(value: Any) -> Effect:
 _texts: IdentityCache[Expression | Effect, str] = IdentityCache()
 
 
-def _text_out(part: Expression | Effect) -> str:
+def text_of(part: Expression | Effect) -> str:
     """Return the text of a condition or effect.
 
-    The text is cached by the identity of the object, because a plot and its expansion share conditions.
+    The text is cached by the identity of the object, because a plot and its expansion share conditions, and so do
+    successive plans.
     """
     return _texts.find(part, None) or _texts.keep(part, None, to_text(part))
 
@@ -258,7 +259,7 @@ Setting = Annotated[Value, _Text(_setting, _setting_out, {"type": ["string", "nu
 
 ConditionField = Annotated[
     Expression,
-    _Text(_condition, _text_out, {"type": "string", "description": "a condition, e.g. (and (on ?o table) (cup ?o))"}),
+    _Text(_condition, text_of, {"type": "string", "description": "a condition, e.g. (and (on ?o table) (cup ?o))"}),
 ]
 """Field type of a condition; each free variable must be a chart variable, a parameter or an event attribute."""
 
@@ -279,7 +280,7 @@ EffectField = Annotated[
     Effect,
     _Text(
         _effect,
-        _text_out,
+        text_of,
         {
             "type": ["string", "array"],
             "items": {"type": "string"},

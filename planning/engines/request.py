@@ -1,7 +1,7 @@
 """The request to a worker: a problem as a line of JSON, which lists each fact once and refers to facts by number.
 
 Serialization must be fast, since a robot may wait. Successive problems share most ground actions, so the text of each
-action is cached with gaps for the numbers of its facts.
+action is kept on it, with gaps for the numbers of its facts.
 
 Keys of the JSON object:
 
@@ -21,7 +21,7 @@ from itertools import chain
 from typing import Any
 
 from knowledge_base.facts import Fact
-from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.owner_cache import cache_on_owner
 from planning.model.ground_action import ActionSpan, GroundAction
 from planning.model.plan import PlanStep
 from planning.model.problem import Problem
@@ -31,9 +31,10 @@ _Row = tuple[str, tuple[Fact, ...]]
 """The text of an action with gaps, and the facts whose numbers fill the gaps."""
 
 
+@cache_on_owner
 def written(problem: Problem) -> bytes:
-    """Return the problem as a line of JSON; cached, since all engines of a race receive an equal request."""
-    return _written.find(problem, None) or _written.keep(problem, None, _line(problem))
+    """Return the problem as a line of JSON; kept on it, since all engines of a race receive an equal request."""
+    return _line(problem)
 
 
 def read(request: Mapping[str, Any]) -> Problem:
@@ -70,7 +71,7 @@ def read(request: Mapping[str, Any]) -> Problem:
 
 
 def _line(problem: Problem) -> bytes:
-    rows = [_rows.find(action, None) or _rows.keep(action, None, _row(action)) for action in problem.actions]
+    rows = list(map(_row, problem.actions))
     before = len(problem.init) + len(problem.goal)
     mentioned = [*problem.init, *problem.goal, *chain.from_iterable([facts for _, facts in rows])]
     places = list(map(id, mentioned))  # ids compare faster than facts; `mentioned` keeps the ids unique
@@ -95,6 +96,7 @@ def _line(problem: Problem) -> bytes:
     return f'{json.dumps(rest)[:-1]}, "actions": [{actions}]}}\n'.encode()
 
 
+@cache_on_owner
 def _row(action: GroundAction) -> _Row:
     span = action.span
     later = () if span is None else (span.over_all, span.end, span.adds, span.deletes)
@@ -151,7 +153,3 @@ def _bound_from_json(data: Sequence[Any]) -> NumericBound:
 def _fluent(data: Any) -> Fact:
     name, *args = data["fluent"]
     return Fact(name, tuple(args))
-
-
-_written: IdentityCache[Problem, bytes] = IdentityCache(size=2)
-_rows: IdentityCache[GroundAction, _Row] = IdentityCache(size=20_000)

@@ -10,9 +10,9 @@ from dsc.dynamic.rule_expansion import NO_CANDIDATE_FITS
 from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.effect import effect_conditions
 from knowledge_base.language.syntax.expression import Expression, Not
-from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.rewriting import names_of
 from knowledge_base.language.syntax.text import to_text
+from knowledge_base.owner_cache import cache_on_owner
 from planning.execution.attempt import EscalationStep, Failure
 from planning.execution.outcomes import GaveUp, GoalHolds, PlotFound, Repaired, Replan
 from planning.execution.plan_ends import shortest_end
@@ -243,17 +243,15 @@ def _as_missing(fact: Expression) -> str:
 
 def situation(domain: PlanningDomain, world: View, goal: Expression) -> str:
     """Return a digest of the facts, numbers and objects on which the problem of reaching the goal depends."""
-    names = _asked.find(goal, domain) or _asked.keep(goal, domain, _asked_about(goal, domain))
+    names = _asked_about(domain, goal)
     facts = sorted(str(fact) for fact in world.facts() if fact.predicate in names)
     numbers = sorted((str(number), value) for number, value in world.values().items() if number.predicate in names)
     told = repr((sorted(world.nodes().items()), facts, numbers))
     return hashlib.blake2b(told.encode(), digest_size=16).hexdigest()
 
 
-_asked: IdentityCache[Expression, frozenset[str]] = IdentityCache(size=8)
-
-
-def _asked_about(goal: Expression, domain: PlanningDomain) -> frozenset[str]:
+@cache_on_owner
+def _asked_about(domain: PlanningDomain, goal: Expression) -> frozenset[str]:
     actions = relevant(goal, None, domain.actions.values()).actions
     asked = [goal, *(action.precondition for action in actions)]
     asked += [condition for action in actions for condition in effect_conditions(action.effect)]

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from dsc.model.language import text_of
 from knowledge_base.language.syntax.expression import Expression
-from knowledge_base.language.syntax.identity_cache import IdentityCache
-from knowledge_base.language.syntax.text import to_text
 from planning.ordering.partial_order import PRESENT
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ class PlanRecords:
             return
         goal = len(order.steps) + 1
         kept = [link for link in order.links if (link.provider, link.user) != (PRESENT, goal)]
-        links = sorted([link.user, link.provider, _text(link.fact)] for link in kept)
+        links = sorted([link.user, link.provider, text_of(link.fact)] for link in kept)
         self._trace.record(
             "plan.ordered",
             plot=name,
@@ -94,7 +93,7 @@ class PlanRecords:
 
     def unobserved(self, name: str, step: PlanStep, facts: Iterable[Expression]) -> None:
         """Record the expected effects of a step that do not hold some time after its end."""
-        self._trace.record("plan.unobserved", plot=name, step=str(step), facts=[_text(fact) for fact in facts])
+        self._trace.record("plan.unobserved", plot=name, step=str(step), facts=[text_of(fact) for fact in facts])
 
     def failed(self, name: str, steps: Iterable[PlanStep], why: str) -> None:
         """Record that one of the running steps failed, and that a new plan is needed."""
@@ -127,14 +126,6 @@ class PlanRecords:
     def wrong(self, step: PlanStep | None, reason: str, engine: str) -> None:
         """Record a plan that fails at a step, or at the goal if `step` is `None`, in an unchanged world."""
         self._trace.record("plan.wrong", step=None if step is None else str(step), reason=reason, engine=engine)
-
-
-_texts: IdentityCache[Expression, str] = IdentityCache()
-
-
-def _text(fact: Expression) -> str:
-    """Return the condition as text, cached by identity because successive plans share most of their conditions."""
-    return _texts.find(fact, None) or _texts.keep(fact, None, to_text(fact))
 
 
 def why_broken(broken: Mapping[str, Any]) -> str:

@@ -38,8 +38,8 @@ from knowledge_base.language.syntax.expression import (
     is_equality,
     substitute,
 )
-from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.rewriting import names_of
+from knowledge_base.owner_cache import cache_on_owner
 from planning.model.domain import GroundStep, PlanningDomain
 from planning.model.plan import PlanStep
 from planning.problem.expressions import changed
@@ -341,18 +341,12 @@ class _Regressing:
     plain: _Plain | None
 
     @staticmethod
+    @cache_on_owner
     def of(step: GroundStep) -> _Regressing:
-        """Return the parts of a step; cached, since successive plans share most steps."""
-        known = _regressing.find(step, None)
-        if known is None:
-            needed, changes = dict.fromkeys(conjuncts(step.typed)), leaves(step.effect)
-            open_ = tuple(filter(_is_open, needed))
-            known = _Regressing(needed, open_, changes, changed(step.effect), _plain(changes))
-            _regressing.keep(step, None, known)
-        return known
-
-
-_regressing: IdentityCache[GroundStep, _Regressing] = IdentityCache(size=1024)
+        """Return the parts of a step; kept on it, since successive plans share most steps."""
+        needed, changes = dict.fromkeys(conjuncts(step.typed)), leaves(step.effect)
+        open_ = tuple(filter(_is_open, needed))
+        return _Regressing(needed, open_, changes, changed(step.effect), _plain(changes))
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,8 +30,8 @@ from knowledge_base.language.syntax.expression import (
     Term,
     substitute,
 )
-from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.rewriting import names_of
+from knowledge_base.owner_cache import cache_on_owner
 from planning.model.domain import PlanningAction, PlanningDomain
 from planning.model.plan import PlanStep
 from planning.problem.expressions import changed
@@ -118,7 +118,7 @@ _MOST_CARRIED = 1024  # steps; a plan for 50 items has about 130 steps
 _CONFIRM = ActionPlot.model_fields["confirm"].default
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # without slots, see `cache_on_owner`
 class CarriedStep:
     """A step of a plan, with everything that its states need.
 
@@ -161,6 +161,7 @@ class Carrier:
     def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule]) -> None:
         self._domain = domain
         self._library = library.copy()
+        self._plots = library.plots
         self.rules = tuple(rules)
         self._usage: dict[tuple[str, ...], Usage] = {}  # most steps share their candidates
         self._carried: dict[tuple[PlanStep, tuple[str, ...]], CarriedStep] = {}
@@ -168,14 +169,15 @@ class Carrier:
     @staticmethod
     def of(domain: PlanningDomain, library: Library, rules: Sequence[Rule]) -> Carrier:
         """Return the carrier of the last plan if rules and experience are equal, since plans share most steps."""
-        known = _carriers.find(domain, library.plots)
-        if known is None or not known.suits(library, rules):
-            known = _carriers.keep(domain, library.plots, Carrier(domain, library, rules))
-        return known
+        last = _last_carrier(domain)
+        if not last or not last[0].suits(library, rules):
+            last[:] = [Carrier(domain, library, rules)]
+        return last[0]
 
     def suits(self, library: Library, rules: Sequence[Rule]) -> bool:
-        """Return whether rules and experience equal those of this carrier."""
-        return self.rules == tuple(rules) and self._library.experience.tries is library.experience.tries
+        """Return whether this carrier has these plots, rules and experience."""
+        same = self._plots is library.plots and self._library.experience.tries is library.experience.tries
+        return same and self.rules == tuple(rules)
 
     def carried(self, step: PlanStep) -> CarriedStep:
         """Return the step as a dynamic state whose candidates implement its action and fit its arguments.
@@ -221,7 +223,10 @@ def _choice(candidates: Collection[ActionPlot], experience: Experience) -> str |
     return "learned" if any(experience.of(plot.implements or "", plot.name, ()) for plot in candidates) else None
 
 
-_carriers: IdentityCache[PlanningDomain, Carrier] = IdentityCache(size=8)
+@cache_on_owner
+def _last_carrier(domain: PlanningDomain) -> list[Carrier]:  # noqa: ARG001  its owner
+    """Return the list with the carrier of the domain's last plan; empty before the first plan."""
+    return []
 
 
 def sketched(step: PlanStep, domain: PlanningDomain) -> CarriedStep:

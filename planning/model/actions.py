@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _Form = TypeVar("_Form", Expression, Effect)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # without slots, see `cache_on_owner`
 class PlanningAction:
     """A PDDL action. A planning action with arguments is a `PlanStep`.
 

@@ -52,7 +52,7 @@ _MOST_GROUND = 1024  # steps; a plan for 50 items has about 130 steps
 __all__ = ["Duration", "PlanningAction", "PlanningDomain"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # without slots, see `cache_on_owner`
 class GroundStep:
     """Precondition and effect of a plan step, with the step's arguments instead of parameters.
 
@@ -67,7 +67,7 @@ class GroundStep:
     effect: Effect
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # without slots, see `cache_on_owner`
 class PlanningDomain:
     """Planning actions and axioms over a schema.
 

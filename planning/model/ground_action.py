@@ -53,7 +53,7 @@ class ActionSpan:
     assignments: tuple[Assignment, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # without slots, see `cache_on_owner`
 class GroundAction:
     """One alternative of a plan step.
 

@@ -47,7 +47,7 @@ class WrongPlan:
     reason: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True)  # without slots, see `cache_on_owner`
 class Problem:
     """The input of an engine, made by `planning.problem.construction.build_problem`.
 

@@ -10,7 +10,7 @@ from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.evaluation.lookups import conjuncts
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, NumericEffect, effect_leaves, effect_parts
 from knowledge_base.language.syntax.expression import Atom, Constant, Expression, Not, Variable
-from knowledge_base.language.syntax.identity_cache import IdentityCache
+from knowledge_base.owner_cache import cache_on_owner
 from planning.model.domain import GroundStep, PlanningAction
 from planning.model.plan import PlanStep
 from planning.problem.conditions import Literal
@@ -33,14 +33,11 @@ class KnownStep:
     plain: bool
 
     @staticmethod
+    @cache_on_owner
     def of(ground: GroundStep, step: PlanStep, action: PlanningAction, schema: Vocabulary) -> KnownStep:
-        """Return the needs and changes; cached, since successive plans share most steps."""
-        return _known.find(ground, schema) or _known.keep(ground, schema, KnownStep._of(ground, step, action, schema))
-
-    @staticmethod
-    def _of(ground: GroundStep, step: PlanStep, action: PlanningAction, schema: Vocabulary) -> KnownStep:
+        """Return the needs and changes; kept on the ground step, since successive plans share most steps."""
         needs = tuple([(part, literal_of(part, schema)) for part in dict.fromkeys(conjuncts(ground.condition))])
-        pattern = _patterns.find(action, schema) or _patterns.keep(action, schema, _Pattern.of(action, schema))
+        pattern = _Pattern.of(action, schema)
         if pattern.changes is None:
             return KnownStep(needs, None, {}, plain=False)
         args = dict(zip([p.name for p in action.parameters], step.args, strict=True))
@@ -59,6 +56,7 @@ class _Pattern:
     changes: tuple[tuple[str, tuple[str, ...], bool], ...] | None
 
     @staticmethod
+    @cache_on_owner
     def of(action: PlanningAction, schema: Vocabulary) -> _Pattern:
         """Return the pattern; its changes are `None` unless the action only adds and deletes facts unconditionally."""
         types = {parameter.name: parameter.types for parameter in action.parameters}
@@ -71,10 +69,6 @@ class _Pattern:
             names = tuple([term.name for term in part.atom.args if isinstance(term, Variable)])
             changes.append((part.atom.predicate, names, isinstance(part, Add)))
         return _Pattern(tuple(changes) if action.timed is None else None)
-
-
-_known: IdentityCache[GroundStep, KnownStep] = IdentityCache(size=1024)
-_patterns: IdentityCache[PlanningAction, _Pattern] = IdentityCache(size=256)
 
 
 def changed_names(action: PlanningAction) -> Iterator[str]:

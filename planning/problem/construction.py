@@ -22,9 +22,9 @@ from knowledge_base.language.checking.check import check
 from knowledge_base.language.evaluation.evaluator import holds
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import Expression, Term
-from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.rewriting import names_of
 from knowledge_base.language.syntax.text import to_text
+from knowledge_base.owner_cache import cache_on_owner
 from knowledge_base.pddl.problem_text import Metric
 from planning.model.cancellable_work import WorkLimit
 from planning.model.domain import PlanningDomain
@@ -57,7 +57,7 @@ def build_problem(
 ) -> Problem:
     """Return the problem of reaching `goal` from `world`; `world` stays unchanged.
 
-    The `ProblemBuilder` of the domain is cached, and keeps ground actions for later problems.
+    The domain keeps its `ProblemBuilder`, which keeps ground actions for later problems.
 
     Args:
         domain: the planning domain.
@@ -74,8 +74,7 @@ def build_problem(
         UnsupportedActionError: a relevant action contains such a condition, or has too many alternatives.
         WorkLimitError: the limit has passed, e.g. with many objects and many parameters.
     """
-    builder = _builders.find(domain, None) or _builders.keep(domain, None, ProblemBuilder(domain))
-    return builder.build_problem(world, goal, metric, durations=durations, patience=patience)
+    return _builder(domain).build_problem(world, goal, metric, durations=durations, patience=patience)
 
 
 def check_goal(goal: Expression, world: World) -> None:
@@ -319,7 +318,9 @@ def _conjunction(goal: Residual, bookkeeping: list[Variant]) -> tuple[Leaf, ...]
             return ()
 
 
-_builders: IdentityCache[PlanningDomain, ProblemBuilder] = IdentityCache(size=8)
+@cache_on_owner
+def _builder(domain: PlanningDomain) -> ProblemBuilder:
+    return ProblemBuilder(domain)
 
 
 def said(numbering: Numbering, missing: int, goal: Expression) -> str:

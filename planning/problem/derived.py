@@ -23,8 +23,8 @@ from knowledge_base.language.syntax.expression import (
     Term,
     Variable,
 )
-from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.rewriting import names_of, with_atoms
+from knowledge_base.owner_cache import cache_on_owner
 from knowledge_base.world.derived import Definitions, type_test
 from knowledge_base.world.overlay import Overlay
 from planning.model.domain import PlanningDomain
@@ -33,13 +33,14 @@ from planning.problem.expressions import changed, rewritten
 _AXIOMS = "planners with axioms of their own, such as Fast Downward run by itself"
 
 
+@cache_on_owner
 def derivation(domain: PlanningDomain) -> Derivation:
-    """Return the derivation of a domain; cached by identity.
+    """Return the derivation of a domain; kept on it.
 
     Raises:
         SchemaError: a predicate depends on its own negation.
     """
-    return _known.find(domain, None) or _known.keep(domain, None, Derivation(domain))
+    return Derivation(domain)
 
 
 class Derivation:
@@ -169,9 +170,6 @@ class Settled:
 
 def _equal(term: Term, value: Value) -> Expression:
     return Comparison("=", term, Constant(value))
-
-
-_known: IdentityCache[PlanningDomain, Derivation] = IdentityCache(size=64)
 
 
 def _holds(fact: Fact, world: World) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from itertools import pairwise
+from operator import is_
 from pathlib import Path
 
 from dsc.components.component import Component
@@ -17,6 +18,7 @@ from dsc.skills import SkillSignature, signatures
 from dsc.validation import raise_findings, validate_library
 from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import require, require_able
+from knowledge_base.owner_cache import cache_on_owner
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.world.schema import Schema
 from planning.execution.planning_component import PlanningComponent
@@ -77,9 +79,10 @@ def _mixed_effects(action: str, library: Library) -> Iterator[Finding]:
             yield Finding(error, "effects-of-the-action", "say the same in all plots of an action")
 
 
-_sound: dict[tuple[int, ...], tuple[object, ...]] = {}
-"""Sound combinations, keyed by identity; references to the parts prevent that a new object has a used identity."""
-_MOST_SOUND = 16
+@cache_on_owner
+def _last_sound(domain: PlanningDomain) -> list[object]:  # noqa: ARG001  its owner
+    """Return the list of all parts of the domain's last sound robot; empty before the first one."""
+    return []
 
 
 def interfaces(components: Iterable[Component]) -> dict[str, Interface]:
@@ -107,15 +110,13 @@ def require_sound(
         for one in declared.values()
         for part in (one.parameters, one.modes, one.messages, one.requires, one.pushes)
     ]
-    parts = (domain, schema, *library, *skills, *declared, *shared)
-    key = tuple(map(id, parts))
-    if key in _sound:
+    parts = (schema, *library, *skills, *declared, *shared)
+    last = _last_sound(domain)
+    if len(last) == len(parts) and all(map(is_, last, parts)):
         return
     findings = validate_library(library, schema, skills, declared)
     raise_findings([*findings, *check_implementations(library, domain)])
-    if len(_sound) >= _MOST_SOUND:
-        _sound.clear()
-    _sound[key] = parts
+    last[:] = parts
 
 
 def require_parts(knowledge: object, planner: object, store: object) -> None:
