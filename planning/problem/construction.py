@@ -32,12 +32,11 @@ from planning.model.problem import Problem, UnsupportedActionError, UnsupportedG
 from planning.model.quantities import NumericBound
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, Some
 from planning.problem.derived import derivation
-from planning.problem.grounding import Variant
-from planning.problem.operators import OperatorCache, ignored, metric_of, numbered, things_of
+from planning.problem.operators import OperatorCache, ignored, metric_of, things_of
 from planning.problem.reduction import pruned, spared
 from planning.problem.relaxed_reachability import reachable
 from planning.problem.relevance import Relevant, refuse_unsupported, relevant
-from planning.problem.task import Assembly, Numbering, OperatorIndex, Task
+from planning.problem.task import Assembly, Numbering, OperatorIndex, Task, ground_operator
 from planning.problem.temporal import build_temporal_problem, durative
 
 # Names with blanks differ from every declared name.
@@ -265,15 +264,17 @@ def _with_conjunctive_goal(
 
     A plan contains bookkeeping actions only after the last real action, since a later action may falsify a disjunct.
     """
-    bookkeeping: list[Variant] = []
+    bookkeeping: list[_Bookkeeping] = []
     wanted = tuple(map(numbering.of, _conjunction(goal, bookkeeping)))
     if not bookkeeping:
         return ways, wanted
-    finish = Variant(None, (_ACTING,), (_ACTING.negated, _FINISHED))
-    closing = [Variant(None, (*way.condition, _FINISHED), way.effects) for way in bookkeeping]
     acting = numbering.of(_ACTING)
     real = [way._replace(needs=(*way.needs, acting)) for way in ways.all]
-    return OperatorIndex([*real, *(numbered(variant, numbering, 0.0) for variant in (finish, *closing))]), wanted
+    finish = ground_operator(None, (_ACTING,), (_ACTING.negated, _FINISHED), numbering, cost=0.0)
+    closing = [
+        ground_operator(None, (*choice, _FINISHED), (chosen,), numbering, cost=0.0) for choice, chosen in bookkeeping
+    ]
+    return OperatorIndex([*real, finish, *closing]), wanted
 
 
 def _without_decided_choices(task: Task, possible: Sequence[int]) -> Task:
@@ -303,7 +304,11 @@ def _is_choice(what: object) -> bool:
     return isinstance(what, Fact) and what.predicate == _ONE_OF
 
 
-def _conjunction(goal: Residual, bookkeeping: list[Variant]) -> tuple[Leaf, ...]:
+_Bookkeeping = tuple[tuple[Leaf, ...], Literal]
+"""The conjunction of one part of a disjunction, and the literal that is true after this part."""
+
+
+def _conjunction(goal: Residual, bookkeeping: list[_Bookkeeping]) -> tuple[Leaf, ...]:
     match goal:
         case Literal() | NumericBound():
             return (goal,)
@@ -312,7 +317,7 @@ def _conjunction(goal: Residual, bookkeeping: list[Variant]) -> tuple[Leaf, ...]
         case Some(parts):
             choices = [_conjunction(part, bookkeeping) for part in parts]
             chosen = Literal(Fact(_ONE_OF, (len(bookkeeping),)))
-            bookkeeping.extend(Variant(None, choice, (chosen,)) for choice in choices)
+            bookkeeping += [(choice, chosen) for choice in choices]
             return (chosen,)
         case _:
             return ()

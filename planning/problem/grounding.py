@@ -1,4 +1,4 @@
-"""Grounding: planning actions as joins over facts, and the variants of an action for given arguments."""
+"""Grounding: planning actions as joins over facts, and the ground operators of an action for given arguments."""
 
 from __future__ import annotations
 
@@ -26,34 +26,20 @@ from planning.problem.conditions import (
     every,
     negation,
 )
+from planning.problem.task import GroundOperator, Numbering, ground_operator
 
-_MOST_CONDITIONS = 6  # conditions of effects of one ground action; each doubles the number of variants
+_MOST_CONDITIONS = 6  # conditions of effects of one ground action; each doubles the number of operators
 _MOST_ALTERNATIVES = 64
 _AS_THEY_ARE = "planners that take ADL as it is, such as Fast Downward run by itself"
 
 
-@dataclass(frozen=True, slots=True)
-class Variant:
-    """One alternative of a ground action: a conjunction and unconditional effects.
-
-    Attributes:
-        step: the plan step; `None` for a bookkeeping action, which no plan shows.
-        condition: the literals and bounds that must hold before.
-        effects: the literals that become true, without contradictions.
-        assignments: the numeric changes, one for each fluent.
-    """
-
-    step: PlanStep | None
-    condition: tuple[Leaf, ...]
-    effects: tuple[Literal, ...]
-    assignments: tuple[Assignment, ...] = ()
-
-
-def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Grounder) -> Iterator[Variant]:
-    """Yield a variant for each alternative of the precondition and the conditional effects.
+def ground_operators(
+    action: PlanningAction, bindings: Mapping[str, Value], grounder: Grounder, numbering: Numbering
+) -> Iterator[GroundOperator]:
+    """Yield an operator of cost 1 for each alternative of the precondition and the conditional effects.
 
     Raises:
-        UnsupportedActionError: there are too many variants, or two effects change one number in different ways.
+        UnsupportedActionError: there are too many alternatives, or two effects change one number in different ways.
     """
     precondition = grounder.precondition(action.precondition, bindings)
     if precondition is False:
@@ -76,7 +62,7 @@ def variants(action: PlanningAction, bindings: Mapping[str, Value], grounder: Gr
         happening = {True, *chosen}
         changes = [e.what for e in effects if e.condition in happening]
         for condition in _bounded(every([precondition, *chosen]), action):
-            yield Variant(step, condition, _literals(changes), _assignments(changes, action))
+            yield ground_operator(step, condition, _literals(changes), numbering, _assignments(changes, action))
 
 
 def _eased(effects: list[GroundEffect]) -> list[GroundEffect]:

@@ -28,7 +28,7 @@ from planning.model.domain import PlanningAction
 from planning.model.plan import PlanStep
 from planning.model.quantities import Assignment, linear
 from planning.problem.conditions import Grounder
-from planning.problem.grounding import JoinRule, ReachedFacts, Variant, joined_atoms, variants
+from planning.problem.grounding import JoinRule, ReachedFacts, ground_operators, joined_atoms
 from planning.problem.relevance import Relevant
 from planning.problem.task import GroundOperator, Numbering, OperatorIndex
 
@@ -131,7 +131,7 @@ class OperatorCache:
             patience: the limit of the work; after an error the caller must discard the cache.
 
         Raises:
-            UnsupportedActionError: see `planning.problem.grounding.variants`.
+            UnsupportedActionError: see `planning.problem.grounding.ground_operators`.
             WorkLimitError: the limit has passed.
         """
         self._grounder = replace(self._grounder, patience=patience)
@@ -180,35 +180,16 @@ class OperatorCache:
             step = PlanStep(rule.action.name, tuple([str(full[p.name]) for p in rule.action.parameters]))
             if step not in self._done:
                 self._done.add(step)
-                for variant in variants(rule.action, full, self._grounder):
-                    for effect in variant.effects:
-                        if effect.positive:
-                            self._meet(effect.fact.predicate, [effect.fact.args])
-                    yield self._way(variant)
-
-    def _way(self, variant: Variant) -> GroundOperator:
-        cost = 1.0 if self._costs is None else self._costs.cost(variant.assignments)
-        self._found_so_far += 1
-        return numbered(variant, self.numbering, cost, self._found_so_far)
+                for way in ground_operators(rule.action, full, self._grounder, self.numbering):
+                    for fact in self.numbering.true_facts(way.adds):
+                        self._meet(fact.predicate, [fact.args])
+                    cost = 1.0 if self._costs is None else self._costs.cost(way.assignments)
+                    self._found_so_far += 1
+                    yield way._replace(cost=cost, number=self._found_so_far)
 
     def _key(self, way: GroundOperator) -> tuple[int, tuple[str, ...]]:
-        """Return a sort key that does not depend on the world; the variants of a step have equal keys."""
+        """Return a sort key that does not depend on the world; the operators of a step have equal keys."""
         return (self._order[way.step.action], way.step.args) if way.step else (len(self._order), ())
-
-
-def numbered(variant: Variant, numbering: Numbering, cost: float | None, number: int = -1) -> GroundOperator:
-    """Return the operator of a variant, in numbers."""
-    made = [numbering.of(effect) for effect in variant.effects]
-    touched = [numbering.fluent(one.fluent) for one in variant.assignments]
-    return GroundOperator(
-        variant.step,
-        tuple([numbering.of(leaf) for leaf in variant.condition]),
-        (*made, *touched),
-        tuple([number ^ 1 for number in made]),
-        variant.assignments,
-        cost,
-        number,
-    )
 
 
 def things_of(world: World) -> dict[str, str]:
@@ -217,7 +198,7 @@ def things_of(world: World) -> dict[str, str]:
 
 
 def _ranges_over_all(action: PlanningAction, schema: Vocabulary) -> bool:
-    """Return whether the variants depend on all objects of a type, and not only on objects in facts."""
+    """Return whether the operators depend on all objects of a type, and not only on objects in facts."""
     bound = {term.name for atom in joined_atoms(action, schema) for term in atom.args if isinstance(term, Variable)}
     return (
         any(parameter.name not in bound for parameter in action.parameters)

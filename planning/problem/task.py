@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import filterfalse
@@ -77,6 +77,19 @@ class Numbering:
         """Return the fact or bound of the number; for a negative literal, the negated fact."""
         return self._named[number >> 1]
 
+    def split(self, numbers: Collection[int]) -> tuple[tuple[Fact, ...], tuple[NumericBound, ...]]:
+        """Return the facts of the numbers, in positive normal form, and the bounds."""
+        if self.bounds.keys().isdisjoint(numbers):
+            return tuple(map(self.facts.__getitem__, numbers)), ()
+        facts = tuple([self.facts[one] for one in numbers if one not in self.bounds])
+        return facts, tuple([self.bounds[one] for one in numbers if one in self.bounds])
+
+    def true_facts(self, numbers: Iterable[int]) -> Iterator[Fact]:
+        """Yield the facts of the positive literals among the numbers of literals and fluents."""
+        for number in numbers:
+            if not number & 1 and number not in self.fluents:
+                yield self.facts[number]
+
     def _fact(self, number: int) -> Fact:
         fact = self._named[number >> 1]
         if not isinstance(fact, Fact):
@@ -145,7 +158,7 @@ _MOST_KNOWN = 16
 
 
 class GroundOperator(NamedTuple):
-    """One variant of a ground action in numbers; a tuple, since each problem has thousands of operators.
+    """One alternative of a plan step in numbers; a tuple, since each problem has thousands of operators.
 
     Attributes:
         step: the plan step; `None` for a bookkeeping action.
@@ -164,6 +177,30 @@ class GroundOperator(NamedTuple):
     assignments: tuple[Assignment, ...] = ()
     cost: float | None = 1.0
     number: int = -1
+
+
+def ground_operator(
+    step: PlanStep | None,
+    condition: Iterable[Leaf],
+    effects: Iterable[Literal],
+    numbering: Numbering,
+    assignments: tuple[Assignment, ...] = (),
+    cost: float = 1.0,
+) -> GroundOperator:
+    """Return the operator with a conjunction as its condition, and with effects that do not contradict each other."""
+    made = [numbering.of(effect) for effect in effects]
+    touched = [numbering.fluent(one.fluent) for one in assignments]
+    needs = tuple([numbering.of(leaf) for leaf in condition])
+    return GroundOperator(step, needs, (*made, *touched), tuple([number ^ 1 for number in made]), assignments, cost)
+
+
+def ground_action(way: GroundOperator, numbering: Numbering) -> GroundAction:
+    """Return the operator as a ground action with facts in positive normal form."""
+    fact = numbering.facts.__getitem__
+    needs, bounds = numbering.split(way.needs)
+    adds = tuple(map(fact, filterfalse(numbering.fluents.__contains__, way.adds)))
+    cost = 0.0 if way.cost is None else way.cost
+    return GroundAction(way.step, needs, adds, tuple(map(fact, way.deletes)), cost, bounds, way.assignments)
 
 
 Key = tuple[str, tuple[str, ...]] | None
@@ -272,8 +309,8 @@ class Assembly:
             world: the world with the values of numeric fluents; `None` if the task has no fluents.
             notes: remarks for users.
         """
-        init, _ = self._split(task.init)
-        goal, bounds = self._split(task.goal)
+        init, _ = self._numbering.split(task.init)
+        goal, bounds = self._numbering.split(task.goal)
         ways = task.ways.all if task.left is None else task.left.values()
         known = self._made.get
         actions = tuple([found[1] if (found := known(id(way))) else self._action(way) for way in ways])
@@ -287,21 +324,9 @@ class Assembly:
     def _action(self, way: GroundOperator) -> GroundAction:
         if len(self._made) >= _MOST_KEPT:
             self._made.clear()
-        fact = self._numbering.facts.__getitem__
-        needs, bounds = self._split(way.needs)
-        adds = tuple(map(fact, filterfalse(self._numbering.fluents.__contains__, way.adds)))
-        cost = 0.0 if way.cost is None else way.cost
-        action = GroundAction(way.step, needs, adds, tuple(map(fact, way.deletes)), cost, bounds, way.assignments)
+        action = ground_action(way, self._numbering)
         self._made[id(way)] = way, action
         return action
-
-    def _split(self, numbers: Collection[int]) -> tuple[tuple[Fact, ...], tuple[NumericBound, ...]]:
-        """Return facts in positive normal form, and bounds."""
-        facts, bounds = self._numbering.facts, self._numbering.bounds
-        if bounds.keys().isdisjoint(numbers):
-            return tuple(map(facts.__getitem__, numbers)), ()
-        named = tuple([facts[one] for one in numbers if one not in bounds])
-        return named, tuple([bounds[one] for one in numbers if one in bounds])
 
 
 def _fluents(actions: Iterable[GroundAction], goal: Iterable[NumericBound]) -> dict[Fact, None]:

@@ -25,11 +25,11 @@ from planning.model.problem import Problem, UnsupportedActionError
 from planning.model.quantities import Assignment, NumericBound, fluents, value_of
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, alternatives
 from planning.problem.expressions import changed
-from planning.problem.grounding import Variant, variants
+from planning.problem.grounding import ground_operators
 from planning.problem.operators import OperatorCache, things_of
 from planning.problem.relaxed_reachability import reachable
 from planning.problem.relevance import Relevant, relevant
-from planning.problem.task import NOT, GroundOperator, OperatorIndex, Task, as_fact
+from planning.problem.task import NOT, GroundOperator, Numbering, OperatorIndex, Task, as_fact, ground_action
 
 LONGEST = 1e6
 """The upper bound, in seconds, of the duration of an action without an upper bound in the domain."""
@@ -72,7 +72,7 @@ def build_temporal_problem(
         steps, missing = _possible(actions.values(), matters, wanted, world, patience)
         if missing:
             return Problem(domain.name, {}, (), (), (), missing)
-        grounding = _Grounding(actions, Grounder(world, changing, patience=patience), world)
+        grounding = _Grounding(actions, Grounder(world, changing, patience=patience), world, Numbering())
         found = [action for step in steps for action in grounding.of(step)]
     except (_TooComplexError, UnsupportedActionError):
         return None
@@ -153,18 +153,18 @@ class _Grounding:
     actions: Mapping[str, PlanningAction]
     grounder: Grounder
     world: World
+    numbering: Numbering
 
     def of(self, step: PlanStep) -> Iterator[GroundAction]:
         """Yield an action for each alternative; one alternative over all holds for the whole duration."""
         action = self.actions[step.action]
         bindings = {p.name: arg for p, arg in zip(action.parameters, step.args, strict=True)}
-        starts = list(variants(_start(action), bindings, self.grounder))
+        starts = list(ground_operators(_start(action), bindings, self.grounder, self.numbering))
         spans = list(self._spans(action, bindings))
         if len(starts) * len(spans) > _MOST_ALTERNATIVES:
             raise _TooComplexError
         for start, span in itertools.product(starts, spans):
-            bounds, assignments = _bounds(start.condition), start.assignments
-            yield GroundAction(step, *_facts_of(start), bounds=bounds, assignments=assignments, span=span)
+            yield replace(ground_action(start, self.numbering), step=step, span=span)
 
     def _spans(self, action: PlanningAction, bindings: Mapping[str, Value]) -> Iterator[ActionSpan | None]:
         timed, duration = action.timed, action.duration
@@ -180,18 +180,18 @@ class _Grounding:
         lasting = list(
             itertools.islice(alternatives(self.grounder.precondition(timed.over_all, bindings)), _MOST_ALTERNATIVES + 1)
         )
-        ends = [end for one in _end(action, timed.end) for end in variants(one, bindings, self.grounder)]
+        ends = [
+            ground_action(end, self.numbering)
+            for one in _end(action, timed.end)
+            for end in ground_operators(one, bindings, self.grounder, self.numbering)
+        ]
         if len(lasting) * len(ends) > _MOST_ALTERNATIVES:
             raise _TooComplexError
         for always, end in itertools.product(lasting, ends):
-            facts, bounds = _facts_of(end), (_bounds(always), _bounds(end.condition))
-            yield ActionSpan(least, min(most, LONGEST), _facts(always), *facts, *bounds, end.assignments)
-
-
-def _facts_of(variant: Variant) -> tuple[tuple[Fact, ...], tuple[Fact, ...], tuple[Fact, ...]]:
-    """Return the facts that the variant needs, adds and deletes."""
-    effects = variant.effects
-    return _facts(variant.condition), _facts(effects), _facts(one.negated for one in effects)
+            yield ActionSpan(
+                least, min(most, LONGEST), _facts(always), end.precondition, end.adds, end.deletes,
+                _bounds(always), end.bounds, end.assignments,
+            )  # fmt: skip
 
 
 def _facts(leaves: Iterable[Leaf]) -> tuple[Fact, ...]:

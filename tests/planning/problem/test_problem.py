@@ -27,7 +27,8 @@ from planning.model.plan import PlanStep
 from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
 from planning.problem.conditions import Grounder
 from planning.problem.construction import ProblemBuilder, build_problem
-from planning.problem.grounding import variants
+from planning.problem.grounding import ground_operators
+from planning.problem.task import Numbering
 
 ALL_TIDY = parse_condition("(forall (?i - item) (tidy ?i))")
 
@@ -292,7 +293,7 @@ def test_effects_under_conditions_that_do_not_matter_are_no_ways_of_their_own(ef
     kb = KnowledgeBase(domain.schema)
     kb.apply(Delta(nodes={f"c{i}": "colour" for i in range(9)}, added=(fact("has", "c1"), fact("dry"))), author="test")
     grounder = Grounder(kb, frozenset({"has", "dry", "shiny", "done"}))
-    assert len(list(variants(domain.actions["dip"], {}, grounder))) == ways
+    assert len(list(ground_operators(domain.actions["dip"], {}, grounder, Numbering()))) == ways
 
 
 def test_a_free_variable_is_an_error(clean_up, table):
