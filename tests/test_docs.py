@@ -12,6 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import house
 import pytest
 
 from domains.butler import Scenario as ButlerScenario
@@ -121,6 +122,28 @@ def test_the_architecture_names_every_room():
     shown = (ROOT / "docs" / "pictures" / "rooms.svg").read_text()
     assert rooms <= tables
     assert {room for room in rooms if f">{room.rpartition('.')[2]}<" not in shown} == set()
+
+
+def table_of(package):
+    """The rooms of a package in the order of its table, each with the code spans of its last column."""
+    section = ARCHITECTURE.split(f"### `{package}`")[1].split("\n### ")[0].split("\n## ")[0]
+    rows = re.findall(r"^\| `([\w.]+)`.*\|([^|]*)\|$", section, flags=re.MULTILINE)
+    return {room.rpartition(".")[2]: {*re.findall(r"`([\w.]+)`", last)} for room, last in rows}
+
+
+def test_the_table_of_planning_lists_all_its_imports():
+    arrows = house.arrows("planning")
+    real = {room: {b.rpartition(".")[2] for a, b in arrows if a == f"planning.{room}"} for room in table_of("planning")}
+    public = (ROOT / "planning" / "__init__.pyi").read_text()
+    real["planning"] = set(re.findall(r"^from planning\.(\w+)\.", public, flags=re.MULTILINE))
+    assert table_of("planning") | {"model": set()} == real
+
+
+@pytest.mark.parametrize("package", ["planning", "domains"])
+def test_a_room_imports_rooms_of_lower_rows_only(package):
+    rows = list(table_of(package))
+    arrows = [(one.split(".")[1], other.split(".")[1]) for one, other in house.arrows(package)]
+    assert [(one, other) for one, other in arrows if rows.index(one) >= rows.index(other)] == []
 
 
 def classes():
