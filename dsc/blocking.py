@@ -17,7 +17,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import suppress
 from contextvars import copy_context
 from dataclasses import dataclass, field
 from functools import partial
@@ -165,7 +165,7 @@ async def _supervised(
         watchers.append(_later(max(blocking.seconds, 0.0), stop))
     threading.Thread(target=copy_context().run, args=(run,), name=f"skill {blocking.action_id}", daemon=True).start()
     try:
-        with _hold(call):
+        with call.clock.hold():
             return await _until_stopped(ended, stop)
     finally:
         for watcher in tuple(watchers):
@@ -201,11 +201,6 @@ def _later(seconds: float, do: Callable[[], None]) -> threading.Timer:
     timer.daemon = True
     timer.start()
     return timer
-
-
-def _hold(call: SkillCall[Any]) -> AbstractContextManager[None]:
-    hold: Callable[[], AbstractContextManager[None]] = getattr(call.clock, "hold", nullcontext)
-    return hold()
 
 
 # -- the process ---------------------------------------------------------------------------------------------

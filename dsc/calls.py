@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Generic, Never, Protocol, cast
@@ -29,6 +30,10 @@ class Clock(Protocol):
 
     async def sleep(self, seconds: float) -> None:
         """Wait until `seconds` of run time have passed."""
+        ...
+
+    def hold(self) -> AbstractContextManager[None]:
+        """Return a context manager: simulated time stands still while its block waits for a thread or process."""
         ...
 
 

@@ -13,7 +13,7 @@ from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.checking.vocabulary import Signature
 from knowledge_base.language.evaluation.explanation import Explanation, explain
 from knowledge_base.language.evaluation.query_plan import QueryPlan, plan_query
-from knowledge_base.language.evaluation.world_protocol import BoundedWorld, Bounds, Meter
+from knowledge_base.language.evaluation.world_protocol import BoundedWorld, Bounds, Meter, WorldDefaults
 from knowledge_base.language.syntax.expression import TRUE, Expression
 from knowledge_base.notebook import svg_by
 from knowledge_base.pddl.problem_text import Metric
@@ -32,10 +32,10 @@ _TOGETHER = 100
 """Number of answers that a stream computes during one acquisition of the lock."""
 
 
-class View:
+class View(WorldDefaults):
     """Queries of a world from several threads; each result is a complete list for one version.
 
-    A view is itself a `World` (`schema`, `holds`, `match`, `value`, `objects`, `type_of`).
+    A view is itself a `World`.
     """
 
     _repr_svg_ = svg_by("knowledge_base.drawing:draw")

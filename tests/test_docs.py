@@ -151,7 +151,7 @@ def classes():
     found: dict[str, set[str]] = {}
     for package in PACKAGES:
         for path in (ROOT / package).rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text())):
+            for node in ast.walk(house.parse_source(path.read_text())):
                 if isinstance(node, ast.ClassDef):
                     body = {one.name for one in node.body if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef)}
                     found.setdefault(node.name, set()).update(body)

@@ -20,7 +20,7 @@ import asyncio
 import json
 import secrets
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
-from contextlib import asynccontextmanager
+from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
 from typing import Any
 
 from dsc.calls import SkillCall
@@ -46,6 +46,10 @@ class LoopTime:
     async def sleep(self, seconds: float) -> None:
         """Wait."""
         await asyncio.sleep(seconds)
+
+    def hold(self) -> AbstractContextManager[None]:
+        """Return a context manager without effect."""
+        return nullcontext()
 
 
 class _Client(Requirement):

@@ -9,7 +9,7 @@ from knowledge_base.errors import MAX_NAME, InputError, SchemaError, UnknownName
 from knowledge_base.facts import Content, Delta, Fact, Value, require_content, require_finite, require_writable
 from knowledge_base.language.checking.check import check_arity, value_fits
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, VALUE_TYPES, Signature, Vocabulary
-from knowledge_base.language.evaluation.world_protocol import World
+from knowledge_base.language.evaluation.world_protocol import World, WorldDefaults
 from knowledge_base.language.syntax.expression import TypedVariable
 from knowledge_base.spelling import A_NAME_IS, is_name, nearest_name
 from knowledge_base.world.fact_index import FactIndex
@@ -17,7 +17,7 @@ from knowledge_base.world.fact_index import FactIndex
 _Key = tuple[str, tuple[Value, ...]]
 
 
-class Overlay:
+class Overlay(WorldDefaults):
     """A `World` with pending changes, e.g. in a transaction or for a simulated plan step.
 
     While the overlay is in use, the facts and values of the base that the overlay changes must stay unchanged.
@@ -87,13 +87,8 @@ class Overlay:
         return [*kept, *self._added.match(predicate, pattern)]
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
-        """Return an upper bound of the number of matching facts.
-
-        A base without `estimate` adds 0.
-        """
-        below = getattr(self._base, "estimate", None)
-        own = self._added.estimate(predicate, pattern)
-        return own + below(predicate, pattern) if below else own
+        """Return an upper bound of the number of matching facts."""
+        return self._added.estimate(predicate, pattern) + self._base.estimate(predicate, pattern)
 
     def value(self, function: str, args: tuple[Value, ...]) -> Content:
         """Return the value of the function after the pending changes."""
@@ -102,20 +97,16 @@ class Overlay:
 
     def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
         """Return the reference of the source that is bound to the function, or `None`."""
-        below = getattr(self._base, "reference", None)
         is_recreated = self._gone and not self._gone.keys().isdisjoint(args)
-        return below(function, args) if below and not is_recreated else None
+        return None if is_recreated else self._base.reference(function, args)
 
     def publishes(self, function: str) -> bool:
         """Return whether a transform tree answers the function, and receives its new values."""
-        below = getattr(self._base, "publishes", None)
-        return below is not None and below(function)
+        return self._base.publishes(function)
 
     def require_publishable(self, values: Mapping[Fact, Content]) -> None:
         """Raise an error if a transform tree refuses one of these values, together with the pending ones."""
-        below = getattr(self._base, "require_publishable", None)
-        if below is not None:
-            below({**self._values, **values})
+        self._base.require_publishable({**self._values, **values})
 
     def objects(self, type_name: str) -> list[str]:
         """Return the objects of that type and its subtypes; objects of the base come first."""
@@ -236,7 +227,6 @@ def check_delta(delta: Delta, world: World) -> None:
     schema, admission = world.schema, _Admission(delta, world)
     # One change may remove facts together with their objects.
     before = _Admission(replace(delta, removed_nodes=()), world) if delta.removed_nodes else admission
-    reference = getattr(world, "reference", None)
     for name, type_name in delta.nodes.items():
         admission.node(name, type_name)
     for fact in (*delta.added, *delta.replaced):
@@ -248,7 +238,7 @@ def check_delta(delta: Delta, world: World) -> None:
         require_content(content, schema.result(fluent.predicate), fluent)
         if delta.removed_nodes and not set(delta.removed_nodes).isdisjoint(fluent.args):
             continue  # the new object has no source
-        if reference is not None and (source := reference(fluent.predicate, fluent.args)) is not None:
+        if (source := world.reference(fluent.predicate, fluent.args)) is not None:
             raise SchemaError(f"{fluent} is fed by '{source}' and cannot be set")
     _require_publishable(delta.values, world)
     for name in delta.removed_nodes:
@@ -262,9 +252,7 @@ def check_delta(delta: Delta, world: World) -> None:
 
 def _require_publishable(values: Mapping[Fact, Content], world: World) -> None:
     if any(isinstance(content, tuple) for content in values.values()):
-        check = getattr(world, "require_publishable", None)
-        if check is not None:
-            check(values)
+        world.require_publishable(values)
 
 
 def check_fluent(fluent: Fact, world: World) -> None:

@@ -160,6 +160,9 @@ class WorldState:
         twin._members = {t: members.copy() for t, members in self._members.items()}
         return twin
 
+    def spend(self) -> None:
+        """Accept all effects; this world has no bounds."""
+
     def _index(self, facts: FactIndex) -> None:
         self.facts = facts
         self.holds, self.match, self.estimate = facts.holds, facts.match, facts.estimate

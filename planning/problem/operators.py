@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE, Vocabulary
-from knowledge_base.language.evaluation.world_protocol import World
+from knowledge_base.language.evaluation.world_protocol import World, WorldDefaults
 from knowledge_base.language.syntax.effect import ForEach, effect_conditions, effect_parts
 from knowledge_base.language.syntax.expression import (
     Arithmetic,
@@ -33,7 +33,7 @@ from planning.problem.relevance import Relevant
 from planning.problem.task import GroundOperator, Numbering, OperatorIndex
 
 
-class Consulted:
+class Consulted(WorldDefaults):
     """A world that records its answers, so that another world can be compared with them.
 
     It contains the objects of all worlds so far.

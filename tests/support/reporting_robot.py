@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING
 
 from domains.clean_up_table.components import Arm, Base, Camera, Voice
@@ -29,6 +30,9 @@ class Clock:
         assert seconds > 0
         self.time += seconds
         await asyncio.sleep(0)
+
+    def hold(self) -> AbstractContextManager[None]:
+        return nullcontext()
 
 
 class Robot:

@@ -236,11 +236,9 @@ class _Application:
         self.removed: dict[Fact, None] = {}
         self.values: dict[Fact, Content] = {}
         self.computed: set[Fact] = set()
-        self.spend: Callable[[], None] | None = getattr(world, "spend", None)
 
     def apply(self, effect: Effect, bindings: Bindings) -> None:
-        if self.spend is not None:
-            self.spend()
+        self.world.spend()
         match effect:
             case Add(atom):
                 self.added[self.fact(atom, bindings)] = None

@@ -223,9 +223,8 @@ class Lookup:
         return answers
 
     def size(self, world: World, bindings: Bindings) -> int:
-        """Return an upper bound of the number of matching facts; 0 if the world has no method `estimate`."""
-        estimate = getattr(world, "estimate", None)
-        return estimate(self._predicate, self._pattern(world, bindings)) if estimate else 0
+        """Return an upper bound of the number of matching facts."""
+        return world.estimate(self._predicate, self._pattern(world, bindings))
 
     def _matches(self, world: World, bindings: Bindings) -> Iterable[tuple[Value, ...]]:
         matches = world.match(self._predicate, self._pattern(world, bindings))

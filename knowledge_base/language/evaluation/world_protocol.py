@@ -7,13 +7,13 @@ a world without bounds has no overhead.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from knowledge_base.errors import OutOfBoundsError, shortened
-from knowledge_base.facts import Content, Value
+from knowledge_base.facts import Content, Fact, Value
 from knowledge_base.language.checking.vocabulary import Vocabulary
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.text import to_text
@@ -23,12 +23,7 @@ class World(Protocol):
     """A state of the world: the store, pending changes on top of it, or a state of a planner.
 
     `holds` and `match` cover only predicates with asserted facts; the language derives type tests, computed predicates,
-    quantifiers and comparisons. Five methods are optional. `estimate(predicate, pattern) -> int` returns an upper bound
-    of the number of matching facts, so that conjunctions begin with the rarest fact.
-    `reference(function, args) -> str | None` returns the reference of the data source of a function's value, which no
-    effect may set. `publishes(function) -> bool` returns whether a transform tree receives new values of a function;
-    `require_publishable(values)` raises an error if the tree refuses them. `spend()` is called for every effect on the
-    world, and may raise an error at a bound (`Bounds`).
+    quantifiers and comparisons. `WorldDefaults` has the last five methods.
     """
 
     @property
@@ -52,6 +47,43 @@ class World(Protocol):
 
     def type_of(self, name: str) -> str | None:
         """Return the type of the object; `None` if the object is unknown."""
+
+    def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
+        """Return an upper bound of the number of matching facts, so that conjunctions begin with the rarest fact."""
+
+    def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
+        """Return the reference of the data source of a function's value, which no effect may set; `None` without."""
+
+    def publishes(self, function: str) -> bool:
+        """Return whether a transform tree answers the function, and receives its new values."""
+
+    def require_publishable(self, values: Mapping[Fact, Content]) -> None:
+        """Raise `TransformError` if a transform tree refuses one of these values."""
+
+    def spend(self) -> None:
+        """Count an effect on the world as work, and end the work at a bound (`Bounds`)."""
+
+
+class WorldDefaults:
+    """The methods of a `World` without an index of its facts, without sources, transform trees and bounds."""
+
+    def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:  # noqa: ARG002
+        """Return 0: all facts count as rare."""
+        return 0
+
+    def reference(self, function: str, args: tuple[Value, ...]) -> str | None:  # noqa: ARG002
+        """Return `None`: no source."""
+        return None
+
+    def publishes(self, function: str) -> bool:  # noqa: ARG002
+        """Return `False`: no transform tree."""
+        return False
+
+    def require_publishable(self, values: Mapping[Fact, Content]) -> None:
+        """Accept all values."""
+
+    def spend(self) -> None:
+        """Accept all effects."""
 
 
 CHECK_EVERY = 500
@@ -137,14 +169,11 @@ class Meter:
             self._next_check = min(self._next_check, bounds.work + 1)
 
 
-class BoundedWorld:
+class BoundedWorld(WorldDefaults):
     """A `World` that counts the results of another world as work."""
 
     def __init__(self, world: World, meter: Meter) -> None:
         self._world, self._meter = world, meter
-        self.spend = meter.spend
-        self.estimate = getattr(world, "estimate", None)
-        self.reference = getattr(world, "reference", None)
 
     @property
     def schema(self) -> Vocabulary:
@@ -158,8 +187,8 @@ class BoundedWorld:
 
     def match(self, predicate: str, pattern: tuple[Value | None, ...]) -> Iterator[tuple[Value, ...]]:
         """Return the arguments of all facts that match `pattern`."""
-        if self.estimate is not None and len(pattern) - pattern.count(None) > 1:  # a list of facts is searched
-            self._meter.spend(self.estimate(predicate, pattern))
+        if len(pattern) - pattern.count(None) > 1:  # a list of facts is searched
+            self._meter.spend(self._world.estimate(predicate, pattern))
         self._meter.spend()
         return self._meter.each(self._world.match(predicate, pattern))
 
@@ -178,3 +207,15 @@ class BoundedWorld:
         """Return the type of the object; `None` if the object is unknown."""
         self._meter.spend()
         return self._world.type_of(name)
+
+    def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
+        """Return an upper bound of the number of matching facts."""
+        return self._world.estimate(predicate, pattern)
+
+    def reference(self, function: str, args: tuple[Value, ...]) -> str | None:
+        """Return the reference of the data source of a function's value; `None` without a source."""
+        return self._world.reference(function, args)
+
+    def spend(self) -> None:
+        """Count an effect on the world as work."""
+        self._meter.spend()

@@ -12,6 +12,7 @@ from knowledge_base.facts import Delta, Fact, fact
 from knowledge_base.language.checking.binding import only_tested
 from knowledge_base.language.evaluation.evaluator import apply_effect, evaluate_term, holds, query
 from knowledge_base.language.evaluation.explanation import explain
+from knowledge_base.language.evaluation.world_protocol import WorldDefaults
 from knowledge_base.language.syntax.expression import TypedVariable, free_variables
 from knowledge_base.language.syntax.text import parse_condition, parse_effect, parse_term
 from knowledge_base.world.overlay import Overlay
@@ -148,7 +149,8 @@ class Counting:
 
 
 class Uncounted(Counting):
-    estimate = None
+    def estimate(self, predicate: str, pattern: object) -> int:
+        return WorldDefaults().estimate(predicate, ())
 
 
 def test_a_conjunction_begins_with_the_rarest_and_does_without_counts_too() -> None:
