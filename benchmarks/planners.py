@@ -30,7 +30,7 @@ from planning.engines.fast_downward import sas
 from planning.engines.planner import PlannerProcess
 from planning.engines.race import PlannerRace
 from planning.engines.registry import ENGINES, installed
-from planning.engines.request import written
+from planning.engines.request import write_problem
 from planning.generation.plan_to_plot import plot_from_plan
 from planning.model.plan import Plan, PlanFound
 from planning.model.problem import Problem
@@ -150,11 +150,11 @@ def part_row(items: int, rounds: int) -> dict[str, Any]:
     builder = ProblemBuilder(domain)
     problem = builder.build_problem(world, goal)
     plan = _plan(problem)
-    order, request = deordered(plan, domain, world, goal), written(problem)
+    order, request = deordered(plan, domain, world, goal), write_problem(problem)
     parts: dict[str, Callable[[], object]] = {
         "pose, cold": lambda: ProblemBuilder(domain).build_problem(world, goal),
         "pose, warm": lambda: builder.build_problem(world, goal),
-        "write": lambda: written(replace(problem)),
+        "write": lambda: write_problem(replace(problem)),
         "translate": lambda: sas(json.loads(request)),
         "validate, de-order": lambda: deordered(plan, domain, world, goal),
         "generate": lambda: plot_from_plan(plan, domain, None, order=order),

@@ -36,7 +36,7 @@ OURS = tuple(part for part in PARTS if part != "engine")
 _HERE = tuple(part for part in OURS if part != "translate")  # the engine's process translates
 _WRAPPED = (
     (search, "local_repair", "mend"), (search, "build_problem", "pose"), (search, "deordered", "validate, de-order"),
-    (asking, "written", "write"),
+    (asking, "write_problem", "write"),
     (escalation, "deordered", "validate, de-order"), (plotting, "deordered", "validate, de-order"),
     (plotting, "laid_out", "generate"), (plotting, "plot_of", "generate"),
 )  # fmt: skip

@@ -227,10 +227,10 @@ class Execution:
                 if before is None:
                     self.enter_plot(compiled, passed, frame, name)
                 else:
-                    self.replace_plot(before, compiled, passed, _shared(before, compiled))
+                    self.replace_plot(before, compiled, passed, _find_shared_states(before, compiled))
                     before = None
             elif isinstance(state, DynamicState):
-                self._bind_decision(frame, name, self._decided(frame, name, state, passed))
+                self._bind_decision(frame, name, self._decide(frame, name, state, passed))
         except InputError as error:
             self.performer.fail(frame, f"{frame.prefix}{name}", error)
         if before is not None:
@@ -290,7 +290,7 @@ class Execution:
                 self._enter(frame, entrance, NOTHING)
         return frame
 
-    def _decided(self, frame: Frame, name: str, state: DynamicState, passed: Mapping[str, Any]) -> Decision:
+    def _decide(self, frame: Frame, name: str, state: DynamicState, passed: Mapping[str, Any]) -> Decision:
         bindings = self.performer.bindings(frame)
         if state.arguments:
             own = {key: term for key, term in state.arguments.items() if key not in passed}
@@ -345,7 +345,7 @@ def _kept_values(before: Frame, compiled: CompiledPlot) -> dict[str, Any]:
     return {**kept, **failures}
 
 
-def _shared(before: Frame, compiled: CompiledPlot) -> list[str]:
+def _find_shared_states(before: Frame, compiled: CompiledPlot) -> list[str]:
     """Return the names of the active, activated states of a plot that another plot has as states of the same kind."""
     found = []
     for name in before.activations:

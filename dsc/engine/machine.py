@@ -35,7 +35,7 @@ def move(state: MachineState, root: FrameState, event: Event, situation: Situati
     choices = root.configuration.reactions.choices
     choice = choices.get(event.name)
     if isinstance(choice, Question):
-        choice = _answered(choice, root, event, situation)
+        choice = _evaluate_guards(choice, root, event, situation)
     if not isinstance(choice, CompiledReaction) or not choice.still or root.children:
         return None
     following = choice.following
@@ -53,7 +53,7 @@ def move(state: MachineState, root: FrameState, event: Event, situation: Situati
     return step
 
 
-def _answered(question: Question, root: FrameState, event: Event, situation: Situation) -> Choice | None:
+def _evaluate_guards(question: Question, root: FrameState, event: Event, situation: Situation) -> Choice | None:
     bindings = {**root.variables, **event.bindings()} if event.attributes else root.variables
     choice: Choice = question
     while isinstance(choice, Question):

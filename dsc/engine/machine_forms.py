@@ -69,15 +69,17 @@ def _frame_of(form: _FrameForm, chart: Chart) -> FrameState:
     index = {node.name: node.index for node in compiled.nodes[1:]}
     index.update({f"#{node.index}": node.index for node in compiled.nodes if node.state is None})  # in older stores
 
-    def placed(names: Iterable[str]) -> tuple[int, ...]:
+    def indices_of(names: Iterable[str]) -> tuple[int, ...]:
         unknown = next((name for name in names if name not in index), None)
         if unknown is not None:
             message = f"plot '{compiled.plot.name}' no longer has the state '{unknown}'"
             raise UnknownNameError(message, found=unknown, valid=index)
         return tuple([index[name] for name in names])
 
-    histories = zip(placed(form.history), map(placed, form.history.values()), strict=True)
-    configuration = configuration_of(compiled, placed(form.active), frozenset(placed(form.waiting)), tuple(histories))
+    histories = zip(indices_of(form.history), map(indices_of, form.history.values()), strict=True)
+    configuration = configuration_of(
+        compiled, indices_of(form.active), frozenset(indices_of(form.waiting)), tuple(histories)
+    )
     children = {name: _frame_of(child, chart) for name, child in form.children.items()}
     kept = tuple([(name, Event(**dict(event))) for name, event in form.kept])
     return FrameState(form.serial, compiled, configuration, form.variables, form.activations, children, kept)

@@ -96,7 +96,7 @@ class MachineState(NamedTuple):
 
     def state_of(self, serial: int) -> tuple[str, ActionPlot] | None:
         """Return path and plot of the state with this serial number; `None` if the state is no longer active."""
-        found = [] if self.root is None else _activated(self.root, "", serial)
+        found = [] if self.root is None else _find_activation(self.root, "", serial)
         return next(iter(found), None)
 
     def plot_of(self, path: str) -> ActionPlot | None:
@@ -120,12 +120,12 @@ class MachineState(NamedTuple):
         return any(path == state or path.endswith("/" + state) for path in self.configuration())
 
 
-def _activated(frame: FrameState, prefix: str, serial: int) -> Iterator[tuple[str, ActionPlot]]:
+def _find_activation(frame: FrameState, prefix: str, serial: int) -> Iterator[tuple[str, ActionPlot]]:
     for name, own in frame.activations.items():
         if own == serial:
             yield prefix + name, frame.compiled.plot
     for name, inner in frame.children.items():
-        yield from _activated(inner, f"{prefix}{name}/", serial)
+        yield from _find_activation(inner, f"{prefix}{name}/", serial)
 
 
 def _paths(frame: FrameState, prefix: str) -> Iterator[str]:

@@ -106,7 +106,7 @@ class Macrostep:
         self._results.end_microstep(None, ())
         for event in self._results.internal:
             if event.name in ERRORS:
-                self._unhandled(event)
+                self._record_unhandled(event)
 
     def _rest(self) -> None:
         """Take transitions without trigger, then handle internal events, until neither is left."""
@@ -119,7 +119,7 @@ class Macrostep:
             event = internal.popleft()
             if not self._take(event):
                 if event.name in ERRORS:
-                    self._unhandled(event)
+                    self._record_unhandled(event)
                 elif event.to is not None:
                     self._refuse_lost_outcome(event, event.to)
 
@@ -138,7 +138,7 @@ class Macrostep:
             state = frame.prefix + state
             self._results.add_error(f"state '{state}' does not handle '{event.name}' of plot '{plot.name}'")
 
-    def _unhandled(self, error: Event) -> None:
+    def _record_unhandled(self, error: Event) -> None:
         """Record an error event that no transition handles.
 
         In dialect `dsc` the error ends the run; in SCXML it is an ordinary event (SCXML 3.12, 5.10.1).

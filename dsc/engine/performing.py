@@ -205,7 +205,7 @@ class Performer:
             case Withdraw(withdraw=term):
                 self.results.put(steps.Revoke(frame.serial, str(self.value(frame, term))))
             case Log(log=parts, label=label):
-                text = "".join(_shown(self.value(frame, part)) for part in parts)
+                text = "".join(_ecmascript_text(self.value(frame, part)) for part in parts)
                 self.results.put(steps.Note(label, text))
             case Choose():
                 for inner in action.then if self._chooses(frame, state, action) else action.otherwise:
@@ -337,7 +337,7 @@ def _delay_of(seconds: Any, least: float = 0) -> float:
     return float(seconds)
 
 
-def _shown(value: Any) -> str:
+def _ecmascript_text(value: Any) -> str:
     """Return the text that ECMAScript prints for a value."""
     if value is None:
         return "undefined"

@@ -89,12 +89,12 @@ class _Work:
             if edge.source in left and not edge.interrupts
         }
         exits = self._exits(set().union(*left_of), own)
-        effects = [self._settled(edge.effect) for edge in edges]
+        effects = [self._settle_actions(edge.effect) for edge in edges]
         for edge in edges:
             for history in edge.cleared:
                 self.remembered.pop(history, None)
         parts = [
-            ReactionPart(edge, effect, self._reached(edge), bool(effect or edge.passed))
+            ReactionPart(edge, effect, self._enter_targets(edge), bool(effect or edge.passed))
             for edge, effect in zip(edges, effects, strict=True)
         ]
         return self._reaction(tuple(parts), exits, keeps, tuple([report(edge, self.compiled) for edge in edges]))
@@ -147,7 +147,7 @@ class _Work:
         for node in ordered:
             actions = node.exit if node.index in own else node.broken
             cancels = node.timed or any(isinstance(action, Trigger | Wire | Unwire) for action in node.entry)
-            exits.append(Exit(node, self._settled(actions), cancels))
+            exits.append(Exit(node, self._settle_actions(actions), cancels))
             self.present.discard(node.index)
             self.waiting.discard(node.index)
         return tuple(exits)
@@ -162,7 +162,7 @@ class _Work:
                 kept = [child for child in node.children if child in self.configuration.members]
             self.remembered[history] = tuple(kept)
 
-    def _reached(self, edge: TransitionEdge) -> tuple[StateEntry, ...]:
+    def _enter_targets(self, edge: TransitionEdge) -> tuple[StateEntry, ...]:
         if not edge.targets:
             return ()
         return self._entrances(domain(self.compiled, edge, self.remembered), edge.targets)
@@ -176,26 +176,26 @@ class _Work:
             self.present.add(index)
             if node.at_least is not None:
                 self.waiting.add(index)
-            actions, after = self._settled(node.entry), self._settled(entry.after.get(index, ()))
-            entrances.append(StateEntry(node, actions, after, tuple(self._completed(node)), _outcome(node)))
+            actions, after = self._settle_actions(node.entry), self._settle_actions(entry.after.get(index, ()))
+            entrances.append(StateEntry(node, actions, after, tuple(self._find_completed(node)), _outcome(node)))
         return tuple(entrances)
 
-    def _settled(self, actions: tuple[_AnyAction, ...]) -> tuple[_AnyAction, ...]:
+    def _settle_actions(self, actions: tuple[_AnyAction, ...]) -> tuple[_AnyAction, ...]:
         """Return the actions with each `in-state` replaced by its current truth value."""
-        return tuple(map(self._settled_action, actions)) if self.compiled.scxml else actions
+        return tuple(map(self._settle_action, actions)) if self.compiled.scxml else actions
 
-    def _settled_action(self, action: _AnyAction) -> _AnyAction:
+    def _settle_action(self, action: _AnyAction) -> _AnyAction:
         match action:
             case Choose(condition=condition, then=then, otherwise=otherwise):
                 settled = settle(condition, lambda state: self.compiled.index.get(state) in self.present)
-                branches = {"then": self._settled(then), "otherwise": self._settled(otherwise)}
+                branches = {"then": self._settle_actions(then), "otherwise": self._settle_actions(otherwise)}
                 return action.model_copy(update={"condition": settled, **branches})
             case Block(block=inside):
-                return action.model_copy(update={"block": self._settled(inside)})
+                return action.model_copy(update={"block": self._settle_actions(inside)})
             case _:
                 return action
 
-    def _completed(self, node: StateNode) -> Iterator[int]:
+    def _find_completed(self, node: StateNode) -> Iterator[int]:
         """Yield indices of nodes whose content this entry completes, if a transition or a parent depends on this."""
         nodes, scxml = self.compiled.nodes, self.compiled.scxml
         return (one for one in self._around_complete(node) if not one or scxml or DONE in nodes[one].edges)

@@ -394,7 +394,7 @@ class _Layout:
         return TransitionEdge(
             node.index, trigger, targets, guard, effect, transition.rule,
             transition.internal and isinstance(node.state, states.CompositeState), place, transition.passed,
-            tuple(self._cleared(node, transition)) if transition.clear else (),
+            tuple(self._find_cleared(node, transition)) if transition.clear else (),
             transition.keep and node.holds_plot and targets == (node.index,), bind=bind,
             asks=guard is not None and bool(asked_states(guard)),
         )  # fmt: skip
@@ -419,7 +419,7 @@ class _Layout:
             )
         return found
 
-    def _cleared(self, source: StateNode, transition: Transition) -> Iterator[int]:
+    def _find_cleared(self, source: StateNode, transition: Transition) -> Iterator[int]:
         """Yield the indices of histories that a transition clears; `*` includes those of all inner states."""
         for name in transition.clear:
             node = self.nodes[self._target(source, name.removesuffix("*"))]

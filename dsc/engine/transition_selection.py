@@ -214,9 +214,9 @@ class EntrySet:
 
     def effective(self, targets: Iterable[int]) -> list[int]:
         """Return the targets; remembered or default nodes replace each history (getEffectiveTargetStates)."""
-        return [real for target in targets for real in self._resolved(target)]
+        return [real for target in targets for real in self._resolve_target(target)]
 
-    def _resolved(self, target: int) -> Iterable[int]:
+    def _resolve_target(self, target: int) -> Iterable[int]:
         """Return the nodes that replace a target; the default of a history may contain further histories."""
         default = self._compiled.defaults.get(target)
         if default is None:
@@ -224,7 +224,7 @@ class EntrySet:
         if target in self._remembered:
             return self._remembered[target]
         self.after[self._compiled.nodes[target].parent] = default.effect
-        return self._resolved(default.target)
+        return self._resolve_target(default.target)
 
     def _add_ways(self, around: int, targets: Sequence[int]) -> set[int]:
         """Add the paths from `around` to the targets, then the targets' default content; return the paths' nodes."""

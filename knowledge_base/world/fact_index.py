@@ -41,15 +41,15 @@ class FactIndex:
         The iterator filters the shortest list of facts with one of the given arguments. The set must not change before
         the end of the iteration.
         """
-        listed = self._listed(predicate, pattern)
+        listed = self._find_shortest(predicate, pattern)
         exact = len(pattern) < 3 or pattern.count(None) >= len(pattern) - 1
         return listed if exact else _agreeing(listed, pattern)
 
     def estimate(self, predicate: str, pattern: tuple[Value | None, ...]) -> int:
         """Return an upper bound of the number of facts that match `pattern`, without reading the facts."""
-        return len(self._listed(predicate, pattern))
+        return len(self._find_shortest(predicate, pattern))
 
-    def _listed(self, predicate: str, pattern: tuple[Value | None, ...]) -> Collection[Args]:
+    def _find_shortest(self, predicate: str, pattern: tuple[Value | None, ...]) -> Collection[Args]:
         """Return the shortest list that contains all facts which match `pattern`."""
         if len(pattern) == 2:  # the most frequent pattern: arcs from or to an object
             start, end = pattern

@@ -173,21 +173,21 @@ def require_single(delta: Delta, world: World) -> None:
         SchemaError: two replacements or two facts of a functional predicate differ only in the last argument. The
             message contains both facts.
     """
-    replaced = _grouped(delta.replaced)
+    replaced = _group(delta.replaced)
     for facts in replaced.values():
         _require_one(facts, "are two replacements of the same")
     functional = world.schema.functional
     if not functional:
         return
     removed, gone = set(delta.removed), set(delta.removed_nodes)
-    added = _grouped(f for f in delta.added if f.predicate in functional)
+    added = _group(f for f in delta.added if f.predicate in functional)
     for key, facts in added.items():
         before = replaced.get(key) or rivals(next(iter(facts)), world)
         stay = [f for f in before if f not in removed and gone.isdisjoint(f.args)]
         _require_one({**dict.fromkeys(stay), **facts}, f"cannot both be true, as '{key[0]}' is functional; use replace")
 
 
-def _grouped(facts: Iterable[Fact]) -> dict[_Key, dict[Fact, None]]:
+def _group(facts: Iterable[Fact]) -> dict[_Key, dict[Fact, None]]:
     found: dict[_Key, dict[Fact, None]] = {}
     for fact in facts:
         found.setdefault((fact.predicate, fact.args[:-1]), {})[fact] = None

@@ -176,8 +176,8 @@ class Schema:
         return Schema(
             types={**self.types, **other.types},
             constants={**self.constants, **other.constants},
-            predicates=_united(both, "predicate"),
-            functions=_united(functions, "function"),
+            predicates=_unite(both, "predicate"),
+            functions=_unite(functions, "function"),
             places={**other.places, **self.places},
             functional=self.functional | other.functional,
             axioms=tuple(dict.fromkeys((*self.axioms, *other.axioms))),
@@ -448,10 +448,10 @@ def agreed_names(files: Iterable[Iterable[TypedName]], kind: str) -> tuple[Typed
 
 
 def _signatures(declarations: Iterable[DeclarationText], kind: str) -> dict[str, Signature]:
-    return _united((Signature(d.name, d.parameters, d.result, d.place, kind=d.domain) for d in declarations), kind)
+    return _unite((Signature(d.name, d.parameters, d.result, d.place, kind=d.domain) for d in declarations), kind)
 
 
-def _united(signatures: Iterable[Signature], kind: str) -> dict[str, Signature]:
+def _unite(signatures: Iterable[Signature], kind: str) -> dict[str, Signature]:
     found: dict[str, Signature] = {}
     for signature in signatures:
         first = found.setdefault(signature.name, signature)

@@ -57,7 +57,7 @@ def indispensable(problem: Problem, chosen: Sequence[int]) -> list[int]:
         problem: a problem without durations.
         chosen: the indices of the actions of a plan for the problem, in order.
     """
-    acts, start, goal = _encoded(problem, chosen)
+    acts, start, goal = _encode(problem, chosen)
     before = None
     while before != len(acts):  # a removal may make an earlier action redundant
         before = len(acts)
@@ -89,7 +89,7 @@ def _without(state: _State, acts: Sequence[_Act]) -> tuple[list[_Act], _State]:
     return taken, state
 
 
-def _encoded(problem: Problem, chosen: Sequence[int]) -> tuple[list[_Act], _State, int]:
+def _encode(problem: Problem, chosen: Sequence[int]) -> tuple[list[_Act], _State, int]:
     bit: dict[Fact, int] = {}
 
     def bits(facts: Sequence[Fact]) -> int:

@@ -14,7 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 from planning.engines.action_elimination import indispensable
 from planning.engines.process import EngineProcess, EngineStoppedError, OutOfTimeError, answers, worker
 from planning.engines.registry import can_time, cannot, in_concert, refusal
-from planning.engines.request import written
+from planning.engines.request import write_problem
 from planning.model.cancellable_work import aside
 from planning.model.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanningOutcome, ProvenUnsolvable, TimedOut
 from planning.model.problem import Problem
@@ -99,7 +99,7 @@ class PlannerProcess:
             return
         async with self._turn():
             with self._clock_hold():
-                async with aclosing(self._tried(problem, seconds)) as outcomes:
+                async with aclosing(self._try_forms(problem, seconds)) as outcomes:
                     async for outcome in outcomes:
                         yield outcome
 
@@ -127,7 +127,7 @@ class PlannerProcess:
         return self._lock
 
     def _without_search(self, problem: Problem) -> PlanningOutcome | None:
-        if problem.unreachable and not self._timed(problem):
+        if problem.unreachable and not self._is_timed(problem):
             return self._none(problem, "unreachable: " + ", ".join(problem.unreachable))
         if not problem.goal and not problem.bounds and not problem.unreachable:
             return PlanFound(Plan(), self.engine, 0.0, problem.simulated_seconds)
@@ -140,17 +140,17 @@ class PlannerProcess:
             return ProvenUnsolvable(self.engine, reason)
         return NoneFound(self.engine, f"no plan with one action at a time ({reason}); {in_concert()}")
 
-    def _timed(self, problem: Problem) -> bool:
+    def _is_timed(self, problem: Problem) -> bool:
         """Return whether the problem has a temporal form and the engine supports durations."""
         return problem.timed is not None and can_time(self.engine)
 
     def _forms(self, problem: Problem) -> list[Callable[[], Problem]]:
         """Return constructors of the forms of a problem, in the order in which the forms are tried."""
-        forms = [problem.timed] if self._timed(problem) else []
+        forms = [problem.timed] if self._is_timed(problem) else []
         made = [_made(one) for one in (*forms, problem) if one is not None and not one.unreachable]
         return made if problem.unsliced is None else [*made, problem.unsliced]
 
-    async def _tried(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
+    async def _try_forms(self, problem: Problem, seconds: float) -> AsyncGenerator[PlanningOutcome, None]:
         """Yield the plans of the first form that has one; each form except the last uses half of the remaining time."""
         *first, last = self._forms(problem)
         cut_short = False
@@ -184,7 +184,7 @@ class PlannerProcess:
             return
         started = time.monotonic()
         try:
-            async with aclosing(answers(process, written(problem), seconds)) as heard:
+            async with aclosing(answers(process, write_problem(problem), seconds)) as heard:
                 async for answer in heard:
                     outcome = self._outcome_of(answer, problem, time.monotonic() - started)
                     if best is None or (isinstance(outcome, PlanFound) and outcome.cost < best.cost):
@@ -202,15 +202,15 @@ class PlannerProcess:
         known = self._process
         if known is not None:
             with contextlib.suppress(OutOfTimeError, EngineStoppedError):
-                await self._started(known)
+                await self._start_process(known)
             if known.alive:  # after the wait: the end of the previous search may have killed the process
                 return known
             self.kill()
         self._process = process = EngineProcess(self._command)
-        await self._started(process)
+        await self._start_process(process)
         return process
 
-    async def _started(self, process: EngineProcess) -> None:
+    async def _start_process(self, process: EngineProcess) -> None:
         if not process.idle:
             await aside(lambda: process.start(self._start_up_seconds))
 

@@ -79,7 +79,7 @@ class PlannerRace:
         engines = [] if problem.timed is None else self._choose(problem.timed)
         if problem.timed is not None and engines:
             started, limit = time.monotonic(), seconds if problem.unreachable else seconds / 2
-            async with aclosing(self._raced(engines, problem.timed, limit)) as outcomes:
+            async with aclosing(self._race(engines, problem.timed, limit)) as outcomes:
                 outcome = await anext(outcomes)
                 if isinstance(outcome, PlanFound) or problem.unreachable:
                     yield outcome
@@ -89,11 +89,11 @@ class PlannerRace:
             seconds -= min(time.monotonic() - started, limit)
             failures = _failures(outcome)
         problem = problem if problem.timed is None else replace(problem, timed=None)
-        async with aclosing(self._raced(self._choose(problem), problem, seconds)) as outcomes:
+        async with aclosing(self._race(self._choose(problem), problem, seconds)) as outcomes:
             async for outcome in outcomes:
                 yield outcome if isinstance(outcome, EngineFailed | Unsupported) else _with(failures, outcome)
 
-    async def _raced(
+    async def _race(
         self, engines: Sequence[Engine], problem: Problem, seconds: float
     ) -> AsyncGenerator[PlanningOutcome, None]:
         """Yield the outcomes of a race of `engines` for one form of a problem, e.g. its temporal form."""
@@ -231,7 +231,7 @@ class CachingPlanner:
         known = self._known.get(key)
         if known is not None:
             self._known.move_to_end(key)
-            yield _recalled(known, time.monotonic() - started)
+            yield _recall(known, time.monotonic() - started)
             return
         async with aclosing(self._planner.plans(problem, seconds)) as plans:
             async for outcome in plans:
@@ -254,7 +254,7 @@ class CachingPlanner:
                 self._known.popitem(last=False)
 
 
-def _recalled(known: PlanFound | ProvenUnsolvable, seconds: float) -> PlanFound | ProvenUnsolvable:
+def _recall(known: PlanFound | ProvenUnsolvable, seconds: float) -> PlanFound | ProvenUnsolvable:
     known = replace(known, failures=())
     return replace(known, from_cache=True, seconds=seconds, translated=0.0) if isinstance(known, PlanFound) else known
 

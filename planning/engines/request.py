@@ -32,7 +32,7 @@ _Row = tuple[str, tuple[Fact, ...]]
 
 
 @cache_on_owner
-def written(problem: Problem) -> bytes:
+def write_problem(problem: Problem) -> bytes:
     """Return the problem as a line of JSON; kept on it, since all engines of a race receive an equal request."""
     return _line(problem)
 

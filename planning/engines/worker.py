@@ -59,7 +59,7 @@ def main() -> None:
     name, megabytes = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else MEGABYTES
     out = _claim_stdout()
     _adopt_orphans()
-    search = _loaded(name)
+    search = _load(name)
     gc.freeze()  # forked searches share the existing objects
     _say(out, {"ready": True})
     for line in sys.stdin.buffer:
@@ -85,7 +85,7 @@ def _say(out: int, said: dict[str, Any]) -> None:
         data = data[os.write(out, data) :]
 
 
-def _loaded(name: str) -> Search:
+def _load(name: str) -> Search:
     """Return the engine's search function; if its import fails, a function that raises the error for each problem."""
     try:
         import planning.model.problem  # noqa: F401, PLC0415  before the first fork, so that no search imports it
@@ -119,7 +119,7 @@ def _serve(line: bytes, search: Search, out: int, megabytes: int) -> None:
     _relay(heard, out, child)
     os.close(heard)
     os.close(held)
-    _say(out, {"ended": _reaped(child)})
+    _say(out, {"ended": _reap(child)})
 
 
 def _in_group(child: int) -> None:
@@ -149,7 +149,7 @@ def _relay(heard: int, out: int, child: int) -> None:
         os.write(out, b"\n")
 
 
-def _reaped(child: int) -> int:
+def _reap(child: int) -> int:
     """Kill the remaining processes of the search, and return the exit status of the search, negative for a signal."""
     os.waitid(os.P_PID, child, os.WEXITED | os.WNOWAIT)  # the zombie reserves the number of its process group
     _kill_group(child)

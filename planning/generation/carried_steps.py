@@ -64,7 +64,7 @@ def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] =
     """
     found: dict[str, ActionPlot] = {}
     waiting = list(plots)
-    applied = _applied(rules, waiting)
+    applied = _find_applied(rules, waiting)
     waiting += [library.plot(rule.do.use) for rule in applied if rule.do.use]
     while waiting:
         plot = waiting.pop()
@@ -80,7 +80,7 @@ def usage(plots: Iterable[ActionPlot], library: Library, rules: Iterable[Rule] =
     return Usage(frozenset(names), any(map(_is_open, found.values())), sum(limits))
 
 
-def _applied(rules: Iterable[Rule], plots: Sequence[ActionPlot]) -> list[Rule]:
+def _find_applied(rules: Iterable[Rule], plots: Sequence[ActionPlot]) -> list[Rule]:
     """Return the rules that may apply to a step with these plots as candidates."""
     emitted = SKILL_FAILURES.union(*(plot.emits for plot in plots))
     actions = {plot.implements for plot in plots}
@@ -266,23 +266,23 @@ def _step(
         limit = Constant(seconds)
     return CarriedStep(
         text=str(step),
-        needed=tuple([one for one in conjuncts(ground.condition) if not _decided(one)]),
-        over_all=tuple(substitute(one, bindings) for one in _watched(action)),
+        needed=tuple([one for one in conjuncts(ground.condition) if not _is_decided(one)]),
+        over_all=tuple(substitute(one, bindings) for one in _find_watched(action)),
         effect=ground.effect,
         expected=() if assumed else tuple(conjuncts(expectation(action.effect, bindings))),
         content=content, assumed=assumed, seconds=limit, **more,
     )  # fmt: skip
 
 
-def _decided(e: Expression) -> bool:
+def _is_decided(e: Expression) -> bool:
     """Return whether the condition is true in every world, e.g. the expansion of a recursive predicate."""
     match e:
         case Comparison("=", Constant(one), Constant(other)):
             return one == other
         case And(those):
-            return all(map(_decided, those))
+            return all(map(_is_decided, those))
         case Or(those):
-            return any(map(_decided, those))
+            return any(map(_is_decided, those))
         case _:
             return False
 
@@ -298,7 +298,7 @@ def _limit(action: PlanningAction, bindings: Mapping[str, Value]) -> Term | None
             return Arithmetic("*", (Constant(PATIENCE), most))
 
 
-def _watched(action: PlanningAction) -> Iterator[Expression]:
+def _find_watched(action: PlanningAction) -> Iterator[Expression]:
     """Yield the conditions over all, except conditions that the action itself changes."""
     if action.timed is not None:
         effects = (action.timed.start_effect, action.timed.end_effect)

@@ -119,7 +119,7 @@ class Writer:
         told = {"about": "waits for " + ", ".join(self._steps[other].text for _, other in waits)} if waits else {}
         ended = []
         if number in self._running and (seen := _seen(self._steps[number])) is not None:
-            ended = [_guarded({"to": f"after_{number}"}, seen)]
+            ended = [_add_guard({"to": f"after_{number}"}, seen)]
         return {**told, "always": [*ended, *self._onward(number, lane, [self._is_over(*one) for one in waits])]}
 
     def _is_over(self, kind: str, number: int) -> Expression:
@@ -133,7 +133,7 @@ class Writer:
     def _again(self, number: int, lane: ControlFlow) -> dict[str, Any]:
         """Return the state through which rules enter a step again."""
         step = self._steps[number]
-        enter = _guarded({"to": f"step_{number}"}, _joined(step.needed))
+        enter = _add_guard({"to": f"step_{number}"}, _join(step.needed))
         return {"always": [enter, self._replan(lane, f"not applicable: {step.text}")]}
 
     def _step(self, number: int, lane: ControlFlow) -> dict[str, Any]:
@@ -158,7 +158,7 @@ class Writer:
         step, flag = self._steps[number], f"{_DONE}_{number}"
         told = {"assign": {flag: True}} if flag in self._flags else {}
         if following is not None and self._waits[following]:
-            onward = [_guarded({"to": f"before_{following}", **told}, None if omitted else _seen(step))]
+            onward = [_add_guard({"to": f"before_{following}", **told}, None if omitted else _seen(step))]
         elif omitted:
             onward = self._onward(following, lane, (), told)
         else:
@@ -177,19 +177,19 @@ class Writer:
         All transitions wait for the conditions in `first`, or for the expected effects of `after` if that is given.
         """
         first, assigned = tuple(first), dict((told or {}).get("assign", {}))
-        begun = _joined(first) if after is None else _seen(after)
+        begun = _join(first) if after is None else _seen(after)
         if number is None:
-            return [_guarded({"to": lane.finished, **(told or {})}, begun)]
+            return [_add_guard({"to": lane.finished, **(told or {})}, begun)]
         step, flag = self._steps[number], f"{_BEGUN}_{number}"
         if flag in self._flags:
             assigned[flag] = True
         begin = {"to": f"step_{number}", **({"assign": assigned} if assigned else {})}
-        both = _joined((*first, *step.needed)) if after is None else _between(after, step)
+        both = _join((*first, *step.needed)) if after is None else _between(after, step)
         otherwise = [] if both == begun else [self._replan(lane, f"not applicable: {step.text}", begun)]
-        return [_guarded(begin, both), *otherwise]
+        return [_add_guard(begin, both), *otherwise]
 
     def _replan(self, lane: ControlFlow, reason: str, when: Expression | None = None) -> dict[str, Any]:
-        return _guarded({"to": REPLAN + lane.mark, "assign": {"reason": reason}}, when)
+        return _add_guard({"to": REPLAN + lane.mark, "assign": {"reason": reason}}, when)
 
 
 def passed(name: str) -> str:
@@ -197,11 +197,11 @@ def passed(name: str) -> str:
     return f"passed_{name}"
 
 
-def _guarded(transition: dict[str, Any], when: Expression | None) -> dict[str, Any]:
+def _add_guard(transition: dict[str, Any], when: Expression | None) -> dict[str, Any]:
     return transition if when is None else {**transition, "when": when}
 
 
-def _joined(conditions: Iterable[Expression]) -> Expression | None:
+def _join(conditions: Iterable[Expression]) -> Expression | None:
     """Return the conjunction of the conditions; `None` without conditions."""
     all_ = tuple(dict.fromkeys(conditions))
     return None if not all_ else all_[0] if len(all_) == 1 else And(all_)
@@ -211,13 +211,13 @@ def _joined(conditions: Iterable[Expression]) -> Expression | None:
 @cache_on_owner
 def _seen(step: CarriedStep) -> Expression | None:
     """Return the conjunction of the expected effects of a step."""
-    return _joined(step.expected)
+    return _join(step.expected)
 
 
 @cache_on_owner
 def _between(step: CarriedStep, following: CarriedStep) -> Expression | None:
     """Return the conjunction of the expected effects of a step and the conditions of the next step."""
-    return _joined((*step.expected, *following.needed))
+    return _join((*step.expected, *following.needed))
 
 
 def _is_set(kind: str, number: int) -> Expression:

@@ -72,7 +72,7 @@ def laid_out(
     if order is None:
         order = scheduled(plan) if plan.schedule else in_sequence(plan)
     domain = derivation(domain).domain  # the knowledge base does not evaluate derived predicates
-    rules = [own for rule in rules if (own := _inherited(rule, plan)) is not None]
+    rules = [own for rule in rules if (own := _inherit(rule, plan)) is not None]
     writing = None if library is None else Carrier.of(domain, library, rules)
     steps = [sketched(step, domain) if writing is None else writing.carried(step) for step in plan.steps]
     order = order.restricted(_clashes([step.usage for step in steps], order, shared))
@@ -160,7 +160,7 @@ def plot_of(
     )
 
 
-def _inherited(rule: Rule, plan: Plan) -> Rule | None:
+def _inherit(rule: Rule, plan: Plan) -> Rule | None:
     """Return the rule restricted to the steps of this plan; `None` if it applies to none of them."""
     if not rule.steps:
         return rule

@@ -121,8 +121,8 @@ class PlanningDomain:
         if len(pieces) == 1 and isinstance(pieces[0], PlanningDomain):
             return pieces[0]
         texts = [_text(piece) for piece in pieces]
-        with _searched(texts):
-            return cls.from_text(_merged(texts), (*_computed(pieces), *computed))
+        with _name_fragments(texts):
+            return cls.from_text(_merge(texts), (*_computed(pieces), *computed))
 
     @classmethod
     def parse(cls, text: str, source: str | None = None, computed: Iterable[Computed[Any]] = ()) -> PlanningDomain:
@@ -195,7 +195,7 @@ class PlanningDomain:
 
     def applicable(self, step: PlanStep, world: World) -> bool:
         """Return whether the step's arguments fit the types of the parameters and the precondition holds in `world`."""
-        action, bindings = self._filled(step)
+        action, bindings = self._bind_arguments(step)
         fitting, type_of = world.schema.fitting, world.type_of
         for parameter in action.parameters:
             if type_of(bindings[parameter.name]) not in fitting(parameter.types):
@@ -204,7 +204,7 @@ class PlanningDomain:
 
     def effects(self, step: PlanStep, world: World) -> Delta:
         """Return the changes that the step causes in `world`, even if the step is not applicable."""
-        action, bindings = self._filled(step)
+        action, bindings = self._bind_arguments(step)
         return apply_effect(action.effect, world, bindings)
 
     def precondition(self, step: PlanStep) -> Expression:
@@ -217,11 +217,11 @@ class PlanningDomain:
         if known is None:
             if len(self._ground) >= _MOST_GROUND:
                 self._ground.clear()
-            known = self._ground[step] = self._grounded(step)
+            known = self._ground[step] = self._ground_step(step)
         return known
 
-    def _grounded(self, step: PlanStep) -> GroundStep:
-        action, bindings = self._filled(step)
+    def _ground_step(self, step: PlanStep) -> GroundStep:
+        action, bindings = self._bind_arguments(step)
         types = [_type_test(p, bindings[p.name], self.schema) for p in action.parameters]
         condition = substitute(action.precondition, bindings)
         typed = And((*types, *(condition.parts if isinstance(condition, And) else (condition,))))
@@ -242,9 +242,9 @@ class PlanningDomain:
 
     def bindings(self, step: PlanStep) -> dict[str, str]:
         """Return the step's arguments by the names of the action's parameters."""
-        return self._filled(step)[1]
+        return self._bind_arguments(step)[1]
 
-    def _filled(self, step: PlanStep) -> tuple[PlanningAction, dict[str, str]]:
+    def _bind_arguments(self, step: PlanStep) -> tuple[PlanningAction, dict[str, str]]:
         action = self.action(step)
         if len(action.parameters) != len(step.args):
             raise InputError(
@@ -253,7 +253,7 @@ class PlanningDomain:
         return action, {p.name: arg for p, arg in zip(action.parameters, step.args, strict=True)}
 
 
-def _merged(texts: Sequence[DomainText]) -> DomainText:
+def _merge(texts: Sequence[DomainText]) -> DomainText:
     """Return the union of the fragments, with the name of the first fragment.
 
     Raises:
@@ -275,7 +275,7 @@ def _merged(texts: Sequence[DomainText]) -> DomainText:
 
 
 @contextmanager
-def _searched(texts: Sequence[DomainText]) -> Iterator[None]:
+def _name_fragments(texts: Sequence[DomainText]) -> Iterator[None]:
     """Add the names of the fragments to an error about a name that no fragment declares."""
     sources = dict.fromkeys(text.source or text.name for text in texts)
     try:

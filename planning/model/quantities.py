@@ -151,9 +151,9 @@ def linear(quantity: Quantity) -> dict[Fact, float] | None:
         case Operation("*", args):
             numbers = [arg for arg in args if not isinstance(arg, Fact | Operation)]
             others = [arg for arg in args if isinstance(arg, Fact | Operation)]
-            return _scaled(linear(others[0]), _product(numbers)) if len(others) == 1 else None
+            return _scale(linear(others[0]), _product(numbers)) if len(others) == 1 else None
         case Operation("/", (dividend, float() | int() as divisor)):
-            return _scaled(linear(dividend), 1 / divisor) if divisor else None
+            return _scale(linear(dividend), 1 / divisor) if divisor else None
         case Operation():
             return None
         case _:
@@ -179,7 +179,7 @@ def _product(numbers: list[float]) -> float:
     return product
 
 
-def _scaled(part: dict[Fact, float] | None, factor: float) -> dict[Fact, float] | None:
+def _scale(part: dict[Fact, float] | None, factor: float) -> dict[Fact, float] | None:
     return None if part is None else {fluent: factor * coefficient for fluent, coefficient in part.items()}
 
 

@@ -104,20 +104,20 @@ class Derivable:
     def _refuse_denied(self, goal: Expression) -> None:
         """Raise an error if a condition requires that a derived fact is false, which bookkeeping cannot prove."""
         for atom in self._unknowable(goal):
-            raise UnsupportedGoalError(self._said("the goal", atom), place=atom.place)
+            raise UnsupportedGoalError(self._describe("the goal", atom), place=atom.place)
         for action in relevant(goal, None, self.domain.actions.values()).actions:
             owner = f"the planning action '{action.name}'"
             if action.name.startswith(_DERIVE):
                 owner = f"the axiom at {action.place}"
             for atom in self._unknowable(action.precondition, *effect_conditions(action.effect)):
-                raise UnsupportedActionError(self._said(owner, atom), place=atom.place)
+                raise UnsupportedActionError(self._describe(owner, atom), place=atom.place)
 
     def _unknowable(self, condition: Expression, *of_effects: Expression) -> Iterator[Atom]:
         asked = [denied(condition, wanted=True)]
         asked += [denied(one, wanted=wanted) for one in of_effects for wanted in (True, False)]
         return (atom for atoms in asked for atom in atoms if atom.predicate in self.predicates)
 
-    def _said(self, owner: str, atom: Atom) -> str:
+    def _describe(self, owner: str, atom: Atom) -> str:
         return f"{owner} asks for the opposite of {self.original.why(atom.predicate)}"
 
 

@@ -33,7 +33,7 @@ from planning.model.quantities import NumericBound
 from planning.problem.conditions import Every, Grounder, Leaf, Literal, Residual, Some
 from planning.problem.derived import derivation
 from planning.problem.operators import OperatorCache, ignored, metric_of, things_of
-from planning.problem.reduction import pruned, spared
+from planning.problem.reduction import find_redundant, prune
 from planning.problem.relaxed_reachability import reachable
 from planning.problem.relevance import Relevant, refuse_unsupported, relevant
 from planning.problem.task import Assembly, Numbering, OperatorIndex, Task, ground_operator
@@ -150,8 +150,8 @@ class ProblemBuilder:
             if missing:
                 return self._nothing(*dict.fromkeys(missing))
             decided = _without_decided_choices(grounded.task, reach.taken)
-            task, notes = _priced(pruned(decided, reach.taken), amount)
-            return self._sliced(task, grounded.assembly, world, grounded.things, notes)
+            task, notes = _set_costs(prune(decided, reach.taken), amount)
+            return self._slice(task, grounded.assembly, world, grounded.things, notes)
 
     def grounded(
         self, world: World, goal: Expression, metric: Term | None = None, patience: WorkLimit | None = None
@@ -179,7 +179,7 @@ class ProblemBuilder:
             raise UnsupportedGoalError(error.message, place=error.place) from None
         if wanted is False:
             return GroundedProblem(matters, things, wanted)
-        groundwork, assembly = self._prepared(matters, metric, world, things, patience)
+        groundwork, assembly = self._prepare(matters, metric, world, things, patience)
         numbering = groundwork.numbering
         ways, goal_numbers = _with_conjunctive_goal(groundwork.ways, wanted, numbering)
         acting = numbering.of(_ACTING)
@@ -195,7 +195,7 @@ class ProblemBuilder:
             self._matters[key] = relevant(goal, metric, self._domain.actions.values())
         return self._matters[key]
 
-    def _prepared(
+    def _prepare(
         self, matters: Relevant, metric: Term | None, world: World, things: Mapping[str, str], patience: WorkLimit
     ) -> tuple[OperatorCache, Assembly]:
         """Return the cached ground actions if they are valid for this world; otherwise new ground actions."""
@@ -210,11 +210,11 @@ class ProblemBuilder:
         self._kept[key] = known
         return known
 
-    def _sliced(
+    def _slice(
         self, task: Task, assembly: Assembly, world: World, things: Mapping[str, str], notes: tuple[str, ...]
     ) -> Problem:
         """Return the slice, without objects that others can replace; `unsliced` constructs the whole problem."""
-        left, gone = task.left or {}, spared(task)
+        left, gone = task.left or {}, find_redundant(task)
 
         def problem(task: Task, world: World | None) -> Problem:
             return assembly.problem(self._domain.name, task, things, world, notes)
@@ -225,7 +225,7 @@ class ProblemBuilder:
 
         if not gone:
             return problem(task, world)
-        slice_ = pruned(task, _only(left.keys() - set(gone), len(task.ways.all)))
+        slice_ = prune(task, _only(left.keys() - set(gone), len(task.ways.all)))
         if notes:
             slice_ = _evenly_priced(slice_)
         if task.numbering.fluents:  # numeric fluents must have the values of this version
@@ -238,7 +238,7 @@ class ProblemBuilder:
         return Problem(self._domain.name, {}, (), (), (), unreachable)
 
 
-def _priced(task: Task, metric: Term | None) -> tuple[Task, tuple[str, ...]]:
+def _set_costs(task: Task, metric: Term | None) -> tuple[Task, tuple[str, ...]]:
     """Return the task with action costs; if the metric is not an action cost, with equal costs and a note."""
     if metric is None or all(way.cost is not None for way in (task.left or {}).values()):
         return task, ()

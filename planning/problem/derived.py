@@ -71,15 +71,13 @@ class Derivation:
 
     def world(self, world: World) -> World:
         """Return the world with the facts of those recursive predicates that no action affects."""
-        return self._closed(
-            world, [one for one in self._definitions.circles if self.unsupported.keys().isdisjoint(one)]
-        )
+        return self._close(world, [one for one in self._definitions.circles if self.unsupported.keys().isdisjoint(one)])
 
     def complete(self, world: World) -> World:
         """Return the world with the facts of all recursive predicates."""
-        return self._closed(world, self._definitions.circles)
+        return self._close(world, self._definitions.circles)
 
-    def _closed(self, world: World, circles: Collection[frozenset[str]]) -> World:
+    def _close(self, world: World, circles: Collection[frozenset[str]]) -> World:
         if not circles:
             return world
         closed = Overlay(world)
@@ -159,9 +157,9 @@ class Settled:
         return self._replaced(expanded) if self.predicates else expanded
 
     def _replaced(self, e: Expression) -> Expression:
-        return with_atoms(e, self._listed)
+        return with_atoms(e, self._list)
 
-    def _listed(self, atom: Atom) -> Expression:
+    def _list(self, atom: Atom) -> Expression:
         if atom.predicate not in self.predicates:
             return atom
         known = sorted((one.args for one in self.facts if one.predicate == atom.predicate), key=str)

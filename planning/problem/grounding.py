@@ -45,7 +45,7 @@ def ground_operators(
     if precondition is False:
         return
     step = PlanStep(action.name, tuple([str(bindings[p.name]) for p in action.parameters]))
-    effects = _eased(list(grounder.effects(action.effect, bindings)))
+    effects = _ease_conditions(list(grounder.effects(action.effect, bindings)))
     conditions: dict[Residual, None] = {}
     for one in effects:
         if one.condition is not True and negation(one.condition) not in conditions:
@@ -61,11 +61,11 @@ def ground_operators(
         chosen = [c if yes else negation(c) for c, yes in zip(conditions, taken, strict=True)]
         happening = {True, *chosen}
         changes = [e.what for e in effects if e.condition in happening]
-        for condition in _bounded(every([precondition, *chosen]), action):
+        for condition in _list_alternatives(every([precondition, *chosen]), action):
             yield ground_operator(step, condition, _literals(changes), numbering, _assignments(changes, action))
 
 
-def _eased(effects: list[GroundEffect]) -> list[GroundEffect]:
+def _ease_conditions(effects: list[GroundEffect]) -> list[GroundEffect]:
     """Return equivalent effects with weaker conditions.
 
     A delete needs no condition that its fact is true. An add needs no condition that its fact is false, unless another
@@ -87,7 +87,7 @@ def _except(condition: Residual, known: Literal) -> Residual:
     return every(part for part in parts if part != known)
 
 
-def _bounded(condition: Residual, action: PlanningAction) -> list[tuple[Leaf, ...]]:
+def _list_alternatives(condition: Residual, action: PlanningAction) -> list[tuple[Leaf, ...]]:
     found = list(itertools.islice(alternatives(condition), _MOST_ALTERNATIVES + 1))
     if len(found) > _MOST_ALTERNATIVES:
         raise UnsupportedActionError(

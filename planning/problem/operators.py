@@ -135,11 +135,11 @@ class OperatorCache:
             WorkLimitError: the limit has passed.
         """
         self._grounder = replace(self._grounder, patience=patience)
-        found = list(self._found(world, more=self._world.follow(world, things)))
+        found = list(self._find_operators(world, more=self._world.follow(world, things)))
         if found:
             self.ways = OperatorIndex(sorted([*self.ways.all, *found], key=self._key))
 
-    def _found(self, world: World, *, more: bool) -> Iterator[GroundOperator]:
+    def _find_operators(self, world: World, *, more: bool) -> Iterator[GroundOperator]:
         first = not self._rules
         if first or more:
             self._rules = [JoinRule.of(action, self._grounder) for action in self._actions]
@@ -202,13 +202,13 @@ def _ranges_over_all(action: PlanningAction, schema: Vocabulary) -> bool:
     bound = {term.name for atom in joined_atoms(action, schema) for term in atom.args if isinstance(term, Variable)}
     return (
         any(parameter.name not in bound for parameter in action.parameters)
-        or any(map(_quantified, (action.precondition, *effect_conditions(action.effect))))
+        or any(map(_has_quantifier, (action.precondition, *effect_conditions(action.effect))))
         or any(isinstance(part, ForEach) for part in effect_parts(action.effect))
     )
 
 
-def _quantified(e: Expression | Term) -> bool:
-    return isinstance(e, Exists | Forall) or any(map(_quantified, parts_of(e)))
+def _has_quantifier(e: Expression | Term) -> bool:
+    return isinstance(e, Exists | Forall) or any(map(_has_quantifier, parts_of(e)))
 
 
 TOTAL_COST = Call("total-cost")

@@ -21,7 +21,7 @@ from planning.model.quantities import fluents
 from planning.problem.task import GroundOperator, LazyTable, Numbering, OperatorIndex, Task
 
 
-def pruned(task: Task, possible: Collection[int] | bytearray) -> Task:
+def prune(task: Task, possible: Collection[int] | bytearray) -> Task:
     """Return the task without parts that cannot matter.
 
     Pruning removes operators that are impossible or cannot contribute, and literals that no condition reads. It also
@@ -133,10 +133,10 @@ def _clean(way: GroundOperator, asked: frozenset[int], settled: frozenset[int], 
     )
 
 
-def spared(task: Task) -> list[int]:
+def find_redundant(task: Task) -> list[int]:
     """Return the positions of the redundant operators; each of them contains a replaceable object."""
     left, naming = task.left or {}, task.ways.naming
-    mentions = _mentions(task, left, _settled(task, left))
+    mentions = _mentions(task, left, _find_fixed_objects(task, left))
     if not mentions:
         return []
     substitutes = [name for name in naming if name not in mentions and not left.keys().isdisjoint(naming[name])]
@@ -156,7 +156,7 @@ def spared(task: Task) -> list[int]:
     return sorted(gone)
 
 
-def _settled(task: Task, left: Mapping[int, GroundOperator]) -> set[str]:
+def _find_fixed_objects(task: Task, left: Mapping[int, GroundOperator]) -> set[str]:
     """Return the objects that must not be removed."""
     objects, bounds = task.numbering.objects, task.numbering.bounds
     settled = set[str]().union(*map(objects.__getitem__, (*task.init, *task.goal)))

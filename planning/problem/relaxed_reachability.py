@@ -57,7 +57,7 @@ def _computed_reach(task: Task) -> Reach:
                     agenda.append(one)
                 if one in supports:
                     hoped = [bound for bound in supports[one] if bound not in reached]
-                    fresh = _helped(hoped, ways[i], task.numbering) if hoped else hoped
+                    fresh = _find_helped(hoped, ways[i], task.numbering) if hoped else hoped
                     reached.update(dict.fromkeys(fresh, i))
                     agenda += fresh
         else:
@@ -68,7 +68,7 @@ def _computed_reach(task: Task) -> Reach:
     return Reach(reached, taken)
 
 
-def _helped(bounds: Iterable[int], way: GroundOperator, numbering: Numbering) -> list[int]:
+def _find_helped(bounds: Iterable[int], way: GroundOperator, numbering: Numbering) -> list[int]:
     """Return the bounds that the operator may make true."""
     return [
         number for number in bounds if any(helps(change, numbering.bounds[number]) for change in way.assignments)
@@ -99,7 +99,7 @@ class _Again:
         given = set(task.init)
         fresh = [one for one in given if one not in before]
         lost = [one for one, way in before.items() if way == _GIVEN and one not in given]
-        if any(one in users for one in fresh) or not all(self._regained(one, given) for one in lost):
+        if any(one in users for one in fresh) or not all(self._is_regained(one, given) for one in lost):
             return None
         taken = self._left(given)
         instead = self._instead(taken, given)
@@ -112,7 +112,7 @@ class _Again:
         }  # fmt: skip
         return Reach({**dict.fromkeys(task.init, _GIVEN), **proven, **kept}, taken)
 
-    def _regained(self, lost: int, given: set[int]) -> bool:
+    def _is_regained(self, lost: int, given: set[int]) -> bool:
         """Return whether a fact that no longer holds initially is proven or certainly unreachable."""
         if lost not in self.task.ways.adders:
             self.gone.add(lost)

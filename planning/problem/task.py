@@ -119,10 +119,10 @@ class Numbering:
     def images(self, name: str, other: str) -> Mapping[int, int]:
         """Return a mapping from each literal to the literal with `other` instead of `name`."""
         if (name, other) not in self._images:
-            self._images[name, other] = LazyTable(lambda number: self._renamed(number, name, other))
+            self._images[name, other] = LazyTable(lambda number: self._rename(number, name, other))
         return self._images[name, other]
 
-    def _renamed(self, number: int, name: str, other: str) -> int:
+    def _rename(self, number: int, name: str, other: str) -> int:
         fact = self._named[number >> 1]
         if isinstance(fact, NumericBound) or name not in fact.args:
             return number

@@ -76,7 +76,7 @@ def build_temporal_problem(
         found = [action for step in steps for action in grounding.of(step)]
     except (_TooComplexError, UnsupportedActionError):
         return None
-    return _restricted(domain.name, found, wanted, world)
+    return _restrict(domain.name, found, wanted, world)
 
 
 def _relevant(domain: PlanningDomain, goal: Expression) -> Relevant:
@@ -128,13 +128,13 @@ def _possible(
     groundwork.extend(world, things, patience)
     numbering = groundwork.numbering
 
-    def linked(way: GroundOperator, step: PlanStep) -> GroundOperator:
+    def link(way: GroundOperator, step: PlanStep) -> GroundOperator:
         begun = numbering.of(Literal(Fact(_BEGUN + step.action.removesuffix(_ENDS), step.args)))
         if step.action.endswith(_ENDS):
             return way._replace(needs=(*way.needs, begun))
         return way._replace(adds=(*way.adds, begun))
 
-    ways = OperatorIndex([linked(way, way.step) for way in groundwork.ways.all if way.step is not None])
+    ways = OperatorIndex([link(way, way.step) for way in groundwork.ways.all if way.step is not None])
     goal = tuple(map(numbering.of, wanted))
     begun = {one for way in ways.all for one in way.adds if str(numbering.named(one)).startswith(f"({_BEGUN}")}
     reach = reachable(Task(numbering, numbering.present(world) - begun, goal, ways))
@@ -226,11 +226,11 @@ def _numbers(actions: Iterable[GroundAction], goal: Iterable[NumericBound]) -> s
     return read
 
 
-def _restricted(name: str, actions: list[GroundAction], wanted: tuple[Leaf, ...], world: World) -> Problem:
+def _restrict(name: str, actions: list[GroundAction], wanted: tuple[Leaf, ...], world: World) -> Problem:
     """Return the problem without facts and numbers that no condition reads, and without facts that never change."""
     goal, bounds = _facts(wanted), _bounds(wanted)
     read = _numbers(actions, bounds)
-    asked = dict.fromkeys([*goal, *(fact for action in actions for fact in _needed(action))])
+    asked = dict.fromkeys([*goal, *(fact for action in actions for fact in _conditions_of(action))])
     gone = {fact for action in actions for fact in (*action.deletes, *(action.span.deletes if action.span else ()))}
     present = [fact for fact in asked if _holds(fact, world)]
     kept = asked.keys() - (set(present) - gone)
@@ -259,7 +259,7 @@ def _restricted(name: str, actions: list[GroundAction], wanted: tuple[Leaf, ...]
     return Problem(name, objects, init, among(goal), tuple(map(small, actions)), numbers=numbers, bounds=bounds)
 
 
-def _needed(action: GroundAction) -> tuple[Fact, ...]:
+def _conditions_of(action: GroundAction) -> tuple[Fact, ...]:
     span = action.span
     return (*action.precondition, *(() if span is None else (*span.over_all, *span.end)))
 

@@ -21,7 +21,7 @@ from knowledge_base.language.syntax.text import parse_condition
 from planning.cli.doctor import DISTRIBUTION
 from planning.engines.process import Deadline, EngineProcess, EngineStoppedError, OutOfTimeError, worker
 from planning.engines.registry import ENGINES
-from planning.engines.request import written
+from planning.engines.request import write_problem
 from planning.model.ground_action import GroundAction
 from planning.model.plan import PlanStep
 from planning.model.problem import Problem
@@ -56,7 +56,7 @@ def scripted():
 def asked(process, problem, seconds=60.0):
     """The one answer."""
     answers: list[dict[str, Any]] = []
-    process.ask(written(problem), Deadline(seconds), answers.append)
+    process.ask(write_problem(problem), Deadline(seconds), answers.append)
     (answer,) = answers
     answer.pop("translated", None)  # it differs from time to time
     return answer
@@ -159,7 +159,7 @@ def test_a_search_may_be_cut_short_from_another_thread(engine):
     hurrying = threading.Thread(target=hurry)
     hurrying.start()
     with pytest.raises(OutOfTimeError):
-        engine.ask(written(HARD), deadline, print)
+        engine.ask(write_problem(HARD), deadline, print)
     hurrying.join()
 
 
@@ -176,7 +176,7 @@ def test_a_search_ends_with_its_worker_and_the_worker_with_its_owner(way):
     popen = subprocess.Popen(worker("pyperplan"), stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     with popen:
         assert json.loads(popen.stdout.readline()) == {"ready": True}
-        popen.stdin.write(written(HARD))
+        popen.stdin.write(write_problem(HARD))
         popen.stdin.flush()
         search = json.loads(popen.stdout.readline())["searching"]
         if way == "it is killed":
@@ -211,7 +211,7 @@ def test_after_a_kill_nothing_that_the_worker_started_lives(scripted):
         process.kill()
 
     with pytest.raises(EngineStoppedError):
-        process.ask(written(PROBLEM), Deadline(60), heard)
+        process.ask(write_problem(PROBLEM), Deadline(60), heard)
     assert len(family) == 4
     assert gone(family)
 
@@ -221,7 +221,7 @@ def test_a_worker_that_does_not_say_that_its_search_has_ended_is_ended_itself(sc
     process = scripted(TEEMING)
     process.start(60)
     with pytest.raises(OutOfTimeError):
-        process.ask(written(PROBLEM), Deadline(0.5), print)
+        process.ask(write_problem(PROBLEM), Deadline(0.5), print)
     assert not process.alive
 
 
@@ -233,7 +233,7 @@ def test_a_worker_cannot_make_us_kill_others(scripted, group):
     )
     process.start(60)
     with pytest.raises(EngineStoppedError, match="no separate process group"):
-        process.ask(written(PROBLEM), Deadline(60), print)
+        process.ask(write_problem(PROBLEM), Deadline(60), print)
     assert not process.alive
 
 
@@ -242,7 +242,7 @@ def test_a_worker_that_babbles_is_ended(scripted, monkeypatch):
     process = scripted(READY + "while True: print('bla' * 1000, end='', flush=True)")
     process.start(60)
     with pytest.raises(EngineStoppedError, match="over 100000 bytes without an end"):
-        process.ask(written(PROBLEM), Deadline(60), print)
+        process.ask(write_problem(PROBLEM), Deadline(60), print)
     assert not process.alive
 
 
@@ -250,7 +250,7 @@ def test_an_answer_too_deep_to_be_read_is_no_answer(scripted):
     process = scripted(READY + "print('[' * 100_000, flush=True); time.sleep(600)")
     process.start(60)
     with pytest.raises(EngineStoppedError):
-        process.ask(written(PROBLEM), Deadline(60), print)
+        process.ask(write_problem(PROBLEM), Deadline(60), print)
     assert not process.alive
 
 
@@ -290,7 +290,7 @@ def test_what_is_said_before_the_end_is_heard_in_order(scripted):
     process = scripted(answering('{"actions": [1]}', '{"actions": [2]}'))
     process.start(60)
     heard: list[Any] = []
-    process.ask(written(PROBLEM), Deadline(60), heard.append)
+    process.ask(write_problem(PROBLEM), Deadline(60), heard.append)
     assert heard == [{"actions": [1]}, {"actions": [2]}]
 
 

@@ -20,7 +20,7 @@ from knowledge_base.language.syntax.text import parse_condition
 from planning.analysis.validation import validate
 from planning.engines.process import Deadline, EngineProcess, worker
 from planning.engines.registry import engine
-from planning.engines.request import read, written
+from planning.engines.request import read, write_problem
 from planning.model.domain import PlanningDomain
 from planning.model.ground_action import GroundAction
 from planning.model.plan import Plan, PlanStep
@@ -63,7 +63,7 @@ def kairos():
 
 def answer(process, problem):
     heard: list[Any] = []
-    process.ask(written(problem), Deadline(60), heard.append)
+    process.ask(write_problem(problem), Deadline(60), heard.append)
     return heard[-1]
 
 
@@ -163,7 +163,7 @@ def test_a_plan_with_numbers_and_durations_is_valid_in_the_ground_problem_and_in
     problem = build_problem(BOTH, world, goal, durations=True).timed
     assert problem is not None
     assert problem.features >= {"numeric", "durations"}
-    assert read(json.loads(written(problem))) == problem
+    assert read(json.loads(write_problem(problem))) == problem
     found = answer(kairos, problem)["timed"]
     plan = problem.scheduled([tuple(one) for one in found])
     assert isinstance(plan, Plan), plan

@@ -13,7 +13,7 @@ from knowledge_base.facts import Fact
 from knowledge_base.language.syntax.text import parse_condition
 from planning.engines.process import Deadline, EngineProcess, OutOfTimeError, worker
 from planning.engines.registry import ENGINES
-from planning.engines.request import written
+from planning.engines.request import write_problem
 from planning.model.domain import PlanningDomain
 from planning.model.ground_action import GroundAction
 from planning.model.plan import PlanStep
@@ -57,7 +57,7 @@ def process_of():
 def answers(process, problem, seconds=60.0):
     heard: list[dict[str, Any]] = []
     try:
-        process.ask(written(problem), Deadline(seconds), heard.append)
+        process.ask(write_problem(problem), Deadline(seconds), heard.append)
     except OutOfTimeError:  # an engine that goes on to look for better plans
         assert heard
     for answer in heard:
@@ -155,7 +155,7 @@ def test_a_search_that_is_ended_leaves_nothing_behind(process_of, name):
 
     watching = threading.Thread(target=watch)
     watching.start()
-    request = written(lights_out(200 if name == "kairos" else 60))  # Kairos has an answer for 60 at once
+    request = write_problem(lights_out(200 if name == "kairos" else 60))  # Kairos has an answer for 60 at once
     with pytest.raises(OutOfTimeError):
         process.ask(request, deadline, print)
     watching.join()
@@ -192,6 +192,6 @@ def test_a_kill_in_the_middle_of_a_search_leaves_nothing_behind(name):
     watching.start()
     with pytest.raises(Exception, match=r"killed|Bad file|ended"):
         # so large that no engine has an answer by then: a search that has answered may end before the kill
-        process.ask(written(lights_out(200)), Deadline(60), print)
+        process.ask(write_problem(lights_out(200)), Deadline(60), print)
     watching.join()
     assert gone({*family, process._pid})

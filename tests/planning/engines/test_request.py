@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from knowledge_base.facts import Fact
-from planning.engines.request import read, written
+from planning.engines.request import read, write_problem
 from planning.model.ground_action import ActionSpan, GroundAction
 from planning.model.plan import PlanStep
 from planning.model.problem import Problem
@@ -55,7 +55,7 @@ PROBLEMS = st.builds(
 
 @given(PROBLEMS)
 def test_a_worker_reads_the_problem_that_was_written(problem):
-    line = written(problem)
+    line = write_problem(problem)
     assert line.count(b"\n") == 1
     again = read(json.loads(line))
     assert again == problem
@@ -67,4 +67,4 @@ def test_a_worker_reads_the_problem_that_was_written(problem):
 def test_a_request_tells_whether_the_problem_is_a_part_of_another(problem, part):
     if part:
         problem = Problem(problem.domain, problem.objects, problem.init, problem.goal, (), unsliced=lambda: problem)
-    assert json.loads(written(problem))["whole"] is part
+    assert json.loads(write_problem(problem))["whole"] is part

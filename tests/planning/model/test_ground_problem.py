@@ -3,7 +3,7 @@ from __future__ import annotations
 import json
 
 from knowledge_base.facts import Fact
-from planning.engines.request import read, written
+from planning.engines.request import read, write_problem
 from planning.model.ground_action import GroundAction
 from planning.model.plan import PlanStep
 from planning.model.problem import Problem
@@ -25,4 +25,4 @@ def test_actions_of_different_costs_are_a_feature():
 
 
 def test_costs_survive_json():
-    assert read(json.loads(written(problem(1, 2.5)))) == problem(1, 2.5)
+    assert read(json.loads(write_problem(problem(1, 2.5)))) == problem(1, 2.5)

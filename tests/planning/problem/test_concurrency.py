@@ -21,7 +21,7 @@ from planning.engines import planner as planner_module
 from planning.engines.planner import PlannerProcess
 from planning.engines.race import PlannerRace
 from planning.engines.registry import engine
-from planning.engines.request import read, written
+from planning.engines.request import read, write_problem
 from planning.model.plan import EngineFailed, NoneFound, Plan, PlanFound, PlanStep, ProvenUnsolvable, Timing
 from planning.problem.construction import build_problem
 
@@ -147,7 +147,7 @@ def test_the_posed_problem_has_a_form_with_durations_that_survives_json():
     assert problem.unreachable  # one action at a time: the light is out before anything can be mended
     assert problem.one_at_a_time
     assert (problem.features, problem.timed.features) == (frozenset(), {"durations"})
-    assert read(json.loads(written(problem.timed))) == problem.timed
+    assert read(json.loads(write_problem(problem.timed))) == problem.timed
     [strike, *_] = problem.timed.actions
     assert (strike.span.least, strike.span.most) == (5.0, 5.0)
 

@@ -14,7 +14,7 @@ from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.store import KnowledgeBase
 from planning.analysis.explanation import why_unsolvable
 from planning.analysis.validation import validate
-from planning.engines.request import read, written
+from planning.engines.request import read, write_problem
 from planning.model.domain import PlanningDomain
 from planning.model.plan import Plan, PlanStep
 from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
@@ -94,7 +94,7 @@ def test_a_number_that_nobody_asks_about_is_left_out(jars):
 
 def test_a_numeric_problem_is_json_and_back(jars):
     problem = build_problem(jars, kitchen(jars), parse_condition("(and (sealed big) (> (poured) 3))"))
-    assert read(json.loads(written(problem))) == problem
+    assert read(json.loads(write_problem(problem))) == problem
 
 
 def test_a_number_that_no_possible_action_changes_is_proven_out_of_reach(jars):

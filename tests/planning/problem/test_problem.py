@@ -21,7 +21,7 @@ from knowledge_base.world.computation import computed
 from knowledge_base.world.overlay import Overlay
 from planning.analysis.explanation import why_unsolvable
 from planning.analysis.validation import validate
-from planning.engines.request import read, written
+from planning.engines.request import read, write_problem
 from planning.model.domain import PlanningDomain
 from planning.model.plan import PlanStep
 from planning.model.problem import UnsupportedActionError, UnsupportedGoalError
@@ -145,7 +145,7 @@ def test_the_same_world_gives_the_same_problem(clean_up, table):
 def test_a_problem_is_json_and_back(clean_up, table):
     problem = build_problem(clean_up, table(cups=3, cans=2, crisp_cans=["two"]), ALL_TIDY)
     assert problem.whole is not None
-    assert read(json.loads(written(problem))) == replace(problem, unsliced=None)
+    assert read(json.loads(write_problem(problem))) == replace(problem, unsliced=None)
 
 
 def test_the_simulated_duration_grows_with_the_problem(clean_up, table):

@@ -8,7 +8,7 @@ from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
 from planning.model.domain import PlanningDomain
 from planning.problem.construction import ProblemBuilder
-from planning.problem.reduction import pruned
+from planning.problem.reduction import prune
 from planning.problem.relaxed_reachability import reachable
 from planning.problem.task import OperatorIndex, Task
 
@@ -56,7 +56,7 @@ def test_what_is_found_again_is_what_comes_of_working_it_out_anew(start, turns, 
         reach, reach_anew = reachable(task), reachable(anew)
         assert set(reach.facts) == set(reach_anew.facts)
         assert reach.taken == reach_anew.taken
-        slice_, slice_anew = pruned(task, reach.taken), pruned(anew, reach.taken)
+        slice_, slice_anew = prune(task, reach.taken), prune(anew, reach.taken)
         assert (slice_.left, slice_.settled) == (slice_anew.left, slice_anew.settled)
         assert (slice_.init, slice_.goal) == (slice_anew.init, slice_anew.goal)
         proven: set[int] = set()
