@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dsc.engine.automaton import Configuration
+from dsc.engine.automaton import MOST_TRIGGERS, Configuration
 from dsc.engine.machine_state import FrameState, MachineState
 from dsc.engine.steps import Step
+from dsc.events import Event
 
 
 class IdleState(MachineState):
@@ -15,6 +16,12 @@ class IdleState(MachineState):
     """
 
     steps: dict[str, Step]
+
+    def keep(self, step: Step, event: Event) -> None:
+        """Keep a step from this state on an event; events from outside may have any name."""
+        if len(self.steps) >= MOST_TRIGGERS:
+            self.steps.clear()
+        self.steps[event.name] = step
 
 
 def idle_state(root: FrameState, serials: int, configuration: Configuration) -> IdleState:

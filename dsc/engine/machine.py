@@ -49,7 +49,7 @@ def move(state: MachineState, root: FrameState, event: Event, situation: Situati
     micro = _new(Microstep, (event, choice.taken, choice.exited, choice.entered, ()))
     step = _new(Step, (after, event, True, (micro,), (), NO_CHANGE, (), (), (), NOTHING, ()))
     if idle is not None and choices[event.name] is choice:
-        idle.steps[event.name] = step
+        idle.keep(step, event)
     return step
 
 

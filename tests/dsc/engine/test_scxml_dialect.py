@@ -13,6 +13,7 @@ from dsc.dynamic.library import Library
 from dsc.engine.machine_forms import read_state
 from dsc.engine.steps import Note, SendLater
 from dsc.engine.transition_selection import matches
+from dsc.events import Event
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.clock import LoopClock, SimulatedEventLoop
 from dsc.sequencer.sequencer import Sequencer
@@ -362,3 +363,15 @@ def test_the_sequencer_delivers_delayed_events_and_writes_notes():
     finally:
         loop.close()
     assert [json.loads(line)["text"] for line in lines if json.loads(line)["type"] == "log"] == ["hi"]
+
+
+def test_steps_on_events_of_any_name_do_not_pile_up(monkeypatch):
+    monkeypatch.setattr("dsc.engine.idle_state.MOST_TRIGGERS", 8)
+    run = Run(chart({"a": {"on": {"*": "b"}}, "b": {"on": {"*": "a"}}}))
+    run.start()
+    for number in range(100):
+        run.send(f"e{number}")
+        assert len(run.machine.state.steps) <= 8
+    assert run.active == ["a"]
+    event = Event("e100")
+    assert run.machine.send(event, run.situation()).microsteps[0].entered == ("b",)
