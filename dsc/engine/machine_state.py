@@ -90,10 +90,6 @@ class MachineState(NamedTuple):
             return () if self.root is None else self.root.configuration.names
         return tuple(_paths(self.root, ""))
 
-    def has_activation(self, serial: int) -> bool:
-        """Return whether the state with this serial number is still active."""
-        return self.root is not None and any(serial in one.activations.values() for one in self.root.frames())
-
     def state_of(self, serial: int) -> tuple[str, ActionPlot] | None:
         """Return path and plot of the state with this serial number; `None` if the state is no longer active."""
         found = [] if self.root is None else _find_activation(self.root, "", serial)

@@ -36,7 +36,6 @@ from knowledge_base.language.syntax.expression import (
     Variable,
 )
 
-IN, SIZE, IS_SET = "in", "size", "is-set"
 _FALSE = Or(())
 PLAIN: dict[int, Form] = {}
 """Forms that read no data, by their identity: a test that costs no call, for the conditions of most plots."""

@@ -9,7 +9,7 @@ The steps are divided into the fewest chains (Dilworth 1950), found by matching 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -97,13 +97,6 @@ def scheduled(plan: Plan) -> PartialOrder:
     last = {j: max((one.start for one in plan.schedule if one.start < now.start), default=None) for j, now in timed}
     begun = {(i, j) for j in last for i, one in timed if one.start == last[j] and i not in order.earlier[j]}
     return replace(order, begin_before=frozenset(begun))
-
-
-def standing(links: Iterable[CausalLink], done: Collection[int], begun: Collection[int]) -> tuple[CausalLink, ...]:
-    """Return the links whose facts must hold now: all providers of a fact are done, and its user has not begun."""
-    waiting = [link for link in links if link.user not in begun]
-    coming = {(link.fact, link.user) for link in waiting if link.provider not in {PRESENT, *done}}
-    return tuple(link for link in waiting if (link.fact, link.user) not in coming)
 
 
 def reduced(pairs: Iterable[tuple[int, int]]) -> frozenset[tuple[int, int]]:

@@ -103,7 +103,7 @@ def answers_dropped_with_their_state(monkeypatch):
 
     def tidy(self, message):
         take(self, message)
-        active = self.machine.state.has_activation
+        active = self.machine.state.state_of
         self.rearrange(
             lambda waiting: [m for m in waiting if not isinstance(m, SkillMessage) or active(m.start.activation)]
         )

@@ -440,5 +440,5 @@ class Played(Run):
 
     def after(self, step):
         self.timers += [one for one in step.output if isinstance(one, StartTimer)]
-        self.timers = [one for one in self.timers if step.state.has_activation(one.activation)]
+        self.timers = [one for one in self.timers if step.state.state_of(one.activation)]
         return step

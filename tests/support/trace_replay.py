@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
+from standing_links import standing
+
 from knowledge_base.exchange import delta_of
 from knowledge_base.facts import Fact
 from knowledge_base.language.evaluation.evaluator import holds
@@ -21,7 +23,6 @@ from knowledge_base.world.overlay import Overlay
 from planning import PlanningDomain
 from planning.model.plan import Plan, PlanStep
 from planning.ordering.causal_tracing import deordered
-from planning.ordering.partial_order import standing
 
 STATE = re.compile(r"(?:.*/)?(step|after)_(\d+)")
 

@@ -92,8 +92,8 @@ def test_the_configuration_names_states_by_their_paths_and_regions_not_at_all():
     assert state.is_active("x/a")
     assert state.is_active("a")
     assert not state.is_active("x2")
-    assert state.has_activation(run.serial("y"))
-    assert not state.has_activation(10_000)
+    assert state.state_of(run.serial("y"))
+    assert not state.state_of(10_000)
 
 
 def test_a_machine_that_was_not_started_or_has_ended_does_nothing():
@@ -150,9 +150,9 @@ def test_what_is_active_inside_a_state_is_its_own_activation_and_those_of_its_co
     assert state.activations_inside(own) == {own, inner}
     assert state.activations_inside(inner) == {inner}
     assert state.activations_inside(0) == MachineState().activations_inside(own) == frozenset()
-    assert state.has_activation(inner)
-    assert not state.has_activation(0)
-    assert not MachineState().has_activation(inner)
+    assert state.state_of(inner)
+    assert not state.state_of(0)
+    assert not MachineState().state_of(inner)
 
 
 def test_a_frame_goes_to_json_and_back():

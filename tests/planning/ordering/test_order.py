@@ -6,6 +6,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from order_strategies import Planned, planned
+from standing_links import standing
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import fact
@@ -17,7 +18,7 @@ from planning.model.domain import PlanningDomain
 from planning.model.plan import Plan, PlanStep
 from planning.ordering import step_dependencies
 from planning.ordering.causal_tracing import deordered
-from planning.ordering.partial_order import PartialOrder, reduced, standing
+from planning.ordering.partial_order import PartialOrder, reduced
 
 
 def linearisations(order: PartialOrder):
