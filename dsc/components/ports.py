@@ -73,10 +73,12 @@ def query(body: _Asked) -> _Asked:
     time `within`. The event `answered` carries the answer.
 
     Raises:
-        SchemaError: the annotation of the method's return value is not one outcome class.
+        SchemaError: the annotation of the method's return value is not one outcome class, or the method is not a
+            coroutine.
     """
     require_function(body, "query")
     with refused_at(body) as name:
+        _require_coroutine(body, f"query '{name}'")
         names = names_around(body.__globals__)
         records = FoundRecords()
         answers = list(returned_outcomes(body, names, records).values())
@@ -99,10 +101,13 @@ def event(test: _Test) -> _Test:
     In the method, the activation's parameters follow those for values, and have defaults.
 
     Raises:
-        SchemaError: the annotation of the method's return value is not one outcome class or `None`.
+        SchemaError: the annotation of the method's return value is not one outcome class or `None`, or the method is a
+            coroutine.
     """
     require_function(test, "event")
     with refused_at(test) as name:
+        if inspect.iscoroutinefunction(inspect.unwrap(test)):
+            raise SchemaError(f"event '{name}' is a coroutine, and its test is a plain function: write `def`")
         names = names_around(test.__globals__)
         own = sum(one.default is inspect.Parameter.empty for one in inspect.signature(test).parameters.values())
         records = FoundRecords()
@@ -117,13 +122,23 @@ def event(test: _Test) -> _Test:
 
 
 def takes(body: _Body) -> _Body:
-    """Declare a coroutine method that receives one-way messages, e.g. `send: voice.say` in a chart."""
+    """Declare a coroutine method that receives one-way messages, e.g. `send: voice.say` in a chart.
+
+    Raises:
+        SchemaError: the method is not a coroutine.
+    """
     require_function(body, "takes")
-    with refused_at(body):
+    with refused_at(body) as name:
+        _require_coroutine(body, f"method '{name}' with `@takes`")
         names = names_around(body.__globals__)
         how = {"execute": _ask, "own": 1, "pattern": "message"}
         setattr(body, TAKES, declaration(body, 1, names, {}, FoundRecords(), **how))
     return body
+
+
+def _require_coroutine(body: _Body, what: str) -> None:
+    if not inspect.iscoroutinefunction(inspect.unwrap(body)):
+        raise SchemaError(f"{what} is not a coroutine: write `async def`")
 
 
 @cache

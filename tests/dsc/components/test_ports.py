@@ -15,7 +15,7 @@ from dsc.outcomes import Outcome
 from dsc.sequencer.clock import run_simulated
 from dsc.skills import skill
 from dsc.validation import validate_plot
-from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.world.schema import Schema
 
 
@@ -309,6 +309,27 @@ class Scale(Component):
     @takes
     async def show(self, text: str, lines: list[int]):
         self.heard.append((text, lines))
+
+
+def test_a_port_whose_method_has_the_wrong_form_is_refused_at_its_declaration():
+    with pytest.raises(SchemaError, match=r"query 'Slow\.lasts' is not a coroutine: write `async def`") as refused:
+
+        class Slow:
+            @query  # type: ignore[type-var]
+            def lasts(self) -> Lasts: ...  # type: ignore[empty-body]
+
+    assert str(refused.value.place).startswith(__file__)
+    with pytest.raises(SchemaError, match=r"'Slow\.show' with `@takes` is not a coroutine: write `async def`"):
+
+        class Slow:  # type: ignore[no-redef]
+            @takes
+            def show(self, text: str) -> None: ...
+
+    with pytest.raises(SchemaError, match=r"event 'Slow\.low' is a coroutine, and its test is a plain function"):
+
+        class Slow:  # type: ignore[no-redef]
+            @event  # type: ignore[type-var]
+            async def low(self, level: float) -> Low | None: ...
 
 
 @pytest.mark.parametrize(
