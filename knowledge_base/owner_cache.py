@@ -4,26 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Any, TypeVar, TypeVarTuple, Unpack
 
-_Owner = TypeVar("_Owner")
-_P = ParamSpec("_P")
+
+class Owner:
+    """An immutable value, without slots, on which `cache_on_owner` keeps results."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state for pickling and copying, without the results, which may contain locks."""
+        return {name: value for name, value in vars(self).items() if "." not in name}
+
+
+_Owner = TypeVar("_Owner", bound=Owner)
+_Args = TypeVarTuple("_Args")
 _T = TypeVar("_T")
 
 
-def cache_on_owner(compute: Callable[Concatenate[_Owner, _P], _T]) -> Callable[Concatenate[_Owner, _P], _T]:
-    """Return the function with its last result kept on its first argument, an immutable object with a `__dict__`.
+def cache_on_owner(compute: Callable[[_Owner, Unpack[_Args]], _T]) -> Callable[[_Owner, Unpack[_Args]], _T]:
+    """Return the function with its last result kept on its first argument.
 
-    A call with other further arguments computes again; these arguments are immutable, too, and positional.
+    A call with other further arguments computes again, so that callers must not alternate between several of them.
+    These arguments are immutable, too.
     """
-    name = f"{compute.__module__}.{compute.__qualname__}"  # no field of the owner contains a dot
+    name = f"{compute.__module__}.{compute.__qualname__}"  # with a dot, which no field of the owner contains
 
     @wraps(compute)
-    def find(owner: _Owner, /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
+    def find(owner: _Owner, *args: *_Args) -> _T:
         known: tuple[tuple[object, ...], _T] | None = vars(owner).get(name)
         if known is not None and known[0] == args:
             return known[1]
-        result = compute(owner, *args, **kwargs)
+        result = compute(owner, *args)
         vars(owner)[name] = args, result
         return result
 

@@ -28,8 +28,9 @@ def idle_state(root: FrameState, serials: int, configuration: Configuration) -> 
     """Return the shared state of a plot without data in a configuration."""
     known = configuration.idle
     if not isinstance(known, IdleState):
-        known = configuration.idle = IdleState(root._replace(configuration=configuration), serials)
+        known = IdleState(root._replace(configuration=configuration), serials)
         known.steps = {}
+        configuration.idle = known  # complete, since other threads read it
     return known
 
 

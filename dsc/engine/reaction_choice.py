@@ -18,12 +18,13 @@ def choice_of(plot: Frame | FrameState, trigger: Trigger) -> Choice | None:
     """Return the reaction or first guard for a trigger; `None` if no active state has a transition for the trigger."""
     configuration = plot.configuration
     known = configuration.reactions.choices
-    found = known.get(trigger)
-    if found is None and trigger not in known:
+    try:
+        return known[trigger]  # one lookup: another thread may add the choice at any time
+    except KeyError:
         configuration.reactions.make_room()
         listens = any(edges_of(configuration.compiled, index, trigger) for index in configuration.active)
-        found = known[trigger] = _compute(configuration, trigger, {}) if listens else None
-    return found
+        choice = known[trigger] = _compute(configuration, trigger, {}) if listens else None
+        return choice
 
 
 def follow(question: Question, answer: bool) -> Choice:  # noqa: FBT001  # the guard's truth value

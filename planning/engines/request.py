@@ -1,7 +1,7 @@
 """The request to a worker: a problem as a line of JSON, which lists each fact once and refers to facts by number.
 
 Serialization must be fast, since a robot may wait. Successive problems share most ground actions, so the text of each
-action is kept on it, with gaps for the numbers of its facts.
+action is cached with gaps for the numbers of its facts.
 
 Keys of the JSON object:
 
@@ -21,6 +21,7 @@ from itertools import chain
 from typing import Any
 
 from knowledge_base.facts import Fact
+from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.owner_cache import cache_on_owner
 from planning.model.ground_action import ActionSpan, GroundAction
 from planning.model.plan import PlanStep
@@ -71,7 +72,7 @@ def read(request: Mapping[str, Any]) -> Problem:
 
 
 def _line(problem: Problem) -> bytes:
-    rows = list(map(_row, problem.actions))
+    rows = [_rows.find(action, None) or _rows.keep(action, None, _row(action)) for action in problem.actions]
     before = len(problem.init) + len(problem.goal)
     mentioned = [*problem.init, *problem.goal, *chain.from_iterable([facts for _, facts in rows])]
     places = list(map(id, mentioned))  # ids compare faster than facts; `mentioned` keeps the ids unique
@@ -96,7 +97,6 @@ def _line(problem: Problem) -> bytes:
     return f'{json.dumps(rest)[:-1]}, "actions": [{actions}]}}\n'.encode()
 
 
-@cache_on_owner
 def _row(action: GroundAction) -> _Row:
     span = action.span
     later = () if span is None else (span.over_all, span.end, span.adds, span.deletes)
@@ -153,3 +153,7 @@ def _bound_from_json(data: Sequence[Any]) -> NumericBound:
 def _fluent(data: Any) -> Fact:
     name, *args = data["fluent"]
     return Fact(name, tuple(args))
+
+
+# Not on the actions: a `CachingPlanner` keeps the actions of many problems.
+_rows: IdentityCache[GroundAction, _Row] = IdentityCache(size=20_000)

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from planning.execution.search import Search
     from planning.model.domain import PlanningDomain
 
+_MOST_GOALS = 8
+
 
 @dataclass(frozen=True, slots=True)
 class Escalation:
@@ -251,7 +253,22 @@ def situation(domain: PlanningDomain, world: View, goal: Expression) -> str:
 
 
 @cache_on_owner
+def _names_by_goal(domain: PlanningDomain) -> dict[Expression, frozenset[str]]:  # noqa: ARG001  its owner
+    """Return, for each goal, the predicates and functions on which its plans depend."""
+    return {}
+
+
 def _asked_about(domain: PlanningDomain, goal: Expression) -> frozenset[str]:
+    known = _names_by_goal(domain)
+    names = known.get(goal)
+    if names is None:
+        if len(known) >= _MOST_GOALS:
+            known.clear()
+        names = known[goal] = _names_about(domain, goal)
+    return names
+
+
+def _names_about(domain: PlanningDomain, goal: Expression) -> frozenset[str]:
     actions = relevant(goal, None, domain.actions.values()).actions
     asked = [goal, *(action.precondition for action in actions)]
     asked += [condition for action in actions for condition in effect_conditions(action.effect)]

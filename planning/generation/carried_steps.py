@@ -31,7 +31,7 @@ from knowledge_base.language.syntax.expression import (
     substitute,
 )
 from knowledge_base.language.syntax.rewriting import names_of
-from knowledge_base.owner_cache import cache_on_owner
+from knowledge_base.owner_cache import Owner, cache_on_owner
 from planning.model.domain import PlanningAction, PlanningDomain
 from planning.model.plan import PlanStep
 from planning.problem.expressions import changed
@@ -114,12 +114,13 @@ def _is_open(plot: ActionPlot) -> bool:
 
 PATIENCE = 2
 """The factor on a step's duration, or on the sum of its skills' time limits, after which a step is interrupted."""
+_MOST_CARRIERS = 8
 _MOST_CARRIED = 1024  # steps; a plan for 50 items has about 130 steps
 _CONFIRM = ActionPlot.model_fields["confirm"].default
 
 
-@dataclass(frozen=True)  # without slots, see `cache_on_owner`
-class CarriedStep:
+@dataclass(frozen=True)
+class CarriedStep(Owner):
     """A step of a plan, with everything that its states need.
 
     Attributes:
@@ -168,11 +169,14 @@ class Carrier:
 
     @staticmethod
     def of(domain: PlanningDomain, library: Library, rules: Sequence[Rule]) -> Carrier:
-        """Return the carrier of the last plan if rules and experience are equal, since plans share most steps."""
-        last = _last_carrier(domain)
-        if not last or not last[0].suits(library, rules):
-            last[:] = [Carrier(domain, library, rules)]
-        return last[0]
+        """Return the carrier of an earlier plan if rules and experience are equal, since plans share most steps."""
+        carriers = _carriers(domain)
+        known = carriers.get(id(library.plots))  # the carrier keeps these plots, so that their id is not used again
+        if known is None or not known.suits(library, rules):
+            if len(carriers) >= _MOST_CARRIERS:
+                carriers.clear()
+            known = carriers[id(library.plots)] = Carrier(domain, library, rules)
+        return known
 
     def suits(self, library: Library, rules: Sequence[Rule]) -> bool:
         """Return whether this carrier has these plots, rules and experience."""
@@ -224,9 +228,9 @@ def _choice(candidates: Collection[ActionPlot], experience: Experience) -> str |
 
 
 @cache_on_owner
-def _last_carrier(domain: PlanningDomain) -> list[Carrier]:  # noqa: ARG001  its owner
-    """Return the list with the carrier of the domain's last plan; empty before the first plan."""
-    return []
+def _carriers(domain: PlanningDomain) -> dict[int, Carrier]:  # noqa: ARG001  its owner
+    """Return the carriers of the domain, by the identity of their plots."""
+    return {}
 
 
 def sketched(step: PlanStep, domain: PlanningDomain) -> CarriedStep:

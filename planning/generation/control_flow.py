@@ -24,6 +24,7 @@ from dsc.dynamic.responses import again, skipped
 from dsc.events import GAVE_UP
 from dsc.model.rules import REPLAN
 from knowledge_base.language.syntax.expression import And, Comparison, Constant, Expression, Not, Or, Variable
+from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import to_text
 from knowledge_base.owner_cache import cache_on_owner
 from planning.generation.carried_steps import CarriedStep
@@ -207,17 +208,21 @@ def _join(conditions: Iterable[Expression]) -> Expression | None:
     return None if not all_ else all_[0] if len(all_) == 1 else And(all_)
 
 
-# Equal pairs of steps should have identical conditions, since texts and compiled conditions are cached by identity.
+# Equal pairs of steps must have identical conditions, because other caches use the identity of a condition as the key.
+_pairs: IdentityCache[CarriedStep, tuple[Expression | None]] = IdentityCache(size=1024)
+
+
 @cache_on_owner
 def _seen(step: CarriedStep) -> Expression | None:
     """Return the conjunction of the expected effects of a step."""
     return _join(step.expected)
 
 
-@cache_on_owner
 def _between(step: CarriedStep, following: CarriedStep) -> Expression | None:
-    """Return the conjunction of the expected effects of a step and the conditions of the next step."""
-    return _join((*step.expected, *following.needed))
+    """Return the conjunction of the expected effects of a step and the conditions of the next step; cached."""
+    both = (*step.expected, *following.needed)
+    (found,) = _pairs.find(step, following) or _pairs.keep(step, following, (_join(both),))
+    return found
 
 
 def _is_set(kind: str, number: int) -> Expression:

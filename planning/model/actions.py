@@ -11,6 +11,7 @@ from knowledge_base.language.checking.check import check, check_effect, check_pa
 from knowledge_base.language.syntax.durative import Duration, DurativeParts
 from knowledge_base.language.syntax.effect import Add, AllOf, Delete, Effect, effect_leaves
 from knowledge_base.language.syntax.expression import And, Comparison, Expression, TypedVariable
+from knowledge_base.owner_cache import Owner
 from knowledge_base.pddl.action_text import ActionText
 
 if TYPE_CHECKING:
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 _Form = TypeVar("_Form", Expression, Effect)
 
 
-@dataclass(frozen=True)  # without slots, see `cache_on_owner`
-class PlanningAction:
+@dataclass(frozen=True)
+class PlanningAction(Owner):
     """A PDDL action. A planning action with arguments is a `PlanStep`.
 
     Attributes:

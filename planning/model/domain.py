@@ -32,6 +32,7 @@ from knowledge_base.language.syntax.expression import (
     substitute,
 )
 from knowledge_base.language.syntax.sexpr import TypedName
+from knowledge_base.owner_cache import Owner
 from knowledge_base.pddl.action_text import ActionText, united
 from knowledge_base.pddl.domain_text import AxiomText, DeclarationText, DomainText, parse_domain, read_domain
 from knowledge_base.pddl.writer import action_to_text, axiom_to_text, domain_to_text
@@ -52,8 +53,8 @@ _MOST_GROUND = 1024  # steps; a plan for 50 items has about 130 steps
 __all__ = ["Duration", "PlanningAction", "PlanningDomain"]
 
 
-@dataclass(frozen=True)  # without slots, see `cache_on_owner`
-class GroundStep:
+@dataclass(frozen=True)
+class GroundStep(Owner):
     """Precondition and effect of a plan step, with the step's arguments instead of parameters.
 
     Attributes:
@@ -67,8 +68,8 @@ class GroundStep:
     effect: Effect
 
 
-@dataclass(frozen=True)  # without slots, see `cache_on_owner`
-class PlanningDomain:
+@dataclass(frozen=True)
+class PlanningDomain(Owner):
     """Planning actions and axioms over a schema.
 
     `axioms` define derived predicates. `notes` list harmless irregularities of the files, with their places.

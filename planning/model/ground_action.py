@@ -53,7 +53,7 @@ class ActionSpan:
     assignments: tuple[Assignment, ...] = ()
 
 
-@dataclass(frozen=True)  # without slots, see `cache_on_owner`
+@dataclass(frozen=True, slots=True)
 class GroundAction:
     """One alternative of a plan step.
 

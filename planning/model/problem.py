@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Fact
+from knowledge_base.owner_cache import Owner
 from planning.model.ground_action import GroundAction, GroundState, after, missing_condition
 from planning.model.plan import Plan, Timing
 from planning.model.quantities import NumericBound
@@ -47,8 +48,8 @@ class WrongPlan:
     reason: str
 
 
-@dataclass(frozen=True)  # without slots, see `cache_on_owner`
-class Problem:
+@dataclass(frozen=True)
+class Problem(Owner):
     """The input of an engine, made by `planning.problem.construction.build_problem`.
 
     Attributes:

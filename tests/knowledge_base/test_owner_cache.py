@@ -1,16 +1,19 @@
 """Results that hang on their owner: computed once, again for other arguments, and gone with the owner."""
 
+import copy
 import gc
+import pickle
+import threading
 import weakref
 from dataclasses import dataclass, replace
 
 import pytest
 
-from knowledge_base.owner_cache import cache_on_owner
+from knowledge_base.owner_cache import Owner, cache_on_owner
 
 
 @dataclass(frozen=True)
-class Shape:
+class Shape(Owner):
     sides: int
 
 
@@ -77,3 +80,17 @@ def test_a_result_ends_with_its_owner(angles):
     del shape
     gc.collect()
     assert result() is None
+
+
+def test_copies_of_an_owner_do_not_have_its_results(calls):
+    @cache_on_owner
+    def lock(shape):
+        calls.append(shape.sides)
+        return threading.Lock()
+
+    shape = Shape(3)
+    lock(shape)
+    for twin in (pickle.loads(pickle.dumps(shape)), copy.deepcopy(shape), copy.copy(shape)):  # noqa: S301
+        assert twin == shape
+        lock(twin)
+    assert calls == [3, 3, 3, 3]

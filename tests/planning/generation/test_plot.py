@@ -9,6 +9,7 @@ from dsc.text.plot_files import plot_to_yaml
 from knowledge_base import UnknownNameError
 from knowledge_base.language.syntax.text import to_text
 from planning import Plan, PlanningDomain, PlanStep, plot_from_plan
+from planning.generation.carried_steps import Carrier
 
 DOMAIN = PlanningDomain.parse("""
 (define (domain delivery)
@@ -147,3 +148,12 @@ def test_a_step_takes_hold_of_what_is_inserted_before_it():
 def test_an_action_without_a_plot_is_an_error_that_names_the_nearest():
     with pytest.raises(UnknownNameError, match="no plot implements the planning action 'take'"):
         made(library=Library([GO]))
+
+
+def test_robots_that_share_a_domain_keep_the_steps_of_their_own_libraries():
+    libraries = (Library([GO, TAKE]), Library([CREEP, TAKE]))
+    first = [Carrier.of(DOMAIN, library, ()) for library in libraries]
+    again = [Carrier.of(DOMAIN, library, ()) for library in libraries]
+    assert first[0] is again[0]
+    assert first[1] is again[1]
+    assert [made(library=library).state("step_1").dynamic for library in libraries] == [("drive",), ("creep",)]

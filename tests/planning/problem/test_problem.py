@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import copy
 import itertools
 import json
+import pickle
 from dataclasses import replace
 
 import pytest
@@ -451,3 +453,16 @@ def test_a_disjunction_with_one_reachable_part_is_that_part(goal, steps, decided
     world = lamps(domain, *([fact("on", "l1")] if "(not" in goal else []), number=3)
     assert (bookkeeping(build_problem(domain, world, parse_condition(goal))) == []) is decided
     assert len(plan_for(domain, world, goal).steps) == steps
+
+
+def test_a_domain_that_has_made_problems_can_be_copied_and_pickled():
+    domain = PlanningDomain.parse(
+        "(define (domain walk) (:types place) (:predicates (at ?p - place))"
+        " (:action go :parameters (?a ?b - place) :precondition (at ?a) :effect (and (at ?b) (not (at ?a)))))"
+    )
+    kb = KnowledgeBase(domain.schema)
+    kb.apply(Delta(nodes={"a": "place", "b": "place"}, added=(fact("at", "a"),)), author="test")
+    goal = parse_condition("(at b)")
+    problem = build_problem(domain, kb, goal)
+    for twin in (copy.deepcopy(domain), pickle.loads(pickle.dumps(domain))):  # noqa: S301
+        assert build_problem(twin, kb, goal) == problem
