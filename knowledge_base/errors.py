@@ -95,15 +95,15 @@ def described(error: BaseException, *, named: bool = True) -> str:
         named: whether the name of the exception's type precedes its text.
     """
     try:
-        return shortened(_described(error, MAX_MEMBERS, named=named))
+        return shortened(_describe(error, MAX_MEMBERS, named=named))
     except BaseException:  # noqa: BLE001  # e.g. RecursionError: the stack ends here
         return "an exception that cannot be described"
 
 
-def _described(error: BaseException, depth: int, *, named: bool) -> str:
+def _describe(error: BaseException, depth: int, *, named: bool) -> str:
     text = text_of(error, str)
     if issubclass(type(error), BaseExceptionGroup) and depth:  # `isinstance` would call `__class__` of the error
-        members = [_described(one, depth - 1, named=True) for one in _members_of(error)[:MAX_MEMBERS]]
+        members = [_describe(one, depth - 1, named=True) for one in _members_of(error)[:MAX_MEMBERS]]
         text = f"{text}: {'; '.join(members)}"
     said = [type_name(error)] if named or not text else []
     return shortened(": ".join([*said, text] if text else said))

@@ -85,12 +85,12 @@ def world_of(form: Form, schema: Schema) -> WorldState:
 
 def schema_form(schema: Schema) -> Form:
     """Return the form of a schema: all declarations, without their places."""
-    axioms = [[one.predicate, _typed(one.parameters), to_text(one.condition)] for one in schema.axioms]
+    axioms = [[one.predicate, _type_rows(one.parameters), to_text(one.condition)] for one in schema.axioms]
     return {
         "types": dict(schema.types),
         "constants": dict(schema.constants),
-        "predicates": {name: _typed(signature.parameters) for name, signature in schema.predicates.items()},
-        "functions": {name: [f.result, *_typed(f.parameters)] for name, f in schema.functions.items()},
+        "predicates": {name: _type_rows(signature.parameters) for name, signature in schema.predicates.items()},
+        "functions": {name: [f.result, *_type_rows(f.parameters)] for name, f in schema.functions.items()},
         "functional": sorted(schema.functional),
         **({"axioms": axioms} if axioms else {}),
         **_kinds(schema),
@@ -153,7 +153,7 @@ def _content(form: Any) -> Content:
     return tuple(form) if isinstance(form, list) else form
 
 
-def _typed(parameters: Iterable[TypedVariable]) -> list[list[Any]]:
+def _type_rows(parameters: Iterable[TypedVariable]) -> list[list[Any]]:
     return [[p.name, *p.types] for p in parameters]
 
 

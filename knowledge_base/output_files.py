@@ -83,8 +83,8 @@ class Output:
         if self.path == STANDARD_OUTPUT:
             yield sys.stdout
             return
-        with self._reported():
-            opened = self._special() if self._is_special() else self._emptied()
+        with self._report_errors():
+            opened = self._special() if self._is_special() else self._open_emptied()
         with os.fdopen(opened, "w", encoding="utf-8", buffering=1) as stream:
             yield stream
 
@@ -95,7 +95,7 @@ class Output:
     def _check(self) -> None:
         if self.path == STANDARD_OUTPUT:
             return
-        with self._reported():
+        with self._report_errors():
             found = _status(self.path)
             if found is None or not stat.S_ISCHR(found.st_mode):  # a terminal can be read and written
                 self._check_others()
@@ -151,7 +151,7 @@ class Output:
                 os.set_blocking(opened, True)
                 return opened
 
-    def _emptied(self) -> int:
+    def _open_emptied(self) -> int:
         """Return a file descriptor of the emptied regular file, which no other stream uses."""
         opened = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:
@@ -176,7 +176,7 @@ class Output:
         os.lseek(opened, 0, os.SEEK_SET)
 
     @contextmanager
-    def _reported(self) -> Iterator[None]:
+    def _report_errors(self) -> Iterator[None]:
         """Convert errors about names and permissions into `InputError`.
 
         Errors of a medium are raised with the name of the file.
@@ -204,7 +204,7 @@ def write_all(texts: Mapping[Output, str]) -> None:
         InputError: a text cannot be encoded as UTF-8, or a file cannot be written.
         OSError: the medium is full or fails.
     """
-    complete = {output: _encoded(output, text) for output, text in texts.items()}
+    complete = {output: _encode(output, text) for output, text in texts.items()}
     beside: dict[Output, Path] = {}
     try:
         for output, data in complete.items():
@@ -212,7 +212,7 @@ def write_all(texts: Mapping[Output, str]) -> None:
             if output.path != STANDARD_OUTPUT and not output._is_special():  # noqa: SLF001
                 _stage(output, data, beside)
         for output, data in complete.items():
-            with output._reported():  # noqa: SLF001
+            with output._report_errors():  # noqa: SLF001
                 if output in beside:
                     beside[output].replace(_target(output.path))
                     del beside[output]
@@ -227,7 +227,7 @@ def write_all(texts: Mapping[Output, str]) -> None:
             file.unlink(missing_ok=True)
 
 
-def _encoded(output: Output, text: str) -> bytes:
+def _encode(output: Output, text: str) -> bytes:
     try:
         return text.encode("utf-8")
     except UnicodeEncodeError as error:
@@ -239,7 +239,7 @@ def _stage(output: Output, data: bytes, beside: dict[Output, Path]) -> None:
     """Write the text to a temporary file in the folder of the output."""
     target = _target(output.path)
     file = target.with_name(f".dsc-{os.urandom(8).hex()}.tmp")
-    with output._reported():  # noqa: SLF001
+    with output._report_errors():  # noqa: SLF001
         opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
         beside[output] = file
         with os.fdopen(opened, "wb") as stream:

@@ -70,7 +70,7 @@ class Questions:
             require_condition(text)
             e = _parsed(text) if isinstance(text, str) else text
             known = [name if name in free_variables(e) else name.lower() for name in params]
-            self._checked(e, dict.fromkeys(known, ""), world, free)  # first report errors of the text
+            self._check(e, dict.fromkeys(known, ""), world, free)  # first report errors of the text
             names = fitted_names(e, params)
             found = e, None if names == tuple(params) else names
             _keep(self._given, key, found)
@@ -107,7 +107,7 @@ class Questions:
             UnknownNameError: an undeclared predicate, function, type, variable or object.
             SchemaError: a wrong number of arguments, or a type that no object can match.
         """
-        return self._checked(text, params, world, "error")
+        return self._check(text, params, world, "error")
 
     def query(self, text: str | Expression, params: Mapping[str, Value], world: World) -> Expression:
         """Return the query for the free variables that `params` does not contain.
@@ -115,9 +115,9 @@ class Questions:
         Raises:
             InputError: as for `condition`, or a variable occurs only under `not` or in a comparison.
         """
-        return self._checked(text, params, world, "answers")
+        return self._check(text, params, world, "answers")
 
-    def _checked(self, text: str | Expression, params: Mapping[str, Value], world: World, free: Free) -> Expression:
+    def _check(self, text: str | Expression, params: Mapping[str, Value], world: World, free: Free) -> Expression:
         require_condition(text)
         e = _parsed(text) if isinstance(text, str) else text
         passed = self._passed.find(e, world.schema)

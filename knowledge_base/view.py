@@ -117,9 +117,9 @@ class View(WorldDefaults):
         with self._lock, meter.over(text):
             params = self._questions.given(text, params, self._state, "answers")
             found = self._questions.rows(text, params, BoundedWorld(self._state, meter))
-        return self._streamed(found, text, meter)
+        return self._stream(found, text, meter)
 
-    def _streamed(self, found: Iterator[Binding], text: str | Expression, meter: Meter) -> Iterator[Binding]:
+    def _stream(self, found: Iterator[Binding], text: str | Expression, meter: Meter) -> Iterator[Binding]:
         version, more = self._version, True
         while more:
             answers: list[Binding] = []

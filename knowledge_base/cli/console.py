@@ -70,7 +70,7 @@ def opened(source: Path, domain: Path | None = None) -> Iterator[Opened]:
     Raises:
         InputError: the file is missing, or is not a store, problem, world or scenario.
     """
-    found = _opened(source, domain)
+    found = _open(source, domain)
     with found.kb:
         yield found
 
@@ -103,7 +103,7 @@ def domain_of(problem: Path) -> Path:
     return problem.parent / "domain.pddl"
 
 
-def _opened(source: Path, domain: Path | None) -> Opened:
+def _open(source: Path, domain: Path | None) -> Opened:
     from knowledge_base.exchange import MAX_WORLD_BYTES
     from knowledge_base.journal.sidecar_files import is_database
     from knowledge_base.pddl.files import MAX_BYTES, decoded, read_bytes, require_size

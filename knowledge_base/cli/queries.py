@@ -74,7 +74,7 @@ def query(
         if not explain:
             _answer(kb, expression, _params(param), limit, seconds, as_json=json)
             return
-        plan = kb.explain_query(_parsed(expression), _params(param))
+        plan = kb.explain_query(_parse(expression), _params(param))
     if json:
         print_json(asdict(plan))
     else:
@@ -94,7 +94,7 @@ def ask(
     from knowledge_base.language.evaluation.world_protocol import Bounds
 
     with opened(source, domain) as (kb, _):
-        explanation = kb.explain(_parsed(expression), _params(param), bounds=Bounds(seconds=seconds))
+        explanation = kb.explain(_parse(expression), _params(param), bounds=Bounds(seconds=seconds))
     if json:
         print_json({"holds": explanation.truth, "why": explanation.to_json()})
     else:
@@ -202,7 +202,7 @@ def _answer(
     from knowledge_base.language.evaluation.world_protocol import Bounds
     from knowledge_base.language.syntax.expression import variables_in_order
 
-    condition = _parsed(expression)
+    condition = _parse(expression)
     answers = world.stream(condition, params, bounds=Bounds(seconds=seconds))
     answers = islice(answers, limit)
     names = [name for name in dict.fromkeys(variables_in_order(condition)) if name not in params]
@@ -241,7 +241,7 @@ def _show(world: View, problem: ProblemText | None, thing: str | None, *, as_jso
     typer.echo(f"version {world.version}" if problem is None else f"goal: {to_text(problem.goal)}")
 
 
-def _parsed(expression: str) -> Expression:
+def _parse(expression: str) -> Expression:
     from knowledge_base.language.syntax.text import parse_condition
 
     return parse_condition(expression, source="EXPR")

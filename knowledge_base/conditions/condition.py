@@ -267,13 +267,13 @@ class Condition:
     def _hold(self) -> None:
         hold = self._terms.hold
         if hold is not None:
-            self._notifier.queue(partial(self._start_hold, hold, hold.due(), partial(self._held, self._rises)))
+            self._notifier.queue(partial(self._start_hold, hold, hold.due(), partial(self._fire_held, self._rises)))
 
     def _start_hold(self, hold: Hold, due: float, over: Callable[[], None]) -> None:
         if self._installed:
             hold.start(due, over)
 
-    def _held(self, rises: int) -> None:
+    def _fire_held(self, rises: int) -> None:
         """Fire at the end of the hold time, unless the condition became false meanwhile."""
         with self._notifier.lock:
             if self._installed and self.truth and self._rises == rises:

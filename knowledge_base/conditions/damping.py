@@ -114,13 +114,13 @@ def relaxed(e: Expression, margin: float) -> Expression:
     """
     if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0 < margin < math.inf:
         raise InputError(f"hysteresis is a positive number, not {margin!r}")
-    found = _relaxed(e, margin)
+    found = _relax(e, margin)
     if found == e:
         raise InputError("hysteresis is for conditions with '<', '<=', '>' or '>=', and here is none", place=e.place)
     return found
 
 
-def _relaxed(e: Expression, margin: float) -> Expression:
+def _relax(e: Expression, margin: float) -> Expression:
     """Return `e` with each bound moved: a positive margin makes `e` easier to satisfy, a negative margin harder."""
     match e:
         case Comparison(operator, _, right) if operator in (*_UP, *_DOWN):
@@ -128,12 +128,12 @@ def _relaxed(e: Expression, margin: float) -> Expression:
             moved = Arithmetic("+" if eased > 0 else "-", (right, Constant(abs(eased))), place=right.place)
             return replace(e, right=moved)
         case Not(body):
-            return replace(e, body=_relaxed(body, -margin))
+            return replace(e, body=_relax(body, -margin))
         case And(parts) | Or(parts):
-            return replace(e, parts=tuple([_relaxed(p, margin) for p in parts]))
+            return replace(e, parts=tuple([_relax(p, margin) for p in parts]))
         case Imply(premise, conclusion):
-            return replace(e, premise=_relaxed(premise, -margin), conclusion=_relaxed(conclusion, margin))
+            return replace(e, premise=_relax(premise, -margin), conclusion=_relax(conclusion, margin))
         case Exists(_, body) | Forall(_, body):
-            return replace(e, body=_relaxed(body, margin))
+            return replace(e, body=_relax(body, margin))
         case _:
             return e

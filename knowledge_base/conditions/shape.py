@@ -82,12 +82,12 @@ def lifted(e: Expression, params: Mapping[str, Value], schema: Schema) -> Lifted
     The variables of an outermost `exists` become answers, so that their values are part of the witness.
     """
     lifting = _Lifting()
-    body = lifting.expression(_opened(substitute(e, params), schema), {})
+    body = lifting.expression(_open(substitute(e, params), schema), {})
     shape = Shape(body, tuple(lifting.values.values()), tuple(lifting.answers.values()))
     return Lifted(shape, tuple(value for _, value in lifting.values), tuple(lifting.answers))
 
 
-def _opened(e: Expression, schema: Schema) -> Expression:
+def _open(e: Expression, schema: Schema) -> Expression:
     """Return `(exists (?c - cup) ...)` as `(and (cup ?c) ...)`, unless a name would then have two meanings."""
     ranges: list[Expression] = []
     seen: set[str] = set(free_variables(e))

@@ -148,10 +148,10 @@ def touches(pattern: Expression, params: Mapping[str, Value], schema: Schema) ->
         raise InputError("a pattern is one predicate, function or type, as in (on ?o table)", place=pattern.place)
     name, fits = pattern.predicate, _Fits(pattern, params)
     if schema.is_type(name, len(pattern.args)):
-        return lambda change: _typed(change.delta, name, schema, fits)
+        return lambda change: _has_type(change.delta, name, schema, fits)
     if name in schema.functions:
         check_arity(schema.functions[name], len(pattern.args), pattern.place)
-        return lambda change: _numbered(change.delta, name, fits)
+        return lambda change: _has_number(change.delta, name, fits)
     if name in schema.computed:
         raise schema.computed[name].refused(pattern.place)
     if name not in schema.predicates:
@@ -189,7 +189,7 @@ class _Fits:
         return name in self.fixed.values() or len(self.fixed) < self.count
 
 
-def _typed(delta: Delta, name: str, schema: Schema, fits: _Fits) -> bool:
+def _has_type(delta: Delta, name: str, schema: Schema, fits: _Fits) -> bool:
     """Return whether the change matches the type.
 
     The removal of an object matches every type, as the type of the object is unknown.
@@ -199,7 +199,7 @@ def _typed(delta: Delta, name: str, schema: Schema, fits: _Fits) -> bool:
     )
 
 
-def _numbered(delta: Delta, name: str, fits: _Fits) -> bool:
+def _has_number(delta: Delta, name: str, fits: _Fits) -> bool:
     return any(f.predicate == name and fits(f.args) for f in delta.values) or any(
         fits.may_contain(thing) for thing in delta.removed_nodes
     )

@@ -80,8 +80,8 @@ def picture_of(world: View, thing: str | None, hops: int, most: int) -> Picture:
     """
     types = world.nodes()
     kinds = world.schema.kinds
-    said = [_said(fact, types, kinds) for fact in world.facts()]
-    said += [_said(fluent, types, kinds, f"= {_content(content)}") for fluent, content in world.values().items()]
+    said = [_describe(fact, types, kinds) for fact in world.facts()]
+    said += [_describe(fluent, types, kinds, f"= {_content(content)}") for fluent, content in world.values().items()]
     if thing is None:
         wanted = list(types)
     elif thing in types:
@@ -96,7 +96,7 @@ def picture_of(world: View, thing: str | None, hops: int, most: int) -> Picture:
     return Picture((*cards, *relations), links, len(wanted) - len(shown))
 
 
-def _said(fact: Fact, types: Mapping[str, str], kinds: Mapping[str, str], value: str = "") -> _Said:
+def _describe(fact: Fact, types: Mapping[str, str], kinds: Mapping[str, str], value: str = "") -> _Said:
     things = tuple(arg for arg in fact.args if isinstance(arg, str) and arg in types)
     rest = [value_text(arg) for arg in fact.args if not (isinstance(arg, str) and arg in types)]
     text = " ".join(filter(None, (fact.predicate, *rest, value)))

@@ -73,7 +73,7 @@ def _part(graph: nx.Graph[str], cards: list[Card]) -> list[Placed]:
     positions = _positions(own)
     lengths = [dist(positions[one], positions[other]) for one, other in own.edges if one != other]
     scale = HOP * len(lengths) / sum(lengths) if lengths else 1.0
-    placed = [_placed(card, positions[card.key], scale) for card in cards]
+    placed = [_place(card, positions[card.key], scale) for card in cards]
     _push_apart(placed)
     left = min(one.x - one.width / 2 for one in placed)
     top = min(one.y - one.height / 2 for one in placed)
@@ -89,7 +89,7 @@ def _positions(graph: nx.Graph[str]) -> Mapping[str, Sequence[float]]:
     return {key: (float(x), float(y)) for key, (x, y) in found.items()}
 
 
-def _placed(card: Card, at: Sequence[float], scale: float) -> Placed:
+def _place(card: Card, at: Sequence[float], scale: float) -> Placed:
     texts = (card.title, card.kind, *(line.text for line in card.lines))
     width = max(map(len, texts)) * CHARACTER + 2 * PADDING
     lines = 1 + bool(card.kind) + len(card.lines)

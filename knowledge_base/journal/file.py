@@ -291,9 +291,9 @@ def open_still(path: Path) -> tuple[sqlite3.Connection, Stamp | None]:
     stamp = stamp_of(path)
     log = stamp[1]
     if log is None or log[1] == 0:
-        return _begun(unlocked(path)), stamp
+        return _begin(unlocked(path)), stamp
     with _lock:  # until SQLite has opened the log too
-        return _begun(sqlite3.connect(_copied(path), isolation_level=None, check_same_thread=False)), None
+        return _begin(sqlite3.connect(_copy(path), isolation_level=None, check_same_thread=False)), None
 
 
 def stamp_of(path: Path) -> Stamp:
@@ -302,7 +302,7 @@ def stamp_of(path: Path) -> Stamp:
     return tuple(one and (one.st_ino, one.st_size, one.st_mtime_ns) for one in found)
 
 
-def _begun(connection: sqlite3.Connection) -> sqlite3.Connection:
+def _begin(connection: sqlite3.Connection) -> sqlite3.Connection:
     try:
         connection.execute("PRAGMA query_only = ON")
         connection.execute("BEGIN")
@@ -313,7 +313,7 @@ def _begun(connection: sqlite3.Connection) -> sqlite3.Connection:
     return connection
 
 
-def _copied(path: Path) -> Path:
+def _copy(path: Path) -> Path:
     for _ in range(_TRIES):
         stamp = stamp_of(path)
         if _copies and _copies[0][:2] == (path, stamp) and _copies[0].process == os.getpid():

@@ -177,7 +177,7 @@ class MemoryHistory:
         size = len(change.delta)
         if not size:
             return
-        kept = _Kept(change, size, _taken(change.delta, before))
+        kept = _Kept(change, size, _take(change.delta, before))
         with self._lock:
             self._kept.append(kept)
             self._size += size
@@ -247,7 +247,7 @@ class MemoryHistory:
             del self._keys[next(iter(self._keys))]
 
 
-def _taken(delta: Delta, before: WorldState) -> _Taken:
+def _take(delta: Delta, before: WorldState) -> _Taken:
     if not (delta.values or delta.removed_nodes):
         return _NOTHING
     values = list(map(before.values.get, delta.values))

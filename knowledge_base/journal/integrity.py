@@ -46,11 +46,11 @@ def link(before: bytes, *values: Any) -> bytes:
         before: the digest of the previous row, and digests of other content that the row depends on.
         values: the columns of the row as SQLite returns them; a REAL is a float.
     """
-    return blake2b(before + (_joined(len(values)) % values).encode(), digest_size=SIZE).digest()
+    return blake2b(before + (_join_format(len(values)) % values).encode(), digest_size=SIZE).digest()
 
 
 @cache
-def _joined(columns: int) -> str:
+def _join_format(columns: int) -> str:
     """Return the format string of a row's text; formatting takes half the time of `join`."""
     return "\0".join(["%s"] * columns)
 

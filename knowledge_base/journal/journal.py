@@ -133,7 +133,7 @@ class Journal(Archive):
                 kept = None if change.delta else delta
                 connection.execute(_INSERT_KEY, (*said, kept, context, link(previous + digest, *said)))
             if along is not None:
-                with _guarded(connection):
+                with _guard(connection):
                     along(connection)
         if snapshot is not None:
             self._tail, self._snapshot_size = 0, len(snapshot)
@@ -275,7 +275,7 @@ class Journal(Archive):
 
 
 @contextmanager
-def _guarded(connection: sqlite3.Connection) -> Iterator[None]:
+def _guard(connection: sqlite3.Connection) -> Iterator[None]:
     """Refuse statements of the block that begin or end a transaction: they would commit a change in part."""
     refused = False
 

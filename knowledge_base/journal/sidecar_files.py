@@ -265,10 +265,10 @@ class WriterLock:
         self._store = store
         self._path = store.with_name(store.name + LOCK)
         self._released = False
-        self._file = self._locked()
+        self._file = self._lock()
         while not self._is_there():  # its owner deleted the file between open and lock
             os.close(self._file)
-            self._file = self._locked()
+            self._file = self._lock()
         os.pwrite(self._file, _lock_content(), 0)
 
     def release(self) -> None:
@@ -286,10 +286,10 @@ class WriterLock:
         except FileNotFoundError:
             return False
 
-    def _locked(self) -> int:
+    def _lock(self) -> int:
         while True:
             try:
-                return self._found()
+                return self._open_existing()
             except FileNotFoundError:
                 pass  # no writer exists, or the writer has just closed the store
             try:
@@ -300,7 +300,7 @@ class WriterLock:
                 said = f"cannot write '{self._path}': {error.strerror}"
                 raise StoreError(said, place=Place(str(self._store))) from None
 
-    def _found(self) -> int:
+    def _open_existing(self) -> int:
         """Return the file descriptor of the existing lock file, after locking it.
 
         Raises:
@@ -313,7 +313,7 @@ class WriterLock:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
-                raise _taken(self._store, process) from None
+                raise _taken_error(self._store, process) from None
         except BaseException:
             os.close(file)
             raise
@@ -345,7 +345,7 @@ def _lock_content() -> bytes:
     return b"dsc writer %20d\n" % os.getpid()
 
 
-def _taken(store: Path, process: str) -> StoreError:
+def _taken_error(store: Path, process: str) -> StoreError:
     return StoreError(
         f"another writer has it open (process {process}); it can be opened with read_only=True meanwhile",
         place=Place(str(store)),

@@ -234,7 +234,7 @@ class Checkpoints:
                 return
             self._waiting[path] = self._waiting.get(path, 0) + 1
             if self._thread is None or not self._thread.is_alive():
-                self._thread = _started(self._run)
+                self._thread = _start(self._run)
 
     def is_behind(self, path: Path) -> bool:
         """Return whether the writer should run the checkpoint itself."""
@@ -275,7 +275,7 @@ class Checkpoints:
             return self._writing
 
 
-def _started(work: Callable[[], None]) -> Thread | None:
+def _start(work: Callable[[], None]) -> Thread | None:
     """Return the started thread, or `None` if the system cannot start one.
 
     The writer then runs a checkpoint itself after `MOST_ASKED` requests.

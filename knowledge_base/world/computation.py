@@ -65,7 +65,7 @@ class Computed(Generic[_Inputs]):
         Args:
             predicates: returns whether a name with a number of arguments is a predicate or type.
         """
-        return replace(self, reads=tuple(_resolved(read, predicates) for read in self.reads))
+        return replace(self, reads=tuple(_resolve(read, predicates) for read in self.reads))
 
     def refused(self, place: Place | None = None) -> SchemaError:
         """Return the error for asserting, retracting or watching the computed predicate."""
@@ -164,7 +164,7 @@ def _takes(function: Callable[..., object], count: int) -> bool:
     return True
 
 
-def _resolved(read: Read, predicates: Callable[[str, int], bool]) -> Read:
+def _resolve(read: Read, predicates: Callable[[str, int], bool]) -> Read:
     if isinstance(read, Call) and predicates(read.function, len(read.args)):
         return Atom(read.function, read.args, place=read.place)
     return read

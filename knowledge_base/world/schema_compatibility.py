@@ -22,7 +22,7 @@ def require_extension(written: Schema, given: Schema, place: Place | None = None
         SchemaMismatchError: `given` is not an extension. The error lists all differences, with the nearest name of
             `given` for a missing name.
     """
-    foreign = _declared(written).isdisjoint(_declared(given))
+    foreign = _list_declared(written).isdisjoint(_list_declared(given))
     found = [
         *_differences("type", written.types, given.types, hint=not foreign),
         *_differences("constant", written.constants, given.constants, hint=not foreign),
@@ -38,7 +38,7 @@ def require_extension(written: Schema, given: Schema, place: Place | None = None
         raise SchemaMismatchError(found, place=place, said=said)
 
 
-def _declared(schema: Schema) -> set[str]:
+def _list_declared(schema: Schema) -> set[str]:
     return {*schema.types, *schema.constants, *schema.predicates, *schema.functions} - {ROOT_TYPE}
 
 

@@ -92,7 +92,7 @@ def _exclusions(domain: PlanningDomain, world: World, goal: Expression, patience
     patience.doing = "looking for goal facts that exclude each other"
     problem = ProblemBuilder(domain).build_problem(world, goal, patience=patience)
     pairs = mutexes(problem, patience)
-    told = [(one, other) for one, other in pairs if _declared(one) and _declared(other)]
+    told = [(one, other) for one, other in pairs if _is_declared(one) and _is_declared(other)]
     return tuple(f"{_as_written(one)} and {_as_written(other)} can never hold together" for one, other in told)
 
 
@@ -103,7 +103,7 @@ def _changing(task: Task) -> list[str]:
     return [*map(str, itertools.islice(read, _MOST_NUMBERS)), *["…"] * (len(read) > _MOST_NUMBERS)]
 
 
-def _declared(fact: Fact) -> bool:
+def _is_declared(fact: Fact) -> bool:
     """Return whether the domain declares the fact; the predicate of a bookkeeping fact contains a blank."""
     return " " not in fact.predicate.removeprefix(NOT)
 
@@ -208,7 +208,7 @@ class _Causes:
                 continue
             missing = (*nearest.facts, *nearest.inner)
             rooted |= not missing or bool(nearest.conditions and not nearest.inner)
-            said.append(f"{here} needs {nearest.step}, which needs {_listed(nearest)}")
+            said.append(f"{here} needs {nearest.step}, which needs {_list(nearest)}")
             fresh = [one for one in dict.fromkeys(missing) if one not in seen]
             seen.update(fresh)
             agenda.extend(fresh)
@@ -316,7 +316,7 @@ def _distance(near: _Nearest) -> tuple[int, int]:
     return len(near.facts) + len(near.conditions), near.fixed
 
 
-def _listed(nearest: _Nearest) -> str:
+def _list(nearest: _Nearest) -> str:
     return " and ".join([*map(str, nearest.facts), *nearest.conditions]) or "more than can hold together"
 
 
@@ -346,19 +346,19 @@ def goal_mutexes(problem: Problem, patience: WorkLimit) -> Iterator[tuple[Fact, 
     Raises:
         WorkLimitError: the search exceeds `patience`.
     """
-    number = {fact: i for i, fact in enumerate(dict.fromkeys([*problem.init, *problem.goal, *_mentioned(problem)]))}
+    number = {fact: i for i, fact in enumerate(dict.fromkeys([*problem.init, *problem.goal, *_mentions(problem)]))}
     actions = []
     for action in problem.actions:
         adds, deletes = ([number[fact] for fact in facts] for facts in (action.adds, action.deletes))
         needs = tuple(number[fact] for fact in action.precondition)
         actions.append(_NumberedAction(needs, _bits(needs), tuple(adds), _bits(adds), ~(_bits(adds) | _bits(deletes))))
-    together = _reached(actions, [number[fact] for fact in problem.init], len(number), patience)
+    together = _reach_pairs(actions, [number[fact] for fact in problem.init], len(number), patience)
     for one, other in itertools.combinations(problem.goal, 2):
         if not together[number[one]] >> number[other] & 1:
             yield one, other
 
 
-def _mentioned(problem: Problem) -> Iterator[Fact]:
+def _mentions(problem: Problem) -> Iterator[Fact]:
     for action in problem.actions:
         yield from action.facts()
 
@@ -370,7 +370,7 @@ def _bits(numbers: Iterable[int]) -> int:
     return found
 
 
-def _reached(actions: list[_NumberedAction], init: list[int], size: int, patience: WorkLimit) -> list[int]:
+def _reach_pairs(actions: list[_NumberedAction], init: list[int], size: int, patience: WorkLimit) -> list[int]:
     """Return, for each fact, the facts that can hold together with it, as bits; a reachable fact includes itself."""
     possible = _bits(init)
     together = [possible if possible >> i & 1 else 0 for i in range(size)]

@@ -34,12 +34,12 @@ def bundles_command(
     elif name is None:
         width = max(map(len, found))
         for bundle in shown:
-            typer.echo(f"{bundle.name:<{width}}  {bundle.about or _counted(bundle)}")
+            typer.echo(f"{bundle.name:<{width}}  {bundle.about or _count_text(bundle)}")
     else:
         typer.echo("\n".join(_lines(shown[0].to_json())))
 
 
-def _counted(bundle: Bundle) -> str:
+def _count_text(bundle: Bundle) -> str:
     return f"plots: {len(bundle.primitive)} primitive, {len(bundle.abstract)} abstract"
 
 

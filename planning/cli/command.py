@@ -138,7 +138,7 @@ def _command() -> None:
         from dsc.errors import ProgrammingError
         from knowledge_base.errors import InputError
 
-        wrong = _unusable(error) or (_misused(error) if as_json else error)
+        wrong = _unusable(error) or (_misuse_error(error) if as_json else error)
         if isinstance(wrong, ProgrammingError):
             _tell(InputError(f"programming error in {wrong}"), as_json=as_json)
             sys.exit(PROGRAMMING_ERROR)
@@ -160,7 +160,7 @@ def _unusable(error: Exception) -> InputError | None:
     return InputError(f"cannot use '{error.filename}': {error.strerror}", found=str(error.filename))
 
 
-def _misused(error: Exception) -> Exception:
+def _misuse_error(error: Exception) -> Exception:
     """Return an `InputError` for wrong arguments of a command; return any other error unchanged."""
     from knowledge_base.errors import InputError
 

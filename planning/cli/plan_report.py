@@ -145,20 +145,20 @@ def valueless(plan: Plan, domain: PlanningDomain, read: ProblemText) -> list[str
     for step in plan.steps:
         ground = domain.ground(step)
         asked = [*_fluents(ground.condition), *(one for e in effect_conditions(ground.effect) for one in _fluents(e))]
-        changed = list(_assigned(ground.effect))
+        changed = list(_find_assignments(ground.effect))
         asked += [one for _, amount in changed for one in _fluents(amount)]
         missing.update(dict.fromkeys(one for one in asked if one not in given))
         given.update(fluent for fluent, _ in changed)
     return [f"{fluent} has no value and counts as 0" for fluent in missing]
 
 
-def _assigned(effect: Effect) -> Iterator[tuple[Fact, Term]]:
+def _find_assignments(effect: Effect) -> Iterator[tuple[Fact, Term]]:
     match effect:
         case AllOf(parts):
             for part in parts:
-                yield from _assigned(part)
+                yield from _find_assignments(part)
         case When(_, inner):
-            yield from _assigned(inner)
+            yield from _find_assignments(inner)
         case NumericEffect(_, call, amount):
             for fluent in _fluents(call):
                 yield fluent, amount

@@ -163,7 +163,7 @@ def run_command(
         clock: ClockKind = "real" if real_time or bundle.remote else "simulated"
         robot = _robot(bundle, _task(bundle, goal, plot, with_ or []), scenario, seed, faults, profile, experience,
                              store, durability, target, planner, clock, wire)  # fmt: skip
-    follow = partial(_followed, robot, speed=inf if speed is None else speed, until=until,
+    follow = partial(_run_with_progress, robot, speed=inf if speed is None else speed, until=until,
                      on_signal=on_signal, quiet=json or quiet, trace=output, watch=watch)  # fmt: skip
     with wire, robot:
         if monitored is not None:
@@ -172,7 +172,7 @@ def run_command(
             report = follow()
             _print(report, as_json=json)
         else:
-            report = _viewed(
+            report = _run_with_page(
                 robot, follow, port, opens=not no_open, control=allow_control, data=data, wait=not no_wait, as_json=json
             )
     if report.programming_error is not None:
@@ -295,7 +295,7 @@ def _resume(store: Path, target: str | None, durability: Durability, planner: Pl
     return resume(bundle, store, durability=durability.value, planner=planner, remote=wire.connect(bundle))
 
 
-def _viewed(
+def _run_with_page(
     robot: Robot,
     follow: partial[Report],
     port: int,
@@ -325,7 +325,7 @@ def _viewed(
     return report
 
 
-def _followed(
+def _run_with_progress(
     robot: Robot,
     *,
     speed: float,

@@ -60,7 +60,7 @@ def plan(
         plan = outcome.plan
         notes += valueless(plan, domain, read)
         order = _order(plan, domain, world, read.goal)
-        notes += _untraced(domain) if parallel or explain or plot else []
+        notes += _note_untraced(domain) if parallel or explain or plot else []
         answer |= ordered(order) if parallel else {}
         answer |= purposes(order) if explain else {}
         if output is not None:
@@ -91,7 +91,7 @@ def _order(plan: Plan, domain: PlanningDomain, world: KnowledgeBase, goal: Expre
     return (linked if plan.schedule else deordered)(plan, domain, world, goal)
 
 
-def _untraced(domain: PlanningDomain) -> list[str]:
+def _note_untraced(domain: PlanningDomain) -> list[str]:
     """Return a note if the domain allows plans only for display, because causal links cannot be traced."""
     form = Derivable.of(domain)
     names = ", ".join(f"'{one}'" for one in sorted(form.predicates)) if form else ""

@@ -62,26 +62,26 @@ class Escalation:
         Returns:
             The outcome of the skill `repair`.
         """
-        ordered = await self._ordered(run)
-        if self._reached(run):
+        ordered = await self._order(run)
+        if self._end_if_reached(run):
             return GoalHolds()
         progress, attempt = run.progress, run.attempt
         if why.startswith(NOT_OBSERVED):
-            why += self._unobserved(run)
+            why += self._record_unobserved(run)
         elif why == NO_CANDIDATE_FITS and self.choices.refusals:
             why += f" ({'; '.join(self.choices.refusals)})"
         end = self._end(run)
         failed = None if run.state is PlanState.STOPPED else self._failed_step(progress)
         if end is not None and (run.successor is not None if failed is None else failed not in end):
             attempt.completed()
-            return self._continued(run, end, why, ordered=ordered)
+            return self._continue_with(run, end, why, ordered=ordered)
         step, choice = self._chosen(run, failed, end, why, outage=outage)
         if step is EscalationStep.REPLAN and run.state is PlanState.MONITORED:
             self.records.failed(run.name, progress.steps_of(progress.running), why)
         if end is not None and step in (EscalationStep.RESUME, EscalationStep.OTHER_CANDIDATE):
             attempt.resumed[end[0]] += 1
             instead_of = choice if step is EscalationStep.OTHER_CANDIDATE else None
-            return self._continued(run, end, why, instead_of, ordered=ordered)
+            return self._continue_with(run, end, why, instead_of, ordered=ordered)
         if step is EscalationStep.GIVE_UP:
             remedy = self._remedy(failed) if failed is not None and why.startswith(NOT_OBSERVED) else ""
             reason = f"{failed} has failed before, in the same way and the same situation: {why}{remedy}"
@@ -97,10 +97,10 @@ class Escalation:
 
     def succeeded(self, run: PlanRun, why: str) -> GoalHolds | PlotFound | None:
         """Return the outcome with the successor's plot; `None` if the successor no longer leads to the goal."""
-        if self._reached(run):
+        if self._end_if_reached(run):
             return GoalHolds()
         end = self._end(run)
-        return None if end is None else self._continued(run, end, why, keeping=True)
+        return None if end is None else self._continue_with(run, end, why, keeping=True)
 
     def bound(self, run: PlanRun, order: PartialOrder, form: dict[str, Any]) -> PlotFound:
         """Add a plan run and record the order of its steps; return the outcome that contains its plot."""
@@ -108,7 +108,7 @@ class Escalation:
         self.records.ordered(run.name, order)
         return PlotFound(plot=form, name=run.name, steps=len(run.progress.steps))
 
-    def _reached(self, run: PlanRun) -> bool:
+    def _end_if_reached(self, run: PlanRun) -> bool:
         """Return whether the goal holds; delete the plan run if it does."""
         if self.plotting.derivation.recursive:
             run.renew(self.plotting.derivation.at(self._knowledge))
@@ -148,7 +148,7 @@ class Escalation:
         expected = expectation(domain.action(step).effect, domain.bindings(step))
         return None if is_true(expected, self._knowledge) else step
 
-    def _unobserved(self, run: PlanRun) -> str:
+    def _record_unobserved(self, run: PlanRun) -> str:
         """Record the expected effects of running steps that do not hold, and return them as text."""
         domain, missing = self.plotting.derivation.domain, list[str]()
         for step in run.progress.steps_of(run.progress.running):
@@ -167,7 +167,7 @@ class Escalation:
         where = f" ({place})" if place is not None and place.source else ""
         return f"; let its skill observe the effect, or give plot '{name}'{where} `tell` or `effects: assumed`"
 
-    def _continued(
+    def _continue_with(
         self,
         run: PlanRun,
         steps: tuple[PlanStep, ...],
@@ -187,7 +187,7 @@ class Escalation:
             keeping: whether running steps with which the new plan begins continue.
             ordered: the partial order of a plan that may have the steps.
         """
-        name = self._recorded(run, steps, why, instead_of)
+        name = self._record_change(run, steps, why, instead_of)
         found = None if run.successor is None else run.successor.found
         known = None if found is None else found.known_order(steps, self._knowledge.version)
         if known is None and ordered is not None and ordered.steps == steps:
@@ -204,7 +204,7 @@ class Escalation:
             again.take_over(run, running)
         return self.bound(again, order, form)
 
-    async def _ordered(self, run: PlanRun) -> PartialOrder | None:
+    async def _order(self, run: PlanRun) -> PartialOrder | None:
         """Return the partial order of the last steps that lead to the goal, computed outside of the event loop.
 
         `None` if no steps lead to the goal, or if the successor knows its order.
@@ -217,7 +217,7 @@ class Escalation:
         order = await self.search.aside(lambda: deordered(Plan(end), domain, world, run.goal))
         return order if self._knowledge.version == version else None
 
-    def _recorded(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None) -> str:
+    def _record_change(self, run: PlanRun, steps: tuple[PlanStep, ...], why: str, instead_of: str | None) -> str:
         """Record why other steps continue a plan, and return the name of their plot."""
         successor, remaining = run.successor, run.progress.remaining_steps
         if successor is not None and successor.name is not None:

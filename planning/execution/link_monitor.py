@@ -176,7 +176,7 @@ class LinkMonitor:
     def _brings(self, step: PlanStep) -> list[Expression]:
         """Return the facts that a step adds in every world; equal objects each time, whose tests are compiled once."""
         if step not in self._brought:
-            parts = conjuncts(_expected(step, self._domain))
+            parts = conjuncts(_expect(step, self._domain))
             self._brought[step] = [part for part in parts if isinstance(part, Atom)]
         return self._brought[step]
 
@@ -245,12 +245,12 @@ class LinkMonitor:
         now, later = progress.needed() or {}, progress.needed_later() or {}
         if fallen is None:
             fallen = next((one for one in itertools.chain(now, later) if not is_true(one, world)), None)
-        why = self._predicted(world)
+        why = self._predict_failure(world)
         if fallen is None:
             return Broken(why, "", len(progress.steps) + 1, author, version)
         return Broken(why, to_text(fallen), now.get(fallen) or later[fallen], author, version)
 
-    def _predicted(self, world: World) -> str:
+    def _predict_failure(self, world: World) -> str:
         """Return the first condition that fails, with the later step for which its failure is predicted."""
         progress, left = self._progress, self._not_done(world)
         found = validate(Plan(progress.steps_of(left)), self._domain, world, progress.goal)
@@ -262,9 +262,9 @@ class LinkMonitor:
     def _not_done(self, world: World) -> tuple[int, ...]:
         """Return the numbers of the remaining steps, without running steps whose expected effects already hold."""
         progress = self._progress
-        done = [n for n in progress.running if is_true(_expected(progress.steps[n - 1], self._domain), world)]
+        done = [n for n in progress.running if is_true(_expect(progress.steps[n - 1], self._domain), world)]
         return tuple([number for number in progress.remaining if number not in done])
 
 
-def _expected(step: PlanStep, domain: PlanningDomain) -> Expression:
+def _expect(step: PlanStep, domain: PlanningDomain) -> Expression:
     return expectation(domain.action(step).effect, domain.bindings(step))

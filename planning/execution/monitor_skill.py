@@ -80,7 +80,7 @@ class MonitorSkill:
         self._escalation.runs.begin(run)
         if self._derivation.recursive:
             self._settled = self._derivation.at(self._knowledge)
-            self._unsubscribe = self._knowledge.subscribe(self._changed)
+            self._unsubscribe = self._knowledge.subscribe(self._check_expansion)
         if run.state is PlanState.BOUND:
             run.state = PlanState.MONITORED
             if run.overtaken:
@@ -154,7 +154,7 @@ class MonitorSkill:
                 outcome = None if better is None else self._follow(answer, Successor(better))
         return outcome
 
-    def _changed(self, change: Change) -> None:
+    def _check_expansion(self, change: Change) -> None:
         """Validate the plan again if recursive predicates now expand to other conditions."""
         settled = self._derivation.at(self._knowledge)
         if settled != self._settled:
@@ -242,16 +242,16 @@ class MonitorSkill:
         skipped = [step for step in run.progress.remaining_steps if step not in steps]
         self._records.skipped(run.name, skipped, why)
         run.successor = run.shortened(steps)
-        return self._replaced(why)
+        return self._replace(why)
 
     def _follow(self, answer: PlanFound, successor: Successor) -> Monitored | None:
         """Replace the plan by a new plan; running steps with which the new plan begins continue."""
         run, name = self._run, self._escalation.runs.new_name()
         self._records.found(answer, name)
         run.successor = replace(successor, name=name)
-        return self._replaced("another plan takes its place")
+        return self._replace("another plan takes its place")
 
-    def _replaced(self, why: str) -> Monitored | None:
+    def _replace(self, why: str) -> Monitored | None:
         """Return the outcome with the successor's plot.
 
         If the successor no longer leads to the goal, running steps continue during another search; without a running

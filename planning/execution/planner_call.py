@@ -50,13 +50,13 @@ async def bounded(work: Awaitable[_Result], seconds: float, name: str) -> _Resul
     Raises:
         LateError: the work has no result at the bound.
     """
-    task = asyncio.ensure_future(_contained(work))
+    task = asyncio.ensure_future(_contain(work))
     try:
         in_time = await _ends(task, seconds)
     except asyncio.CancelledError:
-        await _stopped(task, name)
+        await _stop(task, name)
         raise
-    if not (in_time or await _stopped(task, name)):
+    if not (in_time or await _stop(task, name)):
         raise LateError(obeyed=False)
     if task.cancelled():
         if in_time:
@@ -65,7 +65,7 @@ async def bounded(work: Awaitable[_Result], seconds: float, name: str) -> _Resul
     return task.result()
 
 
-async def _contained(work: Awaitable[_Result]) -> _Result:
+async def _contain(work: Awaitable[_Result]) -> _Result:
     with contained():
         return await work
 
@@ -80,7 +80,7 @@ async def _ends(task: asyncio.Future[Any], seconds: float) -> bool:
     return task.done()
 
 
-async def _stopped(task: asyncio.Future[Any], name: str) -> bool:
+async def _stop(task: asyncio.Future[Any], name: str) -> bool:
     """Cancel the work; return whether it stopped within `STOPPING` seconds."""
     task.cancel()
     try:
@@ -168,14 +168,14 @@ class PlannerCalls:
         if improving and not self._clock.simulated and isinstance(self._planner, Improving):
             plans = self._planner.plans(problem, seconds)
             better = Improvements(plans, self.name)
-            answer = await self._bounded(anext(plans), seconds)
+            answer = await self._call_in_time(anext(plans), seconds)
             if isinstance(answer, PlanFound):
                 return answer, better
             await better.aclose()
             return answer, None
-        return await self._bounded(self._planner.solve(problem, seconds), seconds), None
+        return await self._call_in_time(self._planner.solve(problem, seconds), seconds), None
 
-    async def _bounded(self, answering: Awaitable[object], seconds: float) -> PlanningOutcome:
+    async def _call_in_time(self, answering: Awaitable[object], seconds: float) -> PlanningOutcome:
         """Return the outcome of a call within a bound of real time; a fault of the planner is an `EngineFailed`."""
         engine = self.name
         try:

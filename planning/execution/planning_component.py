@@ -198,7 +198,7 @@ class PlanningComponent(GoalSkills):
         `no_plan` is `unsolvable`, `timed_out`, `failed`, or `invalid` for a goal that is not a condition of the domain.
         """
         try:
-            return await self._planned(call, goal, holder, seconds, replans, self._runs.get(after))
+            return await self._plan(call, goal, holder, seconds, replans, self._runs.get(after))
         finally:  # at the end, since an interrupted search needs the replaced plan again
             self._runs.over(after)
 
@@ -252,7 +252,7 @@ class PlanningComponent(GoalSkills):
         outage = await self._outages.over(run, why, call.clock)
         return await self._escalation.answer(run, why, outage=outage)
 
-    async def _planned(
+    async def _plan(
         self, call: SkillCall, goal: str, holder: str, seconds: float, replans: int, before: PlanRun | None
     ) -> PlotFound | GoalHolds | NoPlan | GaveUp:
         now = self._derivation.at(self._knowledge)
@@ -272,7 +272,7 @@ class PlanningComponent(GoalSkills):
         if before is not None:
             attempt: Attempt | None = before.attempt
         else:
-            attempt, left = self._interrupted(task, now.condition(wanted))
+            attempt, left = self._find_interrupted(task, now.condition(wanted))
         if before is None and attempt is not None and attempt.disturbances >= replans:
             self._runs.conclude(task)
             return GaveUp(reason=f"interruptions ended {replans} plans before a step was completed")
@@ -306,7 +306,7 @@ class PlanningComponent(GoalSkills):
         now = self._derivation.at(self._knowledge)
         return PlanProgress(found.steps, now.domain, now.condition(goal))
 
-    def _interrupted(self, task: str, goal: Expression) -> tuple[Attempt | None, int | None]:
+    def _find_interrupted(self, task: str, goal: Expression) -> tuple[Attempt | None, int | None]:
         """Return the interrupted attempt at a task, unless the goal has gained a fact since the last interruption.
 
         The second value is the number of false parts of the goal; `None` without an interruption.

@@ -168,9 +168,9 @@ def _atom(atom: Atom, changes: Sequence[Leaf]) -> Expression:
 
 def _comparison(e: Comparison, changes: Sequence[Leaf]) -> Expression:
     if isinstance(e.left, Constant | Variable) and isinstance(e.right, Constant | Variable):
-        return _decided(e.operator, e.left, e.right) or e  # a shortcut with the result of the general case
+        return _decide(e.operator, e.left, e.right) or e  # a shortcut with the result of the general case
     return disjunction(
-        conjunction((before_left, before_right, _compared(e.operator, new_left, new_right)))
+        conjunction((before_left, before_right, _regress_comparison(e.operator, new_left, new_right)))
         for before_left, new_left in _values(e.left, changes)
         for before_right, new_right in _values(e.right, changes)
     )
@@ -181,16 +181,16 @@ def _hit(leaf: Leaf, own: tuple[Term, ...], asked: tuple[Term, ...]) -> Expressi
     taken = frozenset[str]().union(*map(free_variables, asked))
     names = {v.name: Variable(fresh(v.name, taken)) for v in leaf.variables if v.name in taken}
     variables = tuple(replace(v, name=names.get(v.name, v).name) for v in leaf.variables)
-    same = (_compared("=", substitute(mine, names), other) for mine, other in zip(own, asked, strict=True))
+    same = (_regress_comparison("=", substitute(mine, names), other) for mine, other in zip(own, asked, strict=True))
     matching = conjunction((*same, substitute(leaf.condition, names)))
     return Exists(variables, matching) if variables and matching != FALSE else matching
 
 
-def _compared(operator: str, left: Term, right: Term) -> Expression:
-    return _decided(operator, left, right) or Comparison(operator, left, right)
+def _regress_comparison(operator: str, left: Term, right: Term) -> Expression:
+    return _decide(operator, left, right) or Comparison(operator, left, right)
 
 
-def _decided(operator: str, left: Term, right: Term) -> Expression | None:
+def _decide(operator: str, left: Term, right: Term) -> Expression | None:
     """Return `TRUE` or `FALSE` if the comparison does not depend on the world or on variables; otherwise `None`."""
     if operator in ("=", "!=") and isinstance(left, Constant) and isinstance(right, Constant):
         return TRUE if (left.value == right.value) is (operator == "=") else FALSE
@@ -204,7 +204,7 @@ def _values(term: Term, changes: Sequence[Leaf]) -> list[tuple[Expression, Term]
             cases: list[tuple[Expression, Term]] = [(TRUE, term)]
             for leaf in changes:
                 if isinstance(leaf.change, NumericEffect) and leaf.change.call.function == function:
-                    cases = [new for case in cases for new in _assigned(case, leaf, leaf.change, args)]
+                    cases = [new for case in cases for new in _find_assignments(case, leaf, leaf.change, args)]
             return cases
         case Arithmetic(_, args):
             combined: list[tuple[Expression, tuple[Term, ...]]] = [(TRUE, ())]
@@ -219,7 +219,7 @@ def _values(term: Term, changes: Sequence[Leaf]) -> list[tuple[Expression, Term]
             return [(TRUE, term)]
 
 
-def _assigned(
+def _find_assignments(
     case: tuple[Expression, Term], leaf: Leaf, change: NumericEffect, args: tuple[Term, ...]
 ) -> Iterator[tuple[Expression, Term]]:
     before, value = case
@@ -260,16 +260,16 @@ class CausalNeeds:
         """
         known = next(cut for cut in range(len(left) + 1) if left[cut:] in self._found)
         for cut in range(known - 1, -1, -1):  # a loop, since recursion would be too deep for a long plan
-            self._found[left[cut:]] = self._prepended(left[cut], self._found[left[cut + 1 :]])
+            self._found[left[cut:]] = self._prepend(left[cut], self._found[left[cut + 1 :]])
         found = self._found[left]
         return None if found is None else MappingProxyType(found.needed)
 
-    def _prepended(self, number: int, after: _Found | None) -> _Found | None:
+    def _prepend(self, number: int, after: _Found | None) -> _Found | None:
         if after is None:
             return None
         step = self._steps[number - 1]
         own = dict.fromkeys(step.needed, number)
-        brought, touched = self._touched(step, after)
+        brought, touched = self._split_needs(step, after)
         rest = dict(after.needed)
         for condition in brought:
             del rest[condition]
@@ -292,7 +292,7 @@ class CausalNeeds:
             kept = [*step.open, *(one for one in kept if one not in own)]
         return _Found(needed, (*kept, *fresh))
 
-    def _touched(self, step: _Regressing, after: _Found) -> tuple[list[Expression], list[Expression]]:
+    def _split_needs(self, step: _Regressing, after: _Found) -> tuple[list[Expression], list[Expression]]:
         """Return the later needs that the step always causes, and the later needs that the step may change.
 
         Both are usually few; all other needs stay unchanged.

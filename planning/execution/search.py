@@ -251,7 +251,7 @@ class Search:
                 await found.close()
                 return NotFound("timed_out", f"the plan found was not validated within {seconds:g} s")
             if verdict.valid:
-                accepted = await self._accepted(found, goal, refused.steps)
+                accepted = await self._accept(found, goal, refused.steps)
                 if accepted is not None:
                     return accepted
                 before = None
@@ -303,10 +303,10 @@ class Search:
         world = _ahead(running, self._domain, snapshot)
         if world is None:
             return NotFound("failed", "a running step is no longer applicable")
-        found = await self._in_time(self._found(goal, seconds, before, refused, world), seconds)
+        found = await self._in_time(self._search(goal, seconds, before, refused, world), seconds)
         return found.with_steps((*running, *found.steps)) if running and isinstance(found, Found) else found
 
-    async def _accepted(self, found: Found, goal: Expression, rejected: dict[PlanStep, str]) -> Found | NotFound | None:
+    async def _accept(self, found: Found, goal: Expression, rejected: dict[PlanStep, str]) -> Found | NotFound | None:
         """Return the valid plan if the simulation accepts it; `None` after adding the step it rejects to `rejected`."""
         if found.answer.plan.schedule:
             alone = validate(Plan(found.steps), self._domain, self._knowledge, goal)
@@ -363,7 +363,7 @@ class Search:
         except TimeoutError:
             return NotFound("timed_out", f"no plan within {seconds:g} s, nor soon after ({self._planner.name})")
 
-    async def _found(
+    async def _search(
         self,
         goal: Expression,
         seconds: float,
@@ -374,7 +374,7 @@ class Search:
         """Search for a plan in the world of the snapshot, first by local repair, then by a planner call."""
         budget = WorkLimit(seconds)
         before = None if refused.plans else before
-        repaired = None if before is None else await self._repaired(goal, seconds / 2, before, snapshot)
+        repaired = None if before is None else await self._repair(goal, seconds / 2, before, snapshot)
         if isinstance(repaired, Found):
             return repaired
         patience, durations = WorkLimit(budget.left), not self._clock.simulated and bool(timing())
@@ -415,7 +415,7 @@ class Search:
             return await self._planner.solve(without(problem, rejected), patience.left)
         return answer, better
 
-    async def _repaired(
+    async def _repair(
         self, goal: Expression, seconds: float, before: PlanProgress, snapshot: World
     ) -> Found | TimedOut | None:
         """Return a local repair of the plan `before`; `TimedOut` at the time limit, or `None` without a repair."""

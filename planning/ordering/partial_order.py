@@ -156,10 +156,10 @@ def why(order: PartialOrder, number: int) -> Purpose:
     goal = len(order.steps) + 1
     own = [link for link in order.links if link.provider == number]
     provides = tuple((link.fact, None if link.user == goal else link.user) for link in own)
-    return Purpose(number, order.steps[number - 1], provides, _served(order.links, number, goal))
+    return Purpose(number, order.steps[number - 1], provides, _find_served(order.links, number, goal))
 
 
-def _served(links: tuple[CausalLink, ...], number: int, goal: int) -> tuple[Expression, ...]:
+def _find_served(links: tuple[CausalLink, ...], number: int, goal: int) -> tuple[Expression, ...]:
     reached, before = {number}, 0
     while before != len(reached):  # in a schedule, a later step may provide for an earlier step
         before = len(reached)

@@ -85,7 +85,7 @@ def deploy(
         kept["goal"] = bundle.goal
     if clock is None and bundle.simulation is not None:
         clock = "simulated"
-    return _deployed(bundle, setup, task, durability, planner, listener, kept, clock, remote)
+    return _deploy(bundle, setup, task, durability, planner, listener, kept, clock, remote)
 
 
 def resume(
@@ -124,7 +124,7 @@ def resume(
         task = Task(goal=str(run.arguments["goal"]))
     elif run.plot == bundle.main and not run.arguments:
         task = Task(plot=bundle.main)
-    return _deployed(bundle, setup, task, durability, planner, listener, {}, kind_of(run), remote)
+    return _deploy(bundle, setup, task, durability, planner, listener, {}, kind_of(run), remote)
 
 
 def kept_run(store: Path) -> RunRow:
@@ -147,7 +147,7 @@ def _require_simulated(bundle: Bundle, **options: object) -> None:
         raise InputError(f"--scenario: the simulation of '{bundle.name}' reads no scenarios (`reads_scenarios`)")
 
 
-def _deployed(
+def _deploy(
     bundle: Bundle,
     setup: Setup,
     task: Task,

@@ -234,7 +234,7 @@ def installed() -> InstalledBundles:
     whose: dict[str, str] = {}
     for point in entry_points(group=GROUP):
         try:
-            bundle = _loaded(point)
+            bundle = _load(point)
         except InputError as error:
             found.errors[point.name] = error
             continue
@@ -377,7 +377,7 @@ def with_plots_of(library: Library, components: Iterable[Component]) -> Library:
     return Library([*library, *plots], library.conversions.values())
 
 
-def _loaded(point: EntryPoint) -> Bundle:
+def _load(point: EntryPoint) -> Bundle:
     try:
         with contained():
             found = point.load()

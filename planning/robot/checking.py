@@ -211,10 +211,10 @@ class _Robot:
         self._simulation: Simulation | None = None
         self._initial: KnowledgeBase | None = None
         self._objects: Mapping[str, str] | None = None
-        self._components = self._made()
-        self._domain = self._merged()
+        self._components = self._make_components()
+        self._domain = self._merge()
 
-    def _made(self, profile: Profile | None = None) -> list[Component] | None:
+    def _make_components(self, profile: Profile | None = None) -> list[Component] | None:
         """Return the components; `None` if their code fails, so that their absence is not reported again."""
         with tolerated():
             try:
@@ -231,7 +231,7 @@ class _Robot:
             return found
         return None
 
-    def _merged(self) -> PlanningDomain | None:
+    def _merge(self) -> PlanningDomain | None:
         if not self._whole:
             return None
         with tolerated():
@@ -433,7 +433,7 @@ class _Robot:
     def check_profile(self, profile: Profile) -> None:
         """Check the robot, the components' values and the plots' values of a profile."""
         with tolerated():
-            made = self._made(profile)
+            made = self._make_components(profile)
             if made is not None:
                 choose_sources(made, wiring_of(self._bundles))
                 configure(made, profile)

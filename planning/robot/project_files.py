@@ -81,7 +81,7 @@ def check_files(files: Iterable[Path]) -> list[Finding]:
                 _read(file, texts[file])
     found += [Finding(error, READABLE) for error in errors]
     plots = [file for file in files if plot_name(file, texts[file]) is not None]
-    return found + _validated(plots)
+    return found + _validate(plots)
 
 
 def _read(file: Path, text: str) -> None:
@@ -100,7 +100,7 @@ def _read(file: Path, text: str) -> None:
         load_monitoring(file)
 
 
-def _validated(files: Iterable[Path]) -> list[Finding]:
+def _validate(files: Iterable[Path]) -> list[Finding]:
     """Return the findings about plot files; each plot may use the other plots of its folder."""
     found: list[Finding] = []
     folders: dict[Path, list[Path]] = {}

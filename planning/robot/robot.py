@@ -199,7 +199,7 @@ class Robot(RobotProgram):
                 differences.
         """
         require_no_loop("resume", "resuming")
-        store, kept = self._unfinished()
+        store, kept = self._open_unfinished()
 
         async def main() -> RunEnd:
             return await self._resume(store, kept, prepare)
@@ -214,7 +214,7 @@ class Robot(RobotProgram):
                 simulated time.
         """
         require_loop("resuming", "resume")
-        store, kept = self._unfinished()
+        store, kept = self._open_unfinished()
         _require_kind(kept, self._loop_clock().kind)
         return self._resume(store, kept, prepare)
 
@@ -389,7 +389,7 @@ class Robot(RobotProgram):
             end = self._perform(judgement.task, ready, speed=speed, until=until)
         except KeyboardInterrupt as interrupt:
             suspended = self.store is not None and on_signal == "suspend"
-            end = RunEnd(finished=False, problem=_interrupted(*interrupt.args, suspended=suspended))
+            end = RunEnd(finished=False, problem=_describe_interruption(*interrupt.args, suspended=suspended))
         finally:
             ignore()
         return judgement.report(self.name, end, tally, self.failures, time.perf_counter() - started, clock)
@@ -421,7 +421,7 @@ class Robot(RobotProgram):
         if self.store is not None and self._runs:
             raise InputError(f"the robot already has a run in '{self.store.name}': await or suspend it first")
 
-    def _unfinished(self) -> tuple[RunStore, Kept]:
+    def _open_unfinished(self) -> tuple[RunStore, Kept]:
         self._require_free()
         store = self.run_store({})
         if store is None:
@@ -568,7 +568,7 @@ def _budget(seconds: float, replans: int) -> Budget:
         raise InputError(wrong, found=str(first["input"])) from None
 
 
-def _interrupted(name: str = "SIGINT", *, suspended: bool) -> str:
+def _describe_interruption(name: str = "SIGINT", *, suspended: bool) -> str:
     """Return how a run ended at the signal of that name."""
     who = "the operator" if name == "SIGINT" else name
     return f"{who} suspended the run, which can be resumed" if suspended else f"{who} ended the run"

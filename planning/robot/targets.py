@@ -100,7 +100,7 @@ def entry_points_of(folder: Path) -> Mapping[str, str]:
 
 
 def _of_file(file: Path, name: str | None) -> object:
-    module = _executed(file)
+    module = _execute(file)
     if name is None:
         name = _only_bundle(module, file)
     if not hasattr(module, name):
@@ -108,7 +108,7 @@ def _of_file(file: Path, name: str | None) -> object:
     return made(getattr(module, name), f"{file}:{name}")
 
 
-def _executed(file: Path) -> ModuleType:
+def _execute(file: Path) -> ModuleType:
     if not file.is_file():
         raise InputError("there is no such file", place=Place(str(file)), found=str(file))
     name, above = file.resolve().stem, file.resolve().parent
@@ -124,7 +124,7 @@ def _executed(file: Path) -> ModuleType:
                 return known
             if known is None and all(part.isidentifier() for part in name.split(".")):
                 return import_module(name)
-            return _loaded(file.resolve().stem, file)
+            return _load(file.resolve().stem, file)
     except InputError as error:
         if error.place is not None:
             raise
@@ -133,7 +133,7 @@ def _executed(file: Path) -> ModuleType:
         raise InputError(f"{file} cannot be executed: {described(error)}{raised_at(error)}") from error
 
 
-def _loaded(name: str, file: Path) -> ModuleType:
+def _load(name: str, file: Path) -> ModuleType:
     """Execute a file whose module name is taken or not an identifier."""
     spec = importlib.util.spec_from_file_location(f"_target_{name}", file)
     assert spec is not None and spec.loader is not None  # noqa: S101, PT018  the file ends in .py

@@ -134,7 +134,7 @@ def value_fits(value: Value, wanted: tuple[str, ...]) -> bool:
     return isinstance(value, int | float) and "number" in wanted
 
 
-def _written(term: Term) -> str:
+def _term_text(term: Term) -> str:
     """Return the text of a term for messages."""
     match term:
         case Variable(name):
@@ -219,7 +219,7 @@ class _Checker:
         types = self.types_of(effect.value)
         if types is not None and result not in types:
             raise SchemaError(
-                f"'{effect.call.function}' has values of type {result}, and {_written(effect.value)} is of type "
+                f"'{effect.call.function}' has values of type {result}, and {_term_text(effect.value)} is of type "
                 f"{' or '.join(types)}",
                 place=effect.value.place or effect.place,
             )
@@ -260,7 +260,7 @@ class _Checker:
         types = self.types_of(term)
         word = isinstance(term, Constant) and isinstance(term.value, str | bool)
         if word or (types is not None and "number" not in types):
-            said, functions = f"'{operator}' works on numbers, and {_written(term)} is none", self.schema.functions
+            said, functions = f"'{operator}' works on numbers, and {_term_text(term)} is none", self.schema.functions
             name = str(term.value) if isinstance(term, Constant) else ""
             if name in functions:
                 said += f"; the value of the function is {functions[name]}"
@@ -281,7 +281,7 @@ class _Checker:
         if isinstance(arg, Constant) and types == ("text",):
             raise self.unknown_object(str(arg.value), arg.place)
         raise SchemaError(
-            f"{_written(arg)} is of type {' or '.join(types)}, but '?{parameter.name}' of '{signature.name}' is of "
+            f"{_term_text(arg)} is of type {' or '.join(types)}, but '?{parameter.name}' of '{signature.name}' is of "
             f"type {' or '.join(wanted)}",
             place=arg.place or signature.place,
         )

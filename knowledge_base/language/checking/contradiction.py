@@ -95,7 +95,7 @@ def _normal(e: Expression, *, holds: bool) -> Expression:
         case Imply(premise, conclusion):
             found = _normal(Or((Not(premise), conclusion)), holds=holds)
         case Comparison(operator, left, right):
-            found = _ordered(operator if holds else _OPPOSITE[operator], left, right)
+            found = _order(operator if holds else _OPPOSITE[operator], left, right)
         case Forall(variables, body):
             found = _normal(Exists(variables, Not(body)), holds=not holds)
         case _:
@@ -104,7 +104,7 @@ def _normal(e: Expression, *, holds: bool) -> Expression:
     return found
 
 
-def _ordered(operator: str, left: Term, right: Term) -> Comparison:
+def _order(operator: str, left: Term, right: Term) -> Comparison:
     """Return the comparison with a constant on the right, or with other terms in a fixed order."""
     swapped = isinstance(left, Constant) or (not isinstance(right, Constant) and to_text(right) < to_text(left))
     return Comparison(_MIRRORED[operator], right, left) if swapped else Comparison(operator, left, right)

@@ -94,9 +94,9 @@ def compile_test(e: Expression, schema: Vocabulary) -> Test:
         case Imply(premise, conclusion):
             test = _any([_negation(compile_test(premise, schema)), compile_test(conclusion, schema)])
         case Exists():
-            test = _found(_witnessing(e, schema), schema, free_variables(e))
+            test = _compile_search(_witnessing(e, schema), schema, free_variables(e))
         case Forall():
-            test = _negation(_found(_refuting(e, schema), schema, free_variables(e)))
+            test = _negation(_compile_search(_refuting(e, schema), schema, free_variables(e)))
     return test
 
 
@@ -168,7 +168,7 @@ def _atom(atom: Atom, schema: Vocabulary) -> Test:
         return _type_test(compile_term(atom.args[0], schema), (atom.predicate,), schema)
     check_arity(schema.predicate(atom.predicate, atom.place), len(atom.args), atom.place)
     if atom.predicate in schema.computed:
-        return _computed(atom, schema)
+        return _compile_computed(atom, schema)
     predicate = atom.predicate
     names = [arg.name for arg in atom.args if isinstance(arg, Variable)]
     if len(names) == len(atom.args) > 1:  # the usual form of a query for one fact
@@ -178,7 +178,7 @@ def _atom(atom: Atom, schema: Vocabulary) -> Test:
     return lambda world, bindings: world.holds(predicate, arguments(world, bindings))
 
 
-def _computed(atom: Atom, schema: Vocabulary) -> Test:
+def _compile_computed(atom: Atom, schema: Vocabulary) -> Test:
     of, arguments = schema.computed[atom.predicate], compile_arguments(atom.args, schema)
     inputs = tuple(
         compile_test(read, schema) if isinstance(read, Atom) else compile_term(read, schema)
@@ -261,7 +261,7 @@ def _all(tests: list[Test]) -> Test:
                 if not part(world, bindings):
                     return False
         except InputError as error:
-            return not _decided(tests, world, bindings, by=False, otherwise=error)
+            return not _decide(tests, world, bindings, by=False, otherwise=error)
         return True
 
     return test
@@ -274,13 +274,13 @@ def _any(tests: list[Test]) -> Test:
                 if part(world, bindings):
                     return True
         except InputError as error:
-            return _decided(tests, world, bindings, by=True, otherwise=error)
+            return _decide(tests, world, bindings, by=True, otherwise=error)
         return False
 
     return test
 
 
-def _decided(tests: list[Test], world: World, bindings: Bindings, *, by: bool, otherwise: InputError) -> bool:
+def _decide(tests: list[Test], world: World, bindings: Bindings, *, by: bool, otherwise: InputError) -> bool:
     """Return whether some part decides the result; raise the error `otherwise` if no part does.
 
     A part that raises an error does not decide.
@@ -294,7 +294,7 @@ def _decided(tests: list[Test], world: World, bindings: Bindings, *, by: bool, o
     raise otherwise
 
 
-def _found(conditions: Iterable[Conjunct], schema: Vocabulary, bound: frozenset[str]) -> Test:
+def _compile_search(conditions: Iterable[Conjunct], schema: Vocabulary, bound: frozenset[str]) -> Test:
     """Return a function that tests whether a search finds any candidate.
 
     The test needs fewer stack frames than the search, which matters for nested quantifiers.

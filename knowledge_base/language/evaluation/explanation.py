@@ -173,7 +173,7 @@ def _existence(text: str, e: Exists, world: World, bindings: Bindings) -> Explan
     names = [v.name for v in e.variables]
     witness = next(witnesses(e, world.schema)(world, bindings), None)
     if witness is not None:
-        return _shown(text, e.body, names, world, witness, truth=True)
+        return _explain_shown(text, e.body, names, world, witness, truth=True)
     if row_variables(e.variables, e.body, world.schema):
         return Explanation(text, truth=False, detail="no row fulfils it")
     tried = itertools.islice(choices(e.variables, world), MOST_TRIED)
@@ -188,10 +188,10 @@ def _universality(text: str, e: Forall, world: World, bindings: Bindings) -> Exp
     counterexample = next(counterexamples(e, world.schema)(world, bindings), None)
     if counterexample is None:
         return Explanation(text, truth=True)
-    return _shown(text, e.body, [v.name for v in e.variables], world, counterexample, truth=False)
+    return _explain_shown(text, e.body, [v.name for v in e.variables], world, counterexample, truth=False)
 
 
-def _shown(
+def _explain_shown(
     text: str, body: Expression, names: Sequence[str], world: World, choice: Bindings, *, truth: bool
 ) -> Explanation:
     chosen = ", ".join(f"?{name} = {value_text(choice[name])}" for name in names)
@@ -217,7 +217,7 @@ def _is_so(e: Expression, world: World, bindings: Bindings) -> bool:
 def _detail(e: Atom | Comparison, world: World, bindings: Bindings) -> str | None:
     """Return the compared values or the inputs of a leaf; `None` for a plain fact."""
     if isinstance(e, Comparison):
-        return _compared(e, world, bindings)
+        return _compare(e, world, bindings)
     of = world.schema.computed.get(e.predicate)
     if of is None:
         return None
@@ -231,7 +231,7 @@ def _input(read: Read, world: World) -> str:
     return f"{to_text(read)} = {value_text(evaluate_term(read, world))}"
 
 
-def _compared(e: Comparison, world: World, bindings: Bindings) -> str | None:
+def _compare(e: Comparison, world: World, bindings: Bindings) -> str | None:
     if not any(isinstance(side, Call | Arithmetic) for side in (e.left, e.right)):
         return None
     left, right = (value_text(evaluate_term(side, world, bindings)) for side in (e.left, e.right))

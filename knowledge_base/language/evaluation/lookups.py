@@ -192,7 +192,7 @@ class Lookup:
         if self._single is not None:
             name, i = self._single
             return ({**bindings, name: args[i]} for args in matches)
-        return (self._extended(bindings, args) for args in matches)
+        return (self._extend(bindings, args) for args in matches)
 
     def answering(self, names: tuple[str, ...]) -> Answering:
         """Return a function that returns the answers for candidates.
@@ -235,10 +235,10 @@ class Lookup:
     def _agrees(self, args: tuple[Value, ...], world: World, bindings: Bindings) -> bool:
         if any(args[i] != args[j] for i, j in self._repeated):
             return False
-        found = self._extended(bindings, args)
+        found = self._extend(bindings, args)
         return all(args[i] == get(world, found) for i, get in self._computed)
 
-    def _extended(self, bindings: Bindings, args: tuple[Value, ...]) -> Answer:
+    def _extend(self, bindings: Bindings, args: tuple[Value, ...]) -> Answer:
         found = dict(bindings)
         for name, i in self._found:
             found[name] = args[i]

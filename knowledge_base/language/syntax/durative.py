@@ -78,8 +78,8 @@ class DurativeParts:
     def effect(self) -> Effect:
         """The net changes from the start to the end of the action, if no other action runs meanwhile."""
         undone = tuple(leaf.atom for leaf in _unconditional(self.end_effect) if isinstance(leaf, Delete))
-        settled = set(_settled(self.end_effect))
-        kept = (_unless(part, undone) for part in _parts(self.start_effect) if _changed(part) not in settled)
+        settled = set(_find_settled(self.end_effect))
+        kept = (_unless(part, undone) for part in _parts(self.start_effect) if _find_changed(part) not in settled)
         parts = (*kept, *_parts(self.end_effect))
         return parts[0] if len(parts) == 1 else AllOf(parts)
 
@@ -129,14 +129,14 @@ def _unconditional(effect: Effect) -> Iterator[Effect]:
     return (part for part in _parts(effect) if isinstance(part, Add | Delete | NumericEffect))
 
 
-def _settled(effect: Effect) -> Iterator[Atom | Call | None]:
+def _find_settled(effect: Effect) -> Iterator[Atom | Call | None]:
     """Yield the atoms and functions whose values after the effect do not depend on their values before."""
     for part in _unconditional(effect):
         if not isinstance(part, NumericEffect) or part.operator == "assign":
-            yield _changed(part)
+            yield _find_changed(part)
 
 
-def _changed(part: Effect) -> Atom | Call | None:
+def _find_changed(part: Effect) -> Atom | Call | None:
     return part.call if isinstance(part, NumericEffect) else _atom(part)
 
 

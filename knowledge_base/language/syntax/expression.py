@@ -249,14 +249,14 @@ def substitute(e: Expression | Term, bindings: Mapping[str, Value | Term]) -> Ex
         case Comparison(_, left, right):
             made = replace(e, left=substitute(left, bindings), right=substitute(right, bindings))
         case Exists(variables, body) | Forall(variables, body):
-            variables, inner = _entered(variables, body, bindings)
+            variables, inner = _enter(variables, body, bindings)
             made = replace(e, variables=variables, body=substitute(body, inner))
         case Variable() | Constant():
             pass
     return made
 
 
-def _entered(
+def _enter(
     variables: tuple[TypedVariable, ...], body: Expression, bindings: Mapping[str, Value | Term]
 ) -> tuple[tuple[TypedVariable, ...], dict[str, Value | Term]]:
     """Return the variables of a quantifier and the bindings for its body.

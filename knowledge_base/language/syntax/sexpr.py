@@ -160,7 +160,7 @@ def parse_typed_list(nodes: Sequence[Node], *, perhaps_none: bool = False) -> li
         ParseError: a `-` has no type after it, or no names before it unless `perhaps_none`; or a group is found
             where a name is expected.
     """
-    nodes = _unglued(nodes)
+    nodes = _unglue(nodes)
     found: list[TypedName] = []
     untyped: list[Word] = []
     position = 0
@@ -228,12 +228,12 @@ def typed_variables(nodes: Sequence[Node], *, distinct: bool = True) -> tuple[Ty
     return tuple(found)
 
 
-def _unglued(nodes: Sequence[Node]) -> list[Node]:
+def _unglue(nodes: Sequence[Node]) -> list[Node]:
     """Return the list with a word such as `-cup`, which some files contain, split into `-` and `cup`."""
-    return [part for node in nodes for part in _parted(node)]
+    return [part for node in nodes for part in _part(node)]
 
 
-def _parted(node: Node) -> tuple[Node, ...]:
+def _part(node: Node) -> tuple[Node, ...]:
     if isinstance(node, Group) or node.quoted or not node.text.startswith("-") or is_number(node.text):
         return (node,)
     after = Place(node.place.source, node.place.line, (node.place.column or 0) + 1)
