@@ -93,7 +93,7 @@ async def in_thread(body: Callable[..., Outcome], call: SkillCall[Any], argument
         DeadlineError: the deadline has passed.
     """
     blocking = _blocking(call)
-    return await _supervised(lambda: body(blocking, **arguments), blocking, call, "thread", STOPPING)
+    return await _run_supervised(lambda: body(blocking, **arguments), blocking, call, "thread", STOPPING)
 
 
 async def in_process(
@@ -108,7 +108,7 @@ async def in_process(
     """
     blocking = _blocking(call)
     work = partial(_in_child, body, name, blocking, arguments)
-    return await _supervised(work, blocking, call, "process", _KILLING * STOPPING)
+    return await _run_supervised(work, blocking, call, "process", _KILLING * STOPPING)
 
 
 def _blocking(call: SkillCall[Any]) -> BlockingCall:
@@ -128,7 +128,7 @@ def _blocking(call: SkillCall[Any]) -> BlockingCall:
     return blocking
 
 
-async def _supervised(
+async def _run_supervised(
     work: Callable[[], Outcome], blocking: BlockingCall, call: SkillCall[Any], what: str, stopping: float
 ) -> Outcome:
     """Run `work` in a daemon thread; request its stop when the skill is cancelled or reaches its deadline.

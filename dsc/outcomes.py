@@ -84,7 +84,7 @@ class Outcome(_Typed):
         own = {name: one for name, one in get_annotations(cls).items() if not is_class_variable(one)}
         cls.declared, cls._defaults, cls.records = (dict(cls.declared), dict(cls._defaults), dict(cls.records))
         cls.event = event or lower_name(cls.__name__)
-        cls.__init__ = _filled  # type: ignore[method-assign]
+        cls.__init__ = _fill  # type: ignore[method-assign]
         with class_statement(cls) as names:
             for above in cls.__mro__[1:]:
                 if declared_by := vars(above).get("declared_by"):
@@ -115,7 +115,7 @@ _PLAIN = frozenset({"number", "integer", "boolean", *WORDS})
 _TAKEN = frozenset({"event", "attributes", "observed", "declared", "records", "declared_by"})
 
 
-def _filled(self: Outcome, *given: object, observed: Delta = _UNCHANGED, **values: Any) -> None:
+def _fill(self: Outcome, *given: object, observed: Delta = _UNCHANGED, **values: Any) -> None:
     """Set the attributes of a declared outcome; `__init__` of all subclasses."""
     kind = type(self)
     if given:

@@ -31,7 +31,7 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
     for name in settings:
         if name not in by_name:
             raise unknown_in(profile, "components", "component", name, by_name)
-    values = {name: _configured(component, profile) for name, component in by_name.items()}
+    values = {name: _compute_values(component, profile) for name, component in by_name.items()}
     for name, component in by_name.items():
         component.parameter_values.replace(values[name])
     if profile is not None:
@@ -42,7 +42,7 @@ def configure(components: Iterable[Component], profile: Profile | None = None) -
             raise
 
 
-def _configured(component: Component, profile: Profile | None) -> dict[str, Value]:
+def _compute_values(component: Component, profile: Profile | None) -> dict[str, Value]:
     settings = {} if profile is None else profile.components.get(component.name, {})
     for parameter, value in settings.items():
         try:

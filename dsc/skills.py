@@ -283,7 +283,7 @@ def _reported_outcomes(
     return {event: attributes for one in found for event, attributes in one.items()}
 
 
-async def _awaited(_: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
+async def _await_body(_: Any, body: SkillBody, call: SkillCall[Any], arguments: Mapping[str, Any]) -> Outcome:
     coming = body(call, **arguments)
     if not inspect.isawaitable(coming):
         raise SchemaError("it is not a coroutine: write `async def`, or declare it `blocking`")
@@ -298,7 +298,7 @@ async def _in_process(component: Any, body: SkillBody, call: SkillCall[Any], arg
     return await in_process(body, component.name, call, arguments)
 
 
-_EXECUTIONS: Mapping[str | None, Execution] = {None: _awaited, "thread": _in_thread, "process": _in_process}
+_EXECUTIONS: Mapping[str | None, Execution] = {None: _await_body, "thread": _in_thread, "process": _in_process}
 
 
 @cache
@@ -379,7 +379,7 @@ def _require_form(named: str, body: SkillBody, declared: Declared) -> None:
         wanted = "self, call" if "." in named else "call"
         raise SchemaError(f"skill '{named}' has no parameter for its call: write ({wanted}, ...), not ({given})")
     coroutine = inspect.iscoroutinefunction(inspect.unwrap(body))
-    if declared.execute is _awaited and not coroutine:
+    if declared.execute is _await_body and not coroutine:
         raise SchemaError(f"skill '{named}' is not a coroutine: write `async def`, or declare it `blocking`")
     if declared.execute in {_in_thread, _in_process} and coroutine:
         raise SchemaError(f"skill '{named}' is a coroutine, and a blocking skill is a plain function: write `def`")

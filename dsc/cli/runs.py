@@ -97,7 +97,9 @@ def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
         print_line(summary | {"under_way": running_actions, "macrosteps": [_step_form(step) for step in steps]})
         return
     for step in steps:
-        typer.echo(f"{step.time:8.1f} s {step.number:5}  {_taken(step)}: {', '.join(_innermost(step.configuration))}")
+        typer.echo(
+            f"{step.time:8.1f} s {step.number:5}  {_describe(step)}: {', '.join(_innermost(step.configuration))}"
+        )
     typer.echo(f"{row.plot}: {summary['state']}")
     for one in running_actions:
         typer.echo(f"  under way since {one['since']:.1f} s: {one['skill']} ({one['id']})")
@@ -219,7 +221,7 @@ def _open(runs: RunArchive, run: RunRow) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _taken(step: StepRow) -> str:
+def _describe(step: StepRow) -> str:
     """Return the message of the macrostep, in the terms of the trace."""
     events = [one.data for one in step.records if one.type == "event"]
     if events:

@@ -87,7 +87,7 @@ class Parameters(Mapping[str, Any]):
             InputError: an annotation, range, default or relation is not valid; the message has the line of the class.
         """
         with class_statement(cls) as names:
-            cls.declared = {**cls.declared, **dict(_declared(cls, names))}
+            cls.declared = {**cls.declared, **dict(_list_declared(cls, names))}
             check_declarations(cls.__qualname__, cls.declared, cls.relations)
 
     def __getitem__(self, name: str) -> Any:
@@ -119,7 +119,7 @@ def parameters_of(declared: Mapping[str, Parameter], relations: tuple[str, ...])
     return DeclaredParameters
 
 
-def _declared(kind: type[Parameters], names: Namespace) -> Iterator[tuple[str, Parameter]]:
+def _list_declared(kind: type[Parameters], names: Namespace) -> Iterator[tuple[str, Parameter]]:
     """Yield the parameters that the annotations of a class declare, and give the class an attribute for each."""
     annotations = get_annotations(kind)
     for name, value in vars(kind).items():
@@ -134,11 +134,11 @@ def _declared(kind: type[Parameters], names: Namespace) -> Iterator[tuple[str, P
             raise SchemaError(f"{said} hides an attribute of every `Parameters`; choose another name", found=name)
         given = vars(kind).get(name)
         made = given if isinstance(given, partial) else partial(Parameter, default=given)
-        yield name, made(**_typed(evaluated(annotation, names, said), said))
+        yield name, made(**_read_type(evaluated(annotation, names, said), said))
         setattr(kind, name, property(partial(_value, name)))
 
 
-def _typed(annotation: object, said: str) -> dict[str, Any]:
+def _read_type(annotation: object, said: str) -> dict[str, Any]:
     """Return the type, and the permitted values, that an annotation declares."""
     among = get_args(annotation) if get_origin(annotation) is Literal else ()
     first = type(among[0]) if among and len({*map(type, among)}) == 1 else annotation

@@ -27,13 +27,13 @@ def check_hardware(deployment: Deployment) -> Iterator[Finding]:
                 for name, path, demand in deployment.demands_on(host, active)
                 for number, wanted in enumerate(demand.hardware)
             }
-            served = _served(deployment, host, demands)
+            served = _find_served(deployment, host, demands)
             for path in [one for one in demands if one not in served and one not in missing]:
                 missing.add(path)
                 yield finding_at(deployment, path, _lack(deployment, host, mode, *demands[path]), HARDWARE)
 
 
-def _served(deployment: Deployment, host: str, demands: Mapping[FormPath, tuple[str, str]]) -> set[FormPath]:
+def _find_served(deployment: Deployment, host: str, demands: Mapping[FormPath, tuple[str, str]]) -> set[FormPath]:
     """Return the demands with a device, if each device that is not shared serves one demand."""
     here = {name: device for name, device in deployment.devices.items() if device.host == host}
     fitting = {

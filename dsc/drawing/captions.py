@@ -132,7 +132,7 @@ def _guard(one: Labelled, *, terse: bool) -> str:
 
 def _brief(transition: Transition, *, terse: bool) -> tuple[str, ...]:
     shown = [action for action in _effect(transition) if not (terse and isinstance(action, Assign))]
-    return (*(action_text(action, brief=True) for action in shown), *_handed(transition, brief=True))
+    return (*(action_text(action, brief=True) for action in shown), *_argument_texts(transition, brief=True))
 
 
 def _effect(transition: Transition) -> list[Internal]:
@@ -140,7 +140,7 @@ def _effect(transition: Transition) -> list[Internal]:
     return [action for action in transition.effect if not (isinstance(action, Bind) and not action.every)]
 
 
-def _handed(transition: Transition, *, brief: bool = False) -> list[str]:
+def _argument_texts(transition: Transition, *, brief: bool = False) -> list[str]:
     """Return texts of the arguments that a transition passes to its target's plot, and of the histories it clears."""
     passed = ", ".join(name if brief else f"{name} = {term_text(value)}" for name, value in transition.passed.items())
     cleared = ", ".join(transition.clear)
@@ -156,14 +156,14 @@ def _caption(group: list[Labelled], *, terse: bool) -> Caption:
         triggers = list(dict.fromkeys(one.trigger for one in group if one.trigger))
         actions = _brief(first.transition, terse=terse)
         kind = _kind(first.transition)
-        words = [*_enumerated(triggers), _guard(first, terse=terse), kind, *_enumerated(actions, ";", "/ ")]
+        words = [*_enumerate(triggers), _guard(first, terse=terse), kind, *_enumerate(actions, ";", "/ ")]
     lines = pack([word for word in words if word], TextStyle.LABEL, WIDTH)
     return Caption(tuple(lines), "\n".join(filter(None, map(full_text, group))), rule is not None)
 
 
 def full_text(one: Labelled, *, trigger: bool = True) -> str:
     """Return the full text of a transition; `trigger=False` omits the trigger."""
-    effects = "; ".join([*map(action_text, _effect(one.transition)), *_handed(one.transition)])
+    effects = "; ".join([*map(action_text, _effect(one.transition)), *_argument_texts(one.transition)])
     rule = one.transition.rule
     parts = [
         one.trigger if trigger else "",
@@ -180,7 +180,7 @@ def _kind(transition: Transition) -> str:
     return "{internal}" if transition.internal and transition.target is not None else ""
 
 
-def _enumerated(words: Sequence[str], separator: str = ",", before: str = "") -> list[str]:
+def _enumerate(words: Sequence[str], separator: str = ",", before: str = "") -> list[str]:
     if not words:
         return []
     return (before + f"{separator}\n".join(words)).split("\n")
@@ -207,13 +207,13 @@ def block_texts(state: State, emits: Container[str] = ()) -> list[str]:
     """
     words = {"entry": "entry", "exit": "exit", "on_break": "break"}
     return [
-        f"{words[key]} / {action_text(action)}{_renamed(action, emits)}"
+        f"{words[key]} / {action_text(action)}{_rename(action, emits)}"
         for key, actions in state.blocks()
         for action in actions
     ]
 
 
-def _renamed(action: Internal | ExternalAction, emits: Container[str]) -> str:
+def _rename(action: Internal | ExternalAction, emits: Container[str]) -> str:
     if not isinstance(action, Trigger) or not action.names:
         return ""
     return " as " + ", ".join(f"^{name}" if name in emits else name for name in action.names.values())
@@ -284,7 +284,7 @@ def content_text(use: str, arguments: Mapping[str, Term]) -> str:
 
 def signature(plot: ActionPlot) -> str:
     """Return the plot's name and parameters as text."""
-    return f"{plot.name}({_declared(plot.parameters)})" if plot.parameters else plot.name
+    return f"{plot.name}({_declare(plot.parameters)})" if plot.parameters else plot.name
 
 
 def facts(plot: ActionPlot) -> list[str]:
@@ -297,22 +297,22 @@ def facts(plot: ActionPlot) -> list[str]:
             *((name, to_text(term)) for name, term in plot.scores().items()),
             ("listens to", _events(plot.receives)),
             ("outcomes", _events(plot.emits)),
-            ("outputs", _declared(plot.outputs)),
-            ("variables", _declared(plot.variables)),
+            ("outputs", _declare(plot.outputs)),
+            ("variables", _declare(plot.variables)),
             *(_robot(plot.robot) if plot.robot is not None else ()),
         )
         if text
     ]
 
 
-def _declared(names: Mapping[str, PlotParameter | PlotVariable]) -> str:
+def _declare(names: Mapping[str, PlotParameter | PlotVariable]) -> str:
     return ", ".join(f"{name}: {one.type}" for name, one in names.items())
 
 
 def _robot(robot: RobotSection) -> Iterator[tuple[str, str]]:
     """Yield the interface of a robot section: the kinds of its parts and their texts."""
-    yield "sensors", _declared(robot.sensors)
-    yield "motors", _declared(robot.motors)
+    yield "sensors", _declare(robot.sensors)
+    yield "motors", _declare(robot.motors)
     yield "constants", ", ".join(f"{name} = {value_text(value)}" for name, value in robot.constants.items())
     for (group, *words), values in robot.assignments.items():
         yield (

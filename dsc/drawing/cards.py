@@ -208,11 +208,11 @@ def _choices(state: DynamicState, library: Library | None) -> list[CardRow]:
         rows.append(_row(f"plots that offer {state.offer}{choice_text(state)}"))
     offering = [] if library is None else [one.name for one in candidates_of(state, library)]
     for name in state.candidates or offering:
-        plot = _known(name, library)
+        plot = _find_plot(name, library)
         condition = f" [{to_text(plot.when)}]" if plot is not None and plot.when is not None else ""
         term = None if plot is None else plot.scores().get(state.choose)
         score = "" if term is None else f"{choice_text(state)} {to_text(term)}"
-        rows.append(_row(f"◇ {content_text(name, _taken(state, plot))}{condition}{score}"))
+        rows.append(_row(f"◇ {content_text(name, _select_arguments(state, plot))}{condition}{score}"))
     if state.situation:
         rows.append(_row(f"situation: {', '.join(map(to_text, state.situation))}"))
     if state.goal is not None:
@@ -220,17 +220,17 @@ def _choices(state: DynamicState, library: Library | None) -> list[CardRow]:
     return rows
 
 
-def _taken(state: DynamicState, plot: ActionPlot | None) -> dict[str, Term]:
+def _select_arguments(state: DynamicState, plot: ActionPlot | None) -> dict[str, Term]:
     """Return the state's arguments that are parameters of a candidate; all arguments for an unknown candidate."""
     return {k: v for k, v in state.arguments.items() if plot is None or k in plot.parameters}
 
 
-def _known(name: str, library: Library | None) -> ActionPlot | None:
+def _find_plot(name: str, library: Library | None) -> ActionPlot | None:
     return library.plot(name) if library is not None and name in library else None
 
 
 def _about(name: str, library: Library | None) -> str:
-    plot = _known(name, library)
+    plot = _find_plot(name, library)
     return plot.about or "" if plot is not None else ""
 
 

@@ -37,7 +37,7 @@ class Port:
     @property
     def before(self) -> Point:
         """The point where the straight end of a line begins."""
-        return _shifted(self.place, self.out, ARRIVAL)
+        return _shift(self.place, self.out, ARRIVAL)
 
 
 @dataclass(slots=True)
@@ -123,7 +123,7 @@ def _inwards(way: Sequence[Box], last: tuple[Point, Point], drawn: Sequence[Draw
     """Return the line from the border of the first box on the path to the border of the last box."""
     box, ports = way[0], _ports(way[-1])
     vertical = abs(last[0][0] - last[1][0]) < abs(last[0][1] - last[1][1])
-    start = _shifted(last[1], _direction(*last), TRACKS[0])
+    start = _shift(last[1], _direction(*last), TRACKS[0])
     ground = _ground(way, drawn)
     befores = [port.before for port in ports]
     maze = Maze(
@@ -134,7 +134,7 @@ def _inwards(way: Sequence[Box], last: tuple[Point, Point], drawn: Sequence[Draw
     )
     arrivals = {(port.before, port.out[0] == 0): port for port in ports}
     words = [_text_area(text) for text in way[-1].texts] if way[-1].kind in ROUND else []
-    goals = {goal: port.price + _taken(port, words, ground.lines) for goal, port in arrivals.items()}
+    goals = {goal: port.price + _price_of(port, words, ground.lines) for goal, port in arrivals.items()}
     points = maze.way(start, goals, vertical=vertical)
     return [*points, next(port.place for (before, _), port in arrivals.items() if before == points[-1])]
 
@@ -214,7 +214,7 @@ def _spread(length: float) -> list[float]:
     return [-room, *middle, room] if room > middle[-1] + PORT_GAP / 2 else middle
 
 
-def _taken(port: Port, words: Iterable[Area], lines: Iterable[tuple[Point, Point]]) -> float:
+def _price_of(port: Port, words: Iterable[Area], lines: Iterable[tuple[Point, Point]]) -> float:
     """Return the additional cost of a port because of texts or other lines at its place."""
     near = sum(1 for ends in lines if any(_distance(end, port.place) < PORT_GAP / 2 for end in ends))
     return 60.0 * near + 500.0 * any(_holds(area, port.before) for area in words)
@@ -234,5 +234,5 @@ def _direction(before: Point, after: Point) -> Point:
     return (after[0] - before[0]) / length, (after[1] - before[1]) / length
 
 
-def _shifted(point: Point, direction: Point, length: float) -> Point:
+def _shift(point: Point, direction: Point, length: float) -> Point:
     return point[0] + direction[0] * length, point[1] + direction[1] * length

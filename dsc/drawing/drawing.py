@@ -68,7 +68,7 @@ class _Builder:
         scopes: dict[Path, list[EdgeBundle]] = {}
         for one in bundles(states, self._added, terse=self._plot.generated):
             for target in one.targets:
-                self._known(target, list(states), paths[one.source])
+                self._require_known(target, list(states), paths[one.source])
             if one.source in among_regions:
                 continue
             scopes.setdefault(self._nesting.common_scope((one.source, *one.targets)), []).append(one)
@@ -77,7 +77,7 @@ class _Builder:
     def scope(self, scope: Scope, path: Path) -> Box:
         """Return a box with the layout of a scope's states and edges."""
         initial = initial_of(scope)
-        self._known(initial, self._nesting.inside(path), (*path, "initial"))
+        self._require_known(initial, self._nesting.inside(path), (*path, "initial"))
         boxes = {"": dot(), **{name: self._state(name, state, path) for name, state in scope.states.items()}}
         edges = (initial_bundle(initial), *self._bundles.get(path, ()))
         spans = [span for one in edges for span in self._spans(path, one)]
@@ -97,7 +97,7 @@ class _Builder:
             if target not in also:
                 yield ScopeSpan(EdgeBundle(bundle.source, target, (), bundle.rule), start, holder(scope, target))
 
-    def _known(self, target: str, valid: list[str], path: Path) -> None:
+    def _require_known(self, target: str, valid: list[str], path: Path) -> None:
         if target not in valid:
             raise UnknownNameError(
                 f"there is no state '{target}' here", place=self._plot.place(path), found=target, valid=valid

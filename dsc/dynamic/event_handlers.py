@@ -70,12 +70,12 @@ class _Handling:
                 inside = self.interrupted(state.states, handlers, entrances, at_top=False)
                 result[name] = state.model_copy(update={"states": inside})
             elif isinstance(state, State):
-                result.update(self._interrupted(name, state, handlers, entrances, at_top=at_top))
+                result.update(self._interrupt(name, state, handlers, entrances, at_top=at_top))
             else:
                 result[name] = state
         return result
 
-    def _interrupted(
+    def _interrupt(
         self, name: str, state: State, handlers: list[Handler], entrances: Mapping[str, str], *, at_top: bool
     ) -> States:
         on, more = dict(state.on), dict[str, AnyState]()
@@ -90,7 +90,7 @@ class _Handling:
                     more[waiting] = State(about=handler.label)
                     leading[then] = Transition(target=waiting, do=(Emit(emit=self._leaving(then)),))
             more[handled] = self._handled(handler, entrances.get(name, name), leading)
-            heard = self._received(handler.on)
+            heard = self._receive(handler.on)
             on[heard] = (*on.get(heard, ()), _way(handler, handled))
         return {name: state.model_copy(update={"on": on}), **more}
 
@@ -147,9 +147,9 @@ class _Handling:
                 }
                 more[handled] = self._handled(handler, awaited, leading)
             ways.append(_way(handler, handled))
-        return {awaited: State(on={self._received(event): tuple(ways)}), **more}
+        return {awaited: State(on={self._receive(event): tuple(ways)}), **more}
 
-    def _received(self, event: str) -> str:
+    def _receive(self, event: str) -> str:
         return self._listening.get(event, event)
 
     def _handled(self, handler: Handler, back: str, leading: Mapping[str, Transition]) -> AnyState:

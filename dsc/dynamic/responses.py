@@ -69,17 +69,17 @@ class Responses:
         """
         guard, counting = self._limit(rule, key)
         if not rule.do.acts:
-            return [_joined(rule, guard, counting, self._handed_out(after)) for after in onward(rule)]
+            return [_join(rule, guard, counting, self._handed_out(after)) for after in onward(rule)]
         name = self._added.state(f"{key}_{rule.do.use or 'command'}", rule.label)
         kept: dict[str, lang.Term] = {}
         ways = {DONE: onward(rule), **{outcome: onward(rule.after_outcome(outcome)) for outcome in rule.do.on}}
         on = {event: tuple(self._afterwards(way, key, kept) for way in found) for event, found in ways.items()}
         states[name] = self._acting(rule, key, {**self._replanning(rule, step), **on}, kept)
-        return [_joined(rule, guard, {**counting, **kept}, Transition(target=name))]
+        return [_join(rule, guard, {**counting, **kept}, Transition(target=name))]
 
     def _afterwards(self, way: Transition, key: str, kept: dict[str, lang.Term]) -> Transition:
         """Return a transition out of a recovery state; `kept` receives the values that it can no longer read."""
-        return self._handed_out(way.model_copy(update={"passed": self._kept(way.passed, key, kept)}))
+        return self._handed_out(way.model_copy(update={"passed": self._keep(way.passed, key, kept)}))
 
     def _replanning(self, rule: Rule, step: str) -> dict[str, tuple[Transition, ...]]:
         """Return transitions for all outcomes and failures of a rule's plot inside a plan, which need a new plan."""
@@ -108,9 +108,9 @@ class Responses:
         if then == CONTINUE and rule.before and skipped(name) in self._sidecar[name]:
             return [Transition(target=skipped(name))]
         if then == CONTINUE:
-            return self._wired(rule, number, name, state, DONE)
+            return self._wire(rule, number, name, state, DONE)
         if then == GIVE_UP:
-            return [because(about, one) for one in self._wired(rule, number, name, state, GAVE_UP)]
+            return [because(about, one) for one in self._wire(rule, number, name, state, GAVE_UP)]
         if then in {RETRY, REPLAN, ENTER}:
             tested = again(name) in self._sidecar[name] and not rule.do.passed
             return [Transition(target=again(name) if tested else name, passed=rule.do.passed)]
@@ -154,7 +154,7 @@ class Responses:
             found[name] = lang.Variable(variable)
         return found
 
-    def _kept(self, terms: Terms, key: str, kept: dict[str, lang.Term]) -> dict[str, lang.Term]:
+    def _keep(self, terms: Terms, key: str, kept: dict[str, lang.Term]) -> dict[str, lang.Term]:
         """Return the terms; a new variable replaces each term that reads the event, and `kept` receives its assignment.
 
         The variables are necessary because a later state can no longer read the event's attributes.
@@ -168,7 +168,7 @@ class Responses:
         do, about = rule.do, f"rule: {_spoken(rule)} {rule.do.use or 'command'}, then {rule.then}"
         if do.use is None:
             return State(entry=do.command, on=on, about=about)
-        arguments = self._kept(do.arguments, key, kept) if self._interrupted else do.arguments
+        arguments = self._keep(do.arguments, key, kept) if self._interrupted else do.arguments
         return SubmachineState(
             use=do.use, arguments=arguments, entry=do.command, on=on, about=about,
             priority=rule.priority, preempt=rule.preempt,
@@ -184,7 +184,7 @@ class Responses:
         guard = below if rule.when is None else lang.And((below, rule.when))
         return guard, {counter: lang.Arithmetic("+", (tries, lang.Constant(1)))}
 
-    def _wired(self, rule: Rule, number: int, name: str, state: State, event: str) -> list[Transition]:
+    def _wire(self, rule: Rule, number: int, name: str, state: State, event: str) -> list[Transition]:
         if event not in state.on:
             raise SchemaError(
                 f"a rule cannot '{rule.then}' at state '{name}', which does not wire '{event}'",
@@ -254,7 +254,7 @@ def _action_because(action: WrittenAction, reason: Terms) -> WrittenAction:
             return action  # without a reason, or of dialect scxml
 
 
-def _joined(rule: Rule, guard: lang.Expression | None, counting: Terms, after: Transition) -> Transition:
+def _join(rule: Rule, guard: lang.Expression | None, counting: Terms, after: Transition) -> Transition:
     """Return the transition `after` with the rule's guard, and with the rule's actions before its actions."""
     both = [part for part in (guard, after.guard) if part is not None]
     actions: list[WrittenAction] = []

@@ -125,9 +125,9 @@ def _follow(loc: _Location, data: Any, schema: _Schema) -> tuple[FormPath, list[
     path: list[str | int] = []
     nodes = [schema]
     for element in loc:
-        members = [member for node in nodes for member in _resolved(node, schema).get("oneOf", ())]
+        members = [member for node in nodes for member in _resolve(node, schema).get("oneOf", ())]
         if members:
-            nodes = _tagged(members, str(element), schema)
+            nodes = _find_tagged(members, str(element), schema)
             continue
         if isinstance(data, list | tuple):
             data = dict(enumerate(data))
@@ -141,22 +141,22 @@ def _follow(loc: _Location, data: Any, schema: _Schema) -> tuple[FormPath, list[
     return tuple(path), [form for node in nodes for form in _alternatives(node, schema)]
 
 
-def _tagged(members: list[_Schema], tag: str, schema: _Schema) -> list[_Schema]:
+def _find_tagged(members: list[_Schema], tag: str, schema: _Schema) -> list[_Schema]:
     """Return the members whose distinctive key is the tag or whose title begins with the tag; all if none matches."""
-    resolved = [_resolved(member, schema) for member in members]
+    resolved = [_resolve(member, schema) for member in members]
     return [
         form for form in resolved if tag in form.get("properties", {}) or form["title"].lower().startswith(tag)
     ] or resolved
 
 
-def _resolved(node: _Schema, schema: _Schema) -> _Schema:
+def _resolve(node: _Schema, schema: _Schema) -> _Schema:
     while "$ref" in node:
         node = schema["$defs"][node["$ref"].rsplit("/", 1)[1]]
     return node
 
 
 def _alternatives(node: _Schema, schema: _Schema) -> list[_Schema]:
-    node = _resolved(node, schema)
+    node = _resolve(node, schema)
     many = node.get("oneOf") or node.get("anyOf")
     return [a for one in many for a in _alternatives(one, schema)] if many else [node]
 

@@ -277,7 +277,7 @@ class SelectState(Connector):
     def placed_transitions(self) -> Iterator[tuple[FormPath, str, Transition]]:
         """Yield the cases as guarded transitions, then `otherwise`; the paths are `("cases", key)` and `("else",)`."""
         for path, value, case in self.written_cases():
-            yield path, CHOICE, self._guarded(value, case)
+            yield path, CHOICE, self._add_guard(value, case)
         yield ("else",), CHOICE, self.otherwise
 
     def written_cases(self) -> Iterator[tuple[FormPath, Value, Transition]]:
@@ -292,7 +292,7 @@ class SelectState(Connector):
         *cases, otherwise = redirected((*self.cases.values(), self.otherwise), change)
         return self.model_copy(update={"cases": dict(zip(self.cases, cases, strict=True)), "otherwise": otherwise})
 
-    def _guarded(self, value: Value, case: Transition) -> Transition:
+    def _add_guard(self, value: Value, case: Transition) -> Transition:
         is_case = Comparison("=", self.select, Constant(value))
         guard = is_case if case.guard is None else And((is_case, case.guard))
         return case.model_copy(update={"guard": guard})

@@ -129,7 +129,7 @@ class RunWriter:
     def step(self, *row: Any) -> None:
         """Write the row of a macrostep without its place; check the right, with the errors of `require_right`."""
         knowledge = self._knowledge.digest
-        before = (self._digest or self._continued()) + knowledge
+        before = (self._digest or self._find_digest()) + knowledge
         digest = link(before, *row)
         if self._cursor.execute(_STEP, (*row, knowledge, digest, self._epoch)).rowcount != 1:
             raise self._taken_over()
@@ -139,7 +139,7 @@ class RunWriter:
     def more(self, change: str = "", records: str = "") -> None:
         """Append to the row of the last macrostep; errors equal those of `require_right`."""
         self.require_right()
-        self._digest = self._digest or self._continued()
+        self._digest = self._digest or self._find_digest()
         before, row = self._last
         row = *row[:-2], row[-2] + change, row[-1] + records
         self._digest = link(before, *row)
@@ -154,7 +154,7 @@ class RunWriter:
         self.connection.execute(_END, (ended, steps, seal, run))
         put_ends(self.connection, [(CHAIN, Tip(steps, seal))])
 
-    def _continued(self) -> bytes:
+    def _find_digest(self) -> bytes:
         """Return the digest of the last macrostep, which an earlier process has written."""
         *row, knowledge, place = self.connection.execute(_LAST).fetchone()
         (before,) = self.connection.execute(_BEFORE, (place - 1, row[0], row[0])).fetchone()

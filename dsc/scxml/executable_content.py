@@ -105,7 +105,7 @@ def fired(element: Element, scope: Scope) -> Sent:
     """Return the event that a `raise` or `send` element fires."""
     if element.name == "raise":
         return Sent(needed(element, "event"), None, scope)
-    return Sent(_constant(element, "event", scope), _carried(element, scope), scope)
+    return Sent(_constant(element, "event", scope), _read_data(element, scope), scope)
 
 
 def _raise(element: Element, _: Scope) -> Form:
@@ -196,7 +196,7 @@ def _delay(element: Element, scope: Scope) -> float:
 def _arguments(element: Element, scope: Scope) -> dict[str, Term]:
     """Return the data of a `send` by name in lower case; data without names have the name `data`."""
     found: dict[str, Term] = {}
-    for name, value in (_carried(element, scope) or {}).items():
+    for name, value in (_read_data(element, scope) or {}).items():
         folded = name.lower() or "data"
         if folded in found:
             why = f"two are named '{folded}', in lower case"
@@ -207,7 +207,7 @@ def _arguments(element: Element, scope: Scope) -> dict[str, Term]:
     return found
 
 
-def _carried(element: Element, scope: Scope) -> dict[str, Term] | None:
+def _read_data(element: Element, scope: Scope) -> dict[str, Term] | None:
     """Return an event's data by the spelling in the document; `None` without data.
 
     Content other than an object has the key `WHOLE`.

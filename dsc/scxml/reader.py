@@ -67,7 +67,7 @@ class _Reader:
         form: Form = {"plot": self._name(), "dialect": "scxml", "variables": self._variables()}
         form |= self._scope(root, ())
         received = self._known.data.received
-        form["receives"] = {event: _declared(attributes) or None for event, attributes in received.items()}
+        form["receives"] = {event: _declare_types(attributes) or None for event, attributes in received.items()}
         return read_model(ActionPlot, Document(form, self._places)).written_at(self._places)
 
     def _note(self, path: Path, place: Place) -> None:
@@ -105,11 +105,11 @@ class _Reader:
         """Compute the kinds of all data; afterwards, translation refuses expressions that convert values."""
         known = self._known.data
         early = {self._known.names.get(name) for name in set_at_first(self._root, self._known)}
-        given = [one for one in self._given(self._root, self._known) if one[1] is not None or one[0] not in early]
-        known.received = {event: {} for event in self._received()}
+        given = [one for one in self._assignments(self._root, self._known) if one[1] is not None or one[0] not in early]
+        known.received = {event: {} for event in self._find_received()}
         compute_kinds(known, given)
 
-    def _given(self, element: Element, scope: Scope) -> Iterator[tuple[str, Term | None, Scope]]:
+    def _assignments(self, element: Element, scope: Scope) -> Iterator[tuple[str, Term | None, Scope]]:
         """Yield variable, value and scope of each assignment inside an element; record the events that it fires."""
         for child in element.children:
             if child.name == "data":
@@ -120,7 +120,7 @@ class _Reader:
                 scope.data.sent.append(fired(child, scope))
             if "idlocation" in child.attributes:
                 yield variable(child.attributes["idlocation"], scope, child), Constant("", quoted=True), scope
-            yield from self._given(child, scope.on(_descriptors(child)) if child.name == "transition" else scope)
+            yield from self._assignments(child, scope.on(_descriptors(child)) if child.name == "transition" else scope)
 
     def _variable(self, element: Element, before: Form) -> Form:
         initial = assigned(element, self._known)
@@ -134,7 +134,7 @@ class _Reader:
         form: Form = {"type": next(iter(kinds)) if len(kinds) == 1 and kinds <= {TEXT, NUMBER, BOOLEAN} else "symbol"}
         return form if initial is None else {**form, "initial": initial}
 
-    def _received(self) -> list[str]:
+    def _find_received(self) -> list[str]:
         """Return the events for which the chart has a transition but which it does not itself fire."""
         own = {sent.event for sent in self._known.data.sent}
         heard = [e for one in self._root.walk() if one.name == "transition" for e in _descriptors(one)]
@@ -295,6 +295,6 @@ def _only(element: Element) -> Element:
     return element.children[0]
 
 
-def _declared(attributes: Mapping[str, str]) -> dict[str, str]:
+def _declare_types(attributes: Mapping[str, str]) -> dict[str, str]:
     """Return the types of attributes by name; an attribute that is only compared for equality is a `symbol`."""
     return {name: kind or "symbol" for name, kind in attributes.items()}

@@ -62,13 +62,13 @@ def expression_text(e: Expression) -> str:
     """
     match e:
         case And(parts):
-            return " && ".join(map(_bracketed, parts)) or "true"
+            return " && ".join(map(_bracket, parts)) or "true"
         case Or(parts):
-            return " || ".join(map(_bracketed, parts)) or "false"
+            return " || ".join(map(_bracket, parts)) or "false"
         case Not(body):
             return f"!({expression_text(body)})"
         case Imply(premise, conclusion):
-            return f"!({expression_text(premise)}) || {_bracketed(conclusion)}"
+            return f"!({expression_text(premise)}) || {_bracket(conclusion)}"
         case Comparison(sign, left, right):
             return f"{term_text(left)} {_SIGNS.get(sign, sign)} {term_text(right)}"
         case Atom() if asked := asked_states(e):
@@ -101,7 +101,7 @@ def identifier(name: str) -> str:
     return name
 
 
-def _bracketed(e: Expression) -> str:
+def _bracket(e: Expression) -> str:
     text = expression_text(e)
     return text if isinstance(e, Atom | Comparison | Not) else f"({text})"
 
@@ -243,7 +243,7 @@ def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -
                     ET.SubElement(around, "assign", {"location": identifier(name), "expr": term_text(term)})
             case Log(log=parts, label=label):
                 labelled = {"label": label} if label else {}
-                shown = {"expr": _joined(parts)} if parts else {}
+                shown = {"expr": _concatenate(parts)} if parts else {}
                 ET.SubElement(around, "log", {**labelled, **shown})
             case Emit():
                 _send(around, action)
@@ -258,7 +258,7 @@ def _actions(around: ET.Element, actions: Iterable[ExternalAction | Internal]) -
                 raise NotExpressibleError(type(action).__name__.lower(), "SCXML knows no skills and no knowledge base")
 
 
-def _joined(parts: Sequence[Term]) -> str:
+def _concatenate(parts: Sequence[Term]) -> str:
     """Return an expression that concatenates the parts; without a text among several parts, `+` would add numbers."""
     texts = list(map(term_text, parts))
     joins = len(parts) == 1 or any(isinstance(part, Constant) and isinstance(part.value, str) for part in parts)

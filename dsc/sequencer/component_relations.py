@@ -49,7 +49,7 @@ class ComponentRelations:
             "dsc:outcome": lambda: self._each(_outcomes),
             "dsc:wire": self._wires,
             "dsc:resource": self._capacities,
-            "dsc:occupies": self._occupied,
+            "dsc:occupies": self._occupation_rows,
             "dsc:executes": self._executes,
             "dsc:waits": self._waits,
         }
@@ -85,7 +85,7 @@ class ComponentRelations:
         room = self._dispatcher.activation.room
         return iter(() if room is None else [*room.capacity.items()])
 
-    def _occupied(self) -> Iterator[_Row]:
+    def _occupation_rows(self) -> Iterator[_Row]:
         room = self._dispatcher.activation.room
         for component, amounts in [] if room is None else [*room.users.items()]:
             yield from ((component, resource, amount) for resource, amount in amounts.items())

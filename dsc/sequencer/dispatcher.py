@@ -98,9 +98,9 @@ class Dispatcher:
         self.components = {component.name: component for component in require_instances(components)}
         self.activation = ComponentActivation(ComponentRegistry(self.components), self._in_use)
         self.sources = Sources(self.activation)
-        self.outbox = Outbox(self._refused)
-        self.lives = ComponentLives(self.components.values(), self._failed, self._recovered)
-        self._undeployed = Undeployed(clock, post, self._refused, self.components.keys())
+        self.outbox = Outbox(self._post_refusal)
+        self.lives = ComponentLives(self.components.values(), self._post_failure, self._post_recovery)
+        self._undeployed = Undeployed(clock, post, self._post_refusal, self.components.keys())
         self.wiring = Wiring(self.components)
         self.wiring.listen(self.activation.look)
         self._faults: list[str] = []
@@ -214,7 +214,7 @@ class Dispatcher:
         try:
             self.wiring.wire(f"{wire.component}.{wire.port}", wire.to, wire.activation)
         except InputError as error:
-            self._refused(wire, error)
+            self._post_refusal(wire, error)
 
     def _send(self, told: Told) -> None:
         self.outbox.send(self.component(told.component), told)
@@ -508,7 +508,7 @@ class Dispatcher:
             return unconfigured
         return component.life.describe() + component.life.hook
 
-    def _refused(self, told: Told | steps.SetWire, error: Exception) -> None:
+    def _post_refusal(self, told: Told | steps.SetWire, error: Exception) -> None:
         """Post an event for the state whose command has failed; at the end of the run, report the failure."""
         bug, failed = bug_in(error), f"{command(told)}: {reason_of(error)}"
         reason = " ".join((failed if bug is None else str(bug)).split())
@@ -519,7 +519,7 @@ class Dispatcher:
             name = SKILL_ERROR if bug is None else PROGRAMMING_ERROR
             self._post(command_failure(name, told.component, port_of(told), reason, told.activation))
 
-    def _failed(self, component: Component) -> None:
+    def _post_failure(self, component: Component) -> None:
         """Post an event about a failed component, unless its skill, or a command to it, reports the failure."""
         name, reason = component.name, component.life.reason
         if self._failures.get(name) == reason:  # another attempt to start has failed
@@ -534,7 +534,7 @@ class Dispatcher:
         else:
             self._report_failure(name, reason)
 
-    def _recovered(self, component: Component) -> None:
+    def _post_recovery(self, component: Component) -> None:
         """Post an event about the end of a failure, and deliver the settings again to a component that has started."""
         if component.life.state is Life.ALIVE:
             self.outbox.repeat(component)

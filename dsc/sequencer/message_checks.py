@@ -42,7 +42,7 @@ def encoded(value: Any) -> Any:
     return json.loads(json.dumps(value, allow_nan=False))
 
 
-def _copied(value: Any, name: str) -> Any:
+def _copy(value: Any, name: str) -> Any:
     """Return a copy of plain data from outside; raise `InputError` for other data."""
     try:
         return encoded(value)
@@ -157,7 +157,7 @@ def _plain(
         fits = type(value) is not float and wanted is not None and type(value) in wanted.exact
         if wanted is not None and not (fits and (type(value) is not str or len(value) < _LONG)):
             checked[name] = wanted.check(f"the attribute '{name}' of '{event}'", value, records)
-    plain: dict[str, Any] = _copied(checked, f"the attributes of '{event}'")
+    plain: dict[str, Any] = _copy(checked, f"the attributes of '{event}'")
     return plain
 
 
@@ -296,7 +296,7 @@ def checked_event(said: object, plots: Library, knowledge: KnowledgeBase) -> Eve
         plots.require_receiver(said.name)  # none declares the event
     if plain and not attributes:
         return said
-    copied = _copied(attributes, f"the attributes of '{said.name}'") if attributes else NO_ATTRIBUTES
+    copied = _copy(attributes, f"the attributes of '{said.name}'") if attributes else NO_ATTRIBUTES
     return said._replace(attributes=copied)
 
 
@@ -383,5 +383,5 @@ def checked_arguments(plot: ActionPlot, given: object, world: World, library: Li
             checked = data_type(declared.type).check(place, value, library.records)
             for at, one, wanted in objects_in(data_type(declared.type), checked, library.records):
                 _require_object(f"{place} at {at}" if at else place, one, wanted, world)
-        _copied(value, f"the argument '{name}'")
+        _copy(value, f"the argument '{name}'")
     return given

@@ -279,13 +279,13 @@ class Outbox:
         if own is not None and (why := own.result()) is not None:
             raise why
         if component.name in self.untaken:
-            await self._taken(component)
+            await self._await_taken(component)
         settings = self._settings.get(component.name)
         if settings is not None and settings.missing:
             self.repeat(component)
-            await self._taken(component)
+            await self._await_taken(component)
 
-    async def _taken(self, component: Component) -> None:
+    async def _await_taken(self, component: Component) -> None:
         """Wait until the component has received its `untaken` outputs; raise the error of a delivery, one time."""
         pending = self.untaken[component.name]
         await asyncio.wait([pending])  # `await pending` would cancel the delivery together with the skill

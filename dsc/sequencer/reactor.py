@@ -215,7 +215,7 @@ class Reactor:
         """Execute the macrostep for a message, and return its outputs; an error sets `problem` instead."""
         self._now = None
         try:
-            event = self._received(message)
+            event = self._receive(message)
             before, began = self.machine.state, self._phases.timer()
             said = message.message if isinstance(message, LateMessage) else message
             if isinstance(said, PlotsMessage):
@@ -234,7 +234,7 @@ class Reactor:
                 self._note_periods(message, in_vain=in_vain)
             output = self._commit(step)
             if event is not None and not step.handled:
-                self._unhandled(message, event)
+                self._end_unhandled(message, event)
             elif event is not None and event.name == PROGRAMMING_ERROR:
                 self.answered_bugs.add(event.attributes["reason"])
         except (RunawayError, InputError) as error:
@@ -248,7 +248,7 @@ class Reactor:
 
     def observe(self, message: SkillMessage) -> None:
         """Apply the observations of a message that arrives after the last macrostep."""
-        self._received(message)
+        self._receive(message)
 
     def leave(self) -> tuple[Output, ...]:
         """Exit the active states at the end of a run, and return the outputs of exit actions, which stop components."""
@@ -272,7 +272,7 @@ class Reactor:
         except InputError:  # a value of an exit action cannot be computed
             return ()
 
-    def _received(self, message: Message) -> Event | None:
+    def _receive(self, message: Message) -> Event | None:
         """Apply the observations of a message; return its event for the machine, or `None`."""
         if isinstance(message, LateMessage):
             message = message.message
@@ -292,7 +292,7 @@ class Reactor:
         if isinstance(message, TimerMessage):
             return self._due(message)
         if isinstance(message, SkillMessage):
-            return self._answered(message)
+            return self._answer(message)
         event = message.event if isinstance(message, SendLater) else message
         self.trace.cause = None
         self.trace.cause = self.tracer.event(event, _source(event))
@@ -332,7 +332,7 @@ class Reactor:
             self.trace.cause = self.tracer.event(event, "timer")
         return event
 
-    def _answered(self, message: SkillMessage) -> Event | None:
+    def _answer(self, message: SkillMessage) -> Event | None:
         start, outcome = message.start, message.outcome
         if outcome.event == OBSERVED:
             self.trace.cause = self.caused_by.get(start.action_id)
@@ -451,7 +451,7 @@ class Reactor:
         elif message.timer.event == EVERY:
             self.in_vain.add((message.timer.activation, message.timer.index))
 
-    def _unhandled(self, message: Message, event: Event) -> None:
+    def _end_unhandled(self, message: Message, event: Event) -> None:
         """End the run if an active state ignores the final answer of its skill, or the failure of its command.
 
         After an answer, the state would wait without end. A programming error ends the run in any case.

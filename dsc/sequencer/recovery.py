@@ -41,11 +41,11 @@ async def recover(kept: Kept, dispatcher: Dispatcher) -> None:
             await dispatcher.abandon(one.what)
     pending = [one for one in kept.pending if not one.cancelled]
     older = [one for one in pending if one.step < kept.number]
-    effective, others = _divided(older)
+    effective, others = _divide(older)
     for component, settings in effective.items():
         dispatcher.restore(component, settings)
     await dispatcher.outbox.all_taken()
-    begun = _begun(pending, kept.number, dispatcher)
+    begun = _find_begun(pending, kept.number, dispatcher)
     for one in sorted(others, key=lambda one: one.place not in begun):  # stable
         _rearm(one, dispatcher, begun)
     await dispatcher.settled()  # answers that were due before the last macrostep precede its answers
@@ -54,7 +54,7 @@ async def recover(kept: Kept, dispatcher: Dispatcher) -> None:
     dispatcher.give_turns()
 
 
-def _divided(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | SwitchMode]], list[Pending]]:
+def _divide(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | SwitchMode]], list[Pending]]:
     """Return the effective settings by component, and the other pending outputs."""
     effective: dict[str, list[SetParameter | SwitchMode]] = {}
     others = []
@@ -66,7 +66,7 @@ def _divided(older: Iterable[Pending]) -> tuple[dict[str, list[SetParameter | Sw
     return effective, others
 
 
-def _begun(pending: Iterable[Pending], number: int, dispatcher: Dispatcher) -> set[int]:
+def _find_begun(pending: Iterable[Pending], number: int, dispatcher: Dispatcher) -> set[int]:
     """Return the places of the actions that their components may have received; the others have waited for a turn.
 
     `number` is the number of the last macrostep.

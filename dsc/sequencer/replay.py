@@ -117,11 +117,11 @@ class _ReplayedRun:
         self._note(self._output(step))
         now = self._reactor.machine.state.configuration()
         if now != step.configuration:
-            return Divergence(step.number, "the configuration", _listed(step.configuration), _listed(now))
+            return Divergence(step.number, "the configuration", _list(step.configuration), _list(now))
         recorded = [change.delta for change in self._past.changes(step.before, step.version)]
         replayed = [change.delta for change in self._knowledge.changes(step.before)]
         if recorded != replayed:
-            return Divergence(step.number, "what was told", _told(recorded), _told(replayed))
+            return Divergence(step.number, "what was told", _describe(recorded), _describe(replayed))
         return None
 
     def _provide(self, relations: Mapping[str, list[list[Value]]]) -> None:
@@ -146,9 +146,9 @@ class _ReplayedRun:
         self._started.update({one.action_id: one for one in output if isinstance(one, Start)})
 
 
-def _listed(configuration: Iterable[str]) -> str:
+def _list(configuration: Iterable[str]) -> str:
     return ", ".join(configuration) or "empty"
 
 
-def _told(deltas: Iterable[Delta]) -> str:
+def _describe(deltas: Iterable[Delta]) -> str:
     return "; ".join(text_of(delta_form(delta)) for delta in deltas) or "nothing"

@@ -140,7 +140,7 @@ class RunningSkill:
         if threading.get_ident() != self._thread:
             skill = f"{self.start.component}.{self.start.skill}"
             bug = ProgrammingError(f"{skill}: it reports from another thread; declare it `blocking`")
-            self.task.get_loop().call_soon_threadsafe(self._misused, bug)
+            self.task.get_loop().call_soon_threadsafe(self._report_misuse, bug)
             raise bug
         if self.stopped or self.answered:
             if self.task.done():
@@ -150,7 +150,7 @@ class RunningSkill:
             self.reports = self.reports or Reports(self._post_report)
             self.reports.put(validated(outcome, self.start, self.signature))
 
-    def _misused(self, bug: ProgrammingError) -> None:
+    def _report_misuse(self, bug: ProgrammingError) -> None:
         if self.answered:
             self._fault(str(bug))
             return
@@ -207,7 +207,7 @@ class RunningSkill:
 
     def _outcome_of(self, error: BaseException) -> Outcome:
         if type(error) is PreemptedError:
-            return self._preempted(error.by)
+            return self._preempt(error.by)
         bug = programming_error(error, f"{self.start.component}.{self.start.skill}", self._raises)
         return failed(self.start, described(error)) if bug is None else faulty(self.start, str(bug))
 
@@ -254,9 +254,9 @@ class RunningSkill:
 
     def lose(self, taker: str) -> None:
         """Post `preempted`, since a skill with a higher priority takes the component; the task is then cancelled."""
-        self.answer(self._preempted(taker), continues=True)
+        self.answer(self._preempt(taker), continues=True)
 
-    def _preempted(self, taker: str) -> Outcome:
+    def _preempt(self, taker: str) -> Outcome:
         return Outcome(PREEMPTED, {"skill": f"{self.start.component}.{self.start.skill}", "by": taker})
 
     async def turn(self) -> None:

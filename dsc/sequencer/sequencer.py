@@ -193,7 +193,7 @@ class Sequencer(OutsideInput):
         async def begin() -> None:
             self._start(wanted.name, given)
 
-        return cast("RunEnd[Outputs]", await self._watched(begin))
+        return cast("RunEnd[Outputs]", await self._watch(begin))
 
     async def resume(self, kept: Kept) -> RunEnd:
         """Continue a run after its last macrostep, and return the end of the run.
@@ -206,9 +206,9 @@ class Sequencer(OutsideInput):
             UnknownNameError: a component that the run needs is not deployed; the run is unchanged.
         """
         require_components(kept, self.dispatcher)
-        return await self._watched(lambda: self._recover(kept))
+        return await self._watch(lambda: self._recover(kept))
 
-    async def _watched(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
+    async def _watch(self, begin: Callable[[], Awaitable[None]]) -> RunEnd:
         is_part = self.dispatcher.is_part  # the sequencer around it has a watchdog
         watch = nullcontext() if is_part else watched(self.dispatcher.skill_of, Sequencer._until_end.__code__)
         unfinished = unfinished_at_second_signal(self.dispatcher.unfinished)
@@ -222,7 +222,7 @@ class Sequencer(OutsideInput):
         self._reacts = True  # until the start is complete
         knowledge = self.knowledge
         ends = [
-            knowledge.subscribe(self._changed), knowledge.subscribe_to_sources(self._fed),
+            knowledge.subscribe(self._receive_change), knowledge.subscribe_to_sources(self._receive_value),
             knowledge.subscribe_to_relations(partial(self.clock.calls.call, self._wake, "relations")),
         ]  # fmt: skip
         if not self.dispatcher.is_part:  # the run around it provides the relations
@@ -310,7 +310,7 @@ class Sequencer(OutsideInput):
             return
         with nullcontext() if self.store is None else self.store.writing:
             for message in messages:
-                self._reactor.observe(self._validated(message))
+                self._reactor.observe(self._validate(message))
 
     def _failure(self) -> str | None:
         """Return the last outcome of the plot if it is declared as a failure."""
@@ -386,11 +386,11 @@ class Sequencer(OutsideInput):
             self._keep_step(None, output)
         self.dispatcher.dispatch_all(output)
 
-    def _changed(self, change: Change) -> None:
+    def _receive_change(self, change: Change) -> None:
         """Receive a change of knowledge from any thread."""
         self.clock.calls.call(self._wake, change.author)
 
-    def _fed(self, source: DataSource) -> None:
+    def _receive_value(self, source: DataSource) -> None:
         """Receive a new value of a source from any thread."""
         self.clock.calls.call(self._wake, source.reference)
 
@@ -409,7 +409,7 @@ class Sequencer(OutsideInput):
 
     def _take(self, message: Message) -> None:
         if isinstance(message, SkillMessage):
-            message = self._validated(message)
+            message = self._validate(message)
         if self.store is None:
             output = self._react(message)
         else:
@@ -435,7 +435,7 @@ class Sequencer(OutsideInput):
             self._reactor.renewed = self._reacts = False
             self._wake("relations")
 
-    def _validated(self, message: SkillMessage) -> SkillMessage:
+    def _validate(self, message: SkillMessage) -> SkillMessage:
         return message_checks.validated_in_world(message, self.knowledge, self.dispatcher.signature)
 
     def _may_group(self, message: Message, output: Collection[Output]) -> bool:

@@ -79,7 +79,7 @@ class Undeployed:
             return
         held = Held(output, self._clock.now())
         self._held.append(held)
-        _LOG.warning("%s", self._described(held))
+        _LOG.warning("%s", self._describe(held))
         if isinstance(output, Start) and math.isfinite(within):
             held.timer = self._clock.call_at(held.at + within, partial(self._expire, held, within))
 
@@ -92,9 +92,9 @@ class Undeployed:
 
     def describe(self) -> Iterator[str]:
         """Yield each output with its reason to wait, as text."""
-        return map(self._described, self._held)
+        return map(self._describe, self._held)
 
-    def _described(self, held: Held) -> str:
+    def _describe(self, held: Held) -> str:
         output = held.output
         what = f"{output.component}.{output.skill}" if isinstance(output, Start) else command(output)
         return f"{what} waits: {self._reason(output)}"

@@ -328,7 +328,7 @@ class Supervisor:
         while True:
             await self._activation.until(lambda: self._activation.on.issuperset(self._activation.needed(component)))
             lasted = await self._once(component)
-            pause = PAUSE if lasted > PAUSE else await _rested(component, pause)
+            pause = PAUSE if lasted > PAUSE else await _rest(component, pause)
 
     async def _once(self, component: Component) -> float:
         """Start and activate the component; return the seconds for which it was active."""
@@ -365,7 +365,7 @@ class Supervisor:
                 life.become(Life.FATAL_ERROR, f"it could not be switched off within {GRACE:g} s")
 
 
-async def _rested(component: Component, pause: float) -> float:
+async def _rest(component: Component, pause: float) -> float:
     """Wait before a failed component restarts, unless it recovers earlier; return the length of the next pause.
 
     A component in Shutdown stays in Shutdown until a `switch` to `init`.

@@ -51,10 +51,10 @@ class SkillDependencies:
             NotAliveError: the component itself cannot start, or is in Shutdown.
             InputError: components need each other in a cycle, or the hook `needed` of a component fails.
         """
-        await (self._supervised() if self.concerned else self._component.life.come_alive())
+        await (self._supervise() if self.concerned else self._component.life.come_alive())
         self._component.life.require_alive()
 
-    async def _supervised(self) -> None:
+    async def _supervise(self) -> None:
         supervisor = self._activation.supervisor(self._component)
         before = 0 if supervisor is None else supervisor.failures
 

@@ -119,7 +119,7 @@ class Crashes(Generic[_Result]):
         self._store = store.path
 
         def boundary(what: Boundary) -> None:
-            happens = self._drawn(what, (KILLED,) if what == "before commit" else _AFTER_COMMIT)
+            happens = self._draw(what, (KILLED,) if what == "before commit" else _AFTER_COMMIT)
             if happens == KILLED:
                 self._leave_behind()
                 raise Killed
@@ -146,7 +146,7 @@ class Crashes(Generic[_Result]):
 
     async def reached(self, boundary: str) -> None:
         """Kill the program at this boundary, or let another program take over, if the draw decides so."""
-        happens = self._drawn(boundary, _REACHED)
+        happens = self._draw(boundary, _REACHED)
         if happens == OVERTAKEN:
             self._overtake()
         if happens == KILLED:
@@ -155,7 +155,7 @@ class Crashes(Generic[_Result]):
             loop.call_soon(_die)  # an exception in a task would surface only later
             await loop.create_future()
 
-    def _drawn(self, boundary: str, possible: tuple[str, ...]) -> str | None:
+    def _draw(self, boundary: str, possible: tuple[str, ...]) -> str | None:
         self._passed += 1
         where = f"{self.life} {self._passed}"
         if self._calm or self.life >= self._most or uniform(self._seed, where, "crash") >= self._chance:
@@ -187,18 +187,18 @@ class _Heir(Generic[_Result]):
         thread = threading.Thread(target=lambda: self._results.append(live(folder)), daemon=True)
         thread.start()
         thread.join()
-        self._left = _told(store)
+        self._left = _list_changes(store)
 
     def result(self, problems: list[str]) -> _Result:
         """Return the second program's result; add a problem if the first program has written since."""
-        if _told(self._store) != self._left:
+        if _list_changes(self._store) != self._left:
             problems.append("an old sequencer has written to a run that another had taken over")
         if not self._results:
             raise StoreError("the run that was taken over has not come to its end")
         return self._results[0]
 
 
-def _told(store: Path) -> list[tuple[int, int]]:
+def _list_changes(store: Path) -> list[tuple[int, int]]:
     with archive(store) as runs:
         return [(run.number, sum(1 for _ in runs.steps(run.number))) for run in runs.runs()]
 

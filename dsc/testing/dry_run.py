@@ -130,7 +130,7 @@ class DryRun:
         start = next((one for one in self.running if _skill(one) == skill), None)
         if start is None:
             raise UnknownNameError(f"no skill '{skill}' is running", found=skill, valid=map(_skill, self.running))
-        self._ended(start.action_id)
+        self._end(start.action_id)
         if observed:
             self.knowledge.apply(change_of(observed, self.knowledge, start.arguments), start.component)
         return self._send(Event(start.names.get(event, event), attributes or {}, to=start.activation))
@@ -165,7 +165,7 @@ class DryRun:
             self.now = due.at
             self._due.remove(due)
             if due.action_id is not None:
-                self._ended(due.action_id)
+                self._end(due.action_id)
             self._send(due.event)
         self.now = until
         return tuple(self.steps[before:])
@@ -205,7 +205,7 @@ class DryRun:
             case SetParameter() | SwitchMode() | SendMessage() | SetWire() | Note():
                 pass  # a dry run has no components
 
-    def _ended(self, action_id: str) -> None:
+    def _end(self, action_id: str) -> None:
         self.running = [start for start in self.running if start.action_id != action_id]
         self._due = [due for due in self._due if due.action_id != action_id]
 

@@ -281,11 +281,11 @@ class Interleaving:
 
         async def settle() -> None:
             await sequencer.clock.settled()
-            sequencer.rearrange(self._shuffled)
+            sequencer.rearrange(self._shuffle)
 
         sequencer.wait_before_events(settle)
 
-    def _shuffled(self, waiting: Iterable[Message]) -> Iterable[Message]:
+    def _shuffle(self, waiting: Iterable[Message]) -> Iterable[Message]:
         """Choose a source by the seed and move its first message to the front; the other messages keep their order."""
         messages = list(waiting)
         sources = list(dict.fromkeys(map(_source, messages)))

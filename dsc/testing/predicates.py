@@ -78,11 +78,11 @@ def took(
     """
     _check(run, source, target, trigger=trigger, rule=rule)
     return any(
-        (source is None or _named(taken.source, source))
+        (source is None or _has_name(taken.source, source))
         and (trigger is None or taken.trigger == trigger)
-        and (target is None or _named(taken.target, target))
+        and (target is None or _has_name(taken.target, target))
         and (rule is None or taken.rule == rule)
-        for taken in _taken(run)
+        for taken in _list_taken(run)
     )
 
 
@@ -134,7 +134,7 @@ def chose(run: Run, state: str, plot: str | None) -> bool:
     """Return whether a dynamic state chose the plot; `None` means that no candidate fitted."""
     _check(run, state)
     return any(
-        _named(made.state, state) and made.decision.chosen == plot and not made.decision.satisfied
+        _has_name(made.state, state) and made.decision.chosen == plot and not made.decision.satisfied
         for step in _steps(run)
         for made in step.decisions
     )
@@ -162,7 +162,7 @@ def _microsteps(run: Run) -> Iterator[Microstep]:
     return (micro for step in _steps(run) for micro in step.microsteps)
 
 
-def _taken(run: Run) -> Iterator[Taken]:
+def _list_taken(run: Run) -> Iterator[Taken]:
     return (taken for micro in _microsteps(run) for taken in micro.taken)
 
 
@@ -170,7 +170,7 @@ def _outputs(run: Run) -> Iterator[Any]:
     return (output for step in _steps(run) for output in step.output)
 
 
-def _named(path: str | None, state: str) -> bool:
+def _has_name(path: str | None, state: str) -> bool:
     return path is not None and (path == state or path.endswith("/" + state))
 
 

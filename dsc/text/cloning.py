@@ -54,7 +54,7 @@ def cloned(plot: ActionPlot, library: Library, prefix: str, *, made: Library | N
         if other in known:
             require_substitute(library.plot(name), known.plot(other))
         else:
-            new.append(_renamed(library.plot(name), names, plans=apart))
+            new.append(_rename(library.plot(name), names, plans=apart))
     return tuple(new)
 
 
@@ -80,7 +80,7 @@ def _dependencies(plot: ActionPlot, library: Library, *, plans: bool) -> Iterabl
     return found.values()
 
 
-def _renamed(plot: ActionPlot, names: Mapping[str, str], *, plans: bool) -> ActionPlot:
+def _rename(plot: ActionPlot, names: Mapping[str, str], *, plans: bool) -> ActionPlot:
     form = plot.to_form()
     form["plot"] = names[plot.name]
     for path, name in plot.references():
@@ -199,7 +199,7 @@ def _text(original: ActionPlot, clone: ActionPlot, names: Mapping[str, str]) -> 
     """Return the original's text with the clones' names if it reads as the clone; else the clone's YAML."""
     place = original.place(("plot",))
     if place is not None and place.source:
-        text = _substituted(read_file(place.source), original, names)
+        text = _substitute(read_file(place.source), original, names)
         lost = [key for key in original.to_form() if key not in clone.to_form()]
         text = "".join(line for line in text.splitlines(keepends=True) if line.partition(":")[0] not in lost)
         with suppress(InputError):
@@ -208,10 +208,10 @@ def _text(original: ActionPlot, clone: ActionPlot, names: Mapping[str, str]) -> 
     return plot_to_yaml(clone)
 
 
-def _substituted(text: str, plot: ActionPlot, names: Mapping[str, str]) -> str:
+def _substitute(text: str, plot: ActionPlot, names: Mapping[str, str]) -> str:
     """Return the text with new names of plots, replaced from the end, so that earlier places stay valid."""
     lines = text.splitlines(keepends=True)
-    for line, column, path, old in sorted(_written(plot), key=lambda one: one[:2], reverse=True):
+    for line, column, path, old in sorted(_find_occurrences(plot), key=lambda one: one[:2], reverse=True):
         key = _KEY if isinstance(path[-1], str) else ""
         before, rest = lines[line - 1][: column - 1], lines[line - 1][column - 1 :]
         found = re.match(rf"""({key}["']?){re.escape(old)}(?![\w\-#.])""", rest)
@@ -220,7 +220,7 @@ def _substituted(text: str, plot: ActionPlot, names: Mapping[str, str]) -> str:
     return "".join(lines)
 
 
-def _written(plot: ActionPlot) -> Iterator[tuple[int, int, FormPath, str]]:
+def _find_occurrences(plot: ActionPlot) -> Iterator[tuple[int, int, FormPath, str]]:
     """Yield line, column, path and name of each occurrence of a plot's name in the text of `plot`."""
     for path, name in ((("plot",), plot.name), *plot.references()):
         place = plot.place(path)

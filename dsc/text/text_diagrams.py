@@ -127,13 +127,13 @@ def _safe(text: str) -> str:
 def require_targets(plot: ActionPlot) -> None:
     """Raise `UnknownNameError` if an initial state or target is not a state of the plot."""
     names = [name for name, _, _ in plot.walk()]
-    for target, path in _named(plot):
+    for target, path in _references(plot):
         if target not in names:
             place = plot.place(path)
             raise UnknownNameError(f"there is no state '{target}'", place=place, found=target, valid=names)
 
 
-def _named(plot: ActionPlot) -> Iterator[tuple[str, Path]]:
+def _references(plot: ActionPlot) -> Iterator[tuple[str, Path]]:
     """Yield name and path of each reference to a state in the plot."""
     yield initial_of(plot), ("initial",)
     for _, state, path in plot.walk():

@@ -95,7 +95,7 @@ def _fields(record: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-def _permitted(parameter: PlotParameter) -> str:
+def _list_permitted(parameter: PlotParameter) -> str:
     if parameter.among and parameter.type in {"text", "symbol"}:
         return f"Literal[{', '.join(map(repr, parameter.among))}]".replace("'", '"')
     return _annotation(parameter.type)
@@ -119,7 +119,7 @@ def _typed_dict(name: str, about: str, types: Mapping[str, str]) -> str:
 def _function(plot: ActionPlot) -> str:
     names = dict(_python_names(plot.parameters))
     returned = f"PlotCall[{_outputs_class(plot)}]" if plot.outputs else "PlotCall"
-    taken = [_taken(names[name], one) for name, one in plot.parameters.items()]
+    taken = [_parameter_text(names[name], one) for name, one in plot.parameters.items()]
     lines = [f"def {_python_name(plot.name)}({'*, ' if taken else ''}{', '.join(taken)}) -> {returned}:"]
     if len(lines[0]) > 88:  # the width of formatters
         lines = [f"def {_python_name(plot.name)}(", "    *,", *(f"    {one}," for one in taken), f") -> {returned}:"]
@@ -128,8 +128,8 @@ def _function(plot: ActionPlot) -> str:
     return "\n".join([*lines, f'    return {returned}("{plot.name}", {{{given}}})'])
 
 
-def _taken(name: str, parameter: PlotParameter) -> str:
-    annotation = _permitted(parameter)
+def _parameter_text(name: str, parameter: PlotParameter) -> str:
+    annotation = _list_permitted(parameter)
     if parameter.required:
         return f"{name}: {annotation}"
     return f"{name}: {annotation.removesuffix(' | None')} | None = None"

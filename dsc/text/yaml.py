@@ -152,7 +152,7 @@ def dump(data: Mapping[str, Any]) -> str:
     yaml.default_flow_style = None
     yaml.width = 110
     yaml.indent(mapping=2, sequence=4, offset=2)
-    yaml.dump(_quoted(dict(data)), stream)
+    yaml.dump(_quote(dict(data)), stream)
     return stream.getvalue()
 
 
@@ -162,7 +162,7 @@ def inline(data: Any) -> str:
     yaml = YAML()
     yaml.default_flow_style = True
     yaml.width = sys.maxsize
-    yaml.dump({"": _quoted(data)}, stream)
+    yaml.dump({"": _quote(data)}, stream)
     return stream.getvalue().strip().removeprefix("{'': ").removesuffix("}")
 
 
@@ -312,12 +312,12 @@ def _plain(text: str) -> Any:
     return int(text) if match["int"] else float(text)
 
 
-def _quoted(data: Any) -> Any:
+def _quote(data: Any) -> Any:
     """Return the data with double quotes around each text that YAML would otherwise read as another type."""
     if isinstance(data, Mapping):
-        return {_quoted(key): _quoted(value) for key, value in data.items()}
+        return {_quote(key): _quote(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
-        return [_quoted(one) for one in data]
+        return [_quote(one) for one in data]
     # YAML reads ':0' as a mapping, and single quotes fold line breaks.
     if isinstance(data, str) and (_plain(data) != data or not data.isprintable() or data.startswith(":")):
         return DoubleQuotedScalarString(data)

@@ -30,16 +30,16 @@ def check_parameters(subject: Subject) -> Iterator[Finding]:
         yield from _own(subject, name, parameter)
     for name, state, path in subject.states:
         if isinstance(state, Step) and state.arguments:
-            yield from _handed(subject, subject.contents(name), state.arguments, "plots", (*path, "with"))
+            yield from _check_handed(subject, subject.contents(name), state.arguments, "plots", (*path, "with"))
         for here, _, way in subject.leaving(path):
             if way.passed:
-                yield from _handed(subject, subject.contents(way.target), way.passed, "plots", (*here, "pass"))
+                yield from _check_handed(subject, subject.contents(way.target), way.passed, "plots", (*here, "pass"))
     for path, do in subject.reactions():
         if do.use is not None:
-            yield from _handed(subject, [library.plot(do.use)], do.arguments, "rules", (*path, "with"))
+            yield from _check_handed(subject, [library.plot(do.use)], do.arguments, "rules", (*path, "with"))
     for number, rule in enumerate(plot.rules):
         entered = entered_by(rule, plot, library) if rule.do.passed else ()
-        yield from _handed(subject, entered, rule.do.passed, "rules", ("rules", number, "do", "pass"))
+        yield from _check_handed(subject, entered, rule.do.passed, "rules", ("rules", number, "do", "pass"))
 
 
 def _own(subject: Subject, name: str, parameter: PlotParameter) -> Iterator[Finding]:
@@ -55,7 +55,7 @@ def _own(subject: Subject, name: str, parameter: PlotParameter) -> Iterator[Find
         yield from _fits(subject, f"{subject.plot.name}.{name}", parameter, parameter.default, (*here, "default"))
 
 
-def _handed(
+def _check_handed(
     subject: Subject, used: Iterable[ActionPlot], arguments: Mapping[str, Term], who: Who, path: Path
 ) -> Iterator[Finding]:
     for plot in used:
@@ -116,19 +116,19 @@ def check_arguments(subject: Subject) -> Iterator[Finding]:
     entrances = _Entrances(subject)
     for name, state, path in subject.states:
         if isinstance(state, Step):
-            yield from _known(subject, state, state.arguments, (*path, "with"))
+            yield from _check_known(subject, state, state.arguments, (*path, "with"))
             for used in subject.contents(name):
-                for parameter in _needed(used):
+                for parameter in _find_needed(used):
                     if parameter not in state.arguments:
-                        yield from _given(subject, name, path, _Need(used.name, parameter), entrances)
+                        yield from _check_given(subject, name, path, _Need(used.name, parameter), entrances)
         for here, _, transition in subject.leaving(path):
             if transition.passed:
-                yield from _passed(subject, transition, (*here, "pass"))
+                yield from _check_passed(subject, transition, (*here, "pass"))
     for path, do in subject.reactions():
         if do.use is not None:
             used, here = subject.library.plot(do.use), (*path, "with")
             yield from _unknown(subject, used, do.arguments, here)
-            missing = (name for name in _needed(used) if name not in do.arguments)
+            missing = (name for name in _find_needed(used) if name not in do.arguments)
             yield from (_missing(subject, _Need(used.name, name), here) for name in missing)
     for number, rule in enumerate(subject.plot.rules):
         if rule.do.passed:
@@ -148,10 +148,10 @@ def _passed_by_rule(subject: Subject, rule: Rule, path: Path) -> Iterator[Findin
     yield from _untaken(subject, used, rule.do.passed, path, "known-parameter", message)
 
 
-def _passed(subject: Subject, transition: Transition, path: Path) -> Iterator[Finding]:
+def _check_passed(subject: Subject, transition: Transition, path: Path) -> Iterator[Finding]:
     target = None if transition.target is None else subject.state(transition.target)
     if isinstance(target, Step):
-        yield from _known(subject, target, transition.passed, path)
+        yield from _check_known(subject, target, transition.passed, path)
         return
     where = "nowhere" if transition.target is None else f"to '{transition.target}', which holds no plot"
     message, fix = (
@@ -161,7 +161,7 @@ def _passed(subject: Subject, transition: Transition, path: Path) -> Iterator[Fi
     yield subject.finding(path, "arguments-are-taken", message, fix)
 
 
-def _known(subject: Subject, state: Step, given: Iterable[str], path: Path) -> Iterator[Finding]:
+def _check_known(subject: Subject, state: Step, given: Iterable[str], path: Path) -> Iterator[Finding]:
     contents = contents_of(state, subject.library)
     if isinstance(state, SubmachineState):
         for used in contents:
@@ -196,7 +196,7 @@ class _Need:
     parameter: str
 
 
-def _needed(plot: ActionPlot) -> Iterator[str]:
+def _find_needed(plot: ActionPlot) -> Iterator[str]:
     return (name for name, parameter in plot.parameters.items() if parameter.required)
 
 
@@ -236,7 +236,7 @@ class _Entrances:
         return {path[:-2] for _, state, path in self._subject.states if isinstance(state, HistoryState)}
 
 
-def _given(subject: Subject, name: str, path: Path, need: _Need, entrances: _Entrances) -> Iterator[Finding]:
+def _check_given(subject: Subject, name: str, path: Path, need: _Need, entrances: _Entrances) -> Iterator[Finding]:
     """Yield a finding for each entry into a state that does not pass the required parameter in `need`."""
     leading, key = entrances.ways.get(name, []), need.parameter
     silent = [(way, written) for way, written in leading if way.target != name or key not in way.passed]

@@ -155,10 +155,10 @@ def _leave_a_gap(conditions: Conditions) -> bool:
 
 def _by_name(conditions: Iterable[Expression]) -> bool:
     """Return whether each condition compares one variable with a name, e.g. `(= ?arm left)`, which leaves no gap."""
-    return bool(set.intersection(*(set(_named(conjuncts(one))) for one in conditions)))
+    return bool(set.intersection(*(set(_find_named(conjuncts(one))) for one in conditions)))
 
 
-def _named(parts: Iterable[Expression]) -> Iterator[Term]:
+def _find_named(parts: Iterable[Expression]) -> Iterator[Term]:
     """Yield each variable that a part equates with a name."""
     for part in parts:
         match part:

@@ -139,7 +139,7 @@ class _Data:
         if state.at_least is not None:
             yield from self._term(state.at_least, None, (*path, "at_least"), "number")
         if isinstance(state, Step):
-            yield from self._given(state.arguments, None, (*path, "with"), contents_of(state, self._library))
+            yield from self._check_given(state.arguments, None, (*path, "with"), contents_of(state, self._library))
         if isinstance(state, DynamicState):
             if state.goal is not None:
                 yield from self._condition(state.goal, self._own, (*path, "goal"), planned=True)
@@ -175,7 +175,7 @@ class _Data:
             yield from self._bindings(transition, scope, path)
         if transition.passed:
             contents = self._subject.contents(transition.target)
-            yield from self._given(transition.passed, scope, (*path, "pass"), contents)
+            yield from self._check_given(transition.passed, scope, (*path, "pass"), contents)
         yield from self._actions(transition.effect, scope, path)
 
     def _bindings(self, transition: Transition, scope: Types | None, path: Path) -> Iterator[Finding]:
@@ -297,9 +297,9 @@ class _Data:
         yield from self._reaction(rule.do, scope, (*path, "do"))
         if rule.do.passed:
             entered = entered_by(rule, self._plot, self._library)
-            yield from self._given(rule.do.passed, scope, (*path, "do", "pass"), entered)
+            yield from self._check_given(rule.do.passed, scope, (*path, "do", "pass"), entered)
         if rule.on is not None and any(one.then == CONTINUE for one in rule.continuations):
-            yield from self._continued(rule, {**self._own, **scope}, (*path, "do", "then"))
+            yield from self._check_continued(rule, {**self._own, **scope}, (*path, "do", "then"))
 
     def _handler(self, handler: Handler, path: Path) -> Iterator[Finding]:
         yield from self._rules.check(handler, path)
@@ -315,11 +315,11 @@ class _Data:
         if do.tell is not None:
             yield from self._effect(do.tell, scope, (*path, "tell"))
         contents = [] if do.use is None else [self._library.plot(do.use)]
-        yield from self._given(do.arguments, scope, (*path, "with"), contents)
+        yield from self._check_given(do.arguments, scope, (*path, "with"), contents)
         for position, command in enumerate(do.command):
             yield from self._terms(terms_of(command), scope, (*path, "command", position))
 
-    def _continued(self, rule: Rule, scope: Types, path: Path) -> Iterator[Finding]:
+    def _check_continued(self, rule: Rule, scope: Types, path: Path) -> Iterator[Finding]:
         """Yield findings about a `continue` response whose event lacks outputs that transitions on `done` read."""
         for name, state, outcomes in self._returning:
             if rule.on in outcomes and concerns(rule, name, state, self._library):
@@ -343,7 +343,7 @@ class _Data:
     def _effect(self, effect: Effect, scope: Types | None, path: Path) -> Iterator[Finding]:
         yield from self._language.effect(effect, self._scope(scope, effect), path)
 
-    def _given(
+    def _check_given(
         self, terms: Mapping[str, Term], scope: Types | None, path: Path, used: Iterable[ActionPlot]
     ) -> Iterator[Finding]:
         """Yield findings about the arguments for a plot, or for several candidates."""

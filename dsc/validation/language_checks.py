@@ -74,7 +74,7 @@ class LanguageChecker:
         if read is None:
             return
         plain, names = read
-        yield from self._compared(plain, names, path)
+        yield from self._check_comparisons(plain, names, path)
 
         def require(schema: Schema, known: Types) -> None:
             check(plain, schema, known)
@@ -90,7 +90,7 @@ class LanguageChecker:
             return
         with suppress(InputError):
             plain = plain_condition(condition, TypeReader(names, self._subject.records))
-            check(plain, schema, self._known(names, schema))
+            check(plain, schema, self._mask_unknown(names, schema))
             try:
                 check_answers(schema.expanded(plain), frozenset(names) - frozenset(wanted), schema)
             except InputError as error:
@@ -167,14 +167,14 @@ class LanguageChecker:
                 yield self._subject.caught(unbound_error(name, None, names), path, rule)
             return
         try:
-            require(self._schema, self._known(names, self._schema))
+            require(self._schema, self._mask_unknown(names, self._schema))
         except InputError as error:
             yield self._subject.caught(error, path, rule)
             return
         for mistake in () if self._objects is None else self._objects.mistakes(form, names):
             yield self._known_object(mistake, path)
 
-    def _compared(self, condition: Expression, names: Types, path: Path) -> Iterator[Finding]:
+    def _check_comparisons(self, condition: Expression, names: Types, path: Path) -> Iterator[Finding]:
         """Yield findings about comparisons with choices and other words, whose types conditions do not know."""
         if isinstance(condition, Comparison):
             for term, other in ((condition.left, condition.right), (condition.right, condition.left)):
@@ -188,7 +188,7 @@ class LanguageChecker:
                     yield self._subject.finding(path, "condition", message)
         for part in parts_of(condition):
             if isinstance(part, Expression):
-                yield from self._compared(part, names, path)
+                yield from self._check_comparisons(part, names, path)
 
     def _impossible_values(self, term: Term, kind: DataType, other: Term, path: Path) -> Iterator[Finding]:
         """Yield a finding about a choice that is compared with a value that it never has."""
@@ -199,6 +199,6 @@ class LanguageChecker:
             yield self._subject.finding(path, "condition", message, found=str(other.value), valid=valid)
 
     @staticmethod
-    def _known(names: Types, schema: Schema) -> Mapping[str, str | None]:
+    def _mask_unknown(names: Types, schema: Schema) -> Mapping[str, str | None]:
         """Return the scope with `None` for each type that conditions do not know."""
         return {name: kind and language_type(kind, schema) for name, kind in names.items()}

@@ -83,10 +83,10 @@ def check_reach(subject: Subject) -> Iterator[Finding]:
             fix = "name candidates, or a `goal`"
             yield subject.finding((*path, "dynamic"), "something-to-choose", message, fix)
     if subject.strict and not subject.plot.generated:
-        yield from _unreached(subject)
+        yield from _find_unreached(subject)
 
 
-def _unreached(subject: Subject) -> Iterator[Finding]:
+def _find_unreached(subject: Subject) -> Iterator[Finding]:
     try:
         expanded = subject.library.expanded(subject.plot)
     except InputError:  # another check reports rules that cannot be applied
@@ -133,7 +133,7 @@ def _unreached_in(scope: Scope, around: Path, ways: Subject, responses: set[str]
 
 def _circle(subject: Subject) -> Iterator[Finding]:
     """Yield a finding about the first cycle of plots that this plot reaches through submachine states."""
-    own, used = subject.plot.name, _used(subject.states)
+    own, used = subject.plot.name, _find_uses(subject.states)
     for name, path in used.items():
         circle = circle_of({**_uses(name, subject.library), own: used})
         if circle:
@@ -151,12 +151,12 @@ def _uses(name: str, library: Library) -> dict[str, Iterable[str]]:
     while waiting:
         one = waiting.pop()
         if one not in found and one in library:
-            found[one] = _used(library.plot(one).walk())
+            found[one] = _find_uses(library.plot(one).walk())
             waiting += found[one]
     return found
 
 
-def _used(states: Iterable[tuple[str, AnyState, Path]]) -> dict[str, Path]:
+def _find_uses(states: Iterable[tuple[str, AnyState, Path]]) -> dict[str, Path]:
     """Return the path of the first submachine state that uses a plot, by the name of this plot."""
     found: dict[str, Path] = {}
     for _, state, path in states:

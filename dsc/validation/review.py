@@ -62,10 +62,10 @@ def _rules(subject: Subject) -> Iterator[Finding]:
     for number, rule in enumerate(subject.plot.rules):
         earlier = [one for one in subject.plot.rules[:number] if _comes_before(one, rule)]
         why = _never(rule.when, [one.when for one in earlier])
-        if why is None and rule.on is not None and not subject.planned and _settled(subject, rule, rule.on):
+        if why is None and rule.on is not None and not subject.planned and _is_settled(subject, rule, rule.on):
             why = f"every state that can end with '{rule.on}' answers it itself"
         if why is not None:
-            message = f"the rule '{rule.label}' can never answer: {why}{_listed(earlier)}"
+            message = f"the rule '{rule.label}' can never answer: {why}{_list(earlier)}"
             yield subject.finding(("rules", number), "rules", message, _REMEDY, level="warning")
 
 
@@ -78,7 +78,7 @@ def _handlers(subject: Subject) -> Iterator[Finding]:
         if why is None and handler.interrupt and handler.listen is None and _all_answer(handler.on, subject):
             why = f"every state answers '{handler.on}' itself"
         if why is not None:
-            message = f"the '{handler.label}' can never answer: {why}{_listed(earlier)}"
+            message = f"the '{handler.label}' can never answer: {why}{_list(earlier)}"
             yield subject.finding(("handlers", number), "handlers", message, _REMEDY, level="warning")
         if handler.do.use is not None:
             for event, used in _events_without_rule(subject, handler.do.use):
@@ -128,7 +128,7 @@ def _all_answer(event: str, subject: Subject) -> bool:
     return all(any(not way.has_guard for way in state.on.get(event, ())) for state in own)
 
 
-def _listed(earlier: Sequence[Rule] | Sequence[Handler]) -> str:
+def _list(earlier: Sequence[Rule] | Sequence[Handler]) -> str:
     return "; before it: " + ", ".join(f"'{one.label}'" for one in earlier) if earlier else ""
 
 
@@ -142,7 +142,7 @@ def _comes_before(earlier: Rule, later: Rule) -> bool:
     return limit_of(earlier) is None and not continues
 
 
-def _settled(subject: Subject, rule: Rule, event: str) -> bool:
+def _is_settled(subject: Subject, rule: Rule, event: str) -> bool:
     """Return whether the transitions of a rule's states always handle the rule's event."""
     mine = [state for name, state, _ in subject.steps if concerns(rule, name, state, subject.library)]
     able = [state for state in mine if event in answerable(state, subject.library)]

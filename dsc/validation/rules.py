@@ -199,11 +199,11 @@ class RuleScope:
 
     def _arguments(self, rule: Rule) -> Types:
         """Return the types of the arguments that all steps of a rule have in common."""
-        given = list(self._given(rule)) if rule.steps else []
+        given = list(self._find_given(rule)) if rule.steps else []
         common = [name for name in given[0] if all(name in one for one in given)] if given else []
         return {STEP + name: _common(name, given) for name in common}
 
-    def _given(self, rule: Rule) -> Iterator[Types]:
+    def _find_given(self, rule: Rule) -> Iterator[Types]:
         for name, state, _ in self._subject.steps:
             if concerns(rule, name, state, self._library):
                 contents = contents_of(state, self._library)

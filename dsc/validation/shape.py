@@ -150,10 +150,12 @@ def _histories(subject: Subject) -> Iterator[Finding]:
             yield subject.finding((*path, "to"), "target", message, found=state.target, valid=valid)
         for here, _, transition in () if subject.strict else subject.leaving(path):
             for number, written in enumerate(transition.clear):
-                yield from _cleared(subject, written, remembering, (*here, "clear", number))
+                yield from _check_clear(subject, written, remembering, (*here, "clear", number))
 
 
-def _cleared(subject: Subject, written: str, remembering: Mapping[bool, set[Path]], path: Path) -> Iterator[Finding]:
+def _check_clear(
+    subject: Subject, written: str, remembering: Mapping[bool, set[Path]], path: Path
+) -> Iterator[Finding]:
     """Yield a finding if `clear` refers to a state without history: directly inside, or with `*` at any level."""
     name = written.removesuffix("*")
     holders = {name: at for name, state, at in subject.states if isinstance(state, CompositeState | OrthogonalState)}

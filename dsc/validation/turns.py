@@ -34,7 +34,7 @@ def waiting_parts(subject: Subject, exclusive: Collection[str]) -> Iterator[Find
 def _regions(
     subject: Subject, name: str, state: OrthogonalState, path: tuple[str | int, ...], exclusive: Collection[str]
 ) -> Iterator[Finding]:
-    used = {key: _used(region.states.values(), subject.library, exclusive) for key, region in state.regions.items()}
+    used = {key: _uses(region.states.values(), subject.library, exclusive) for key, region in state.regions.items()}
     for one, other in combinations(used, 2):
         for component in sorted(used[one] & used[other]):
             message = (
@@ -52,10 +52,10 @@ def _handlers(subject: Subject, exclusive: Collection[str]) -> Iterator[Finding]
     ]
     if not beside:
         return
-    own = _used(subject.plot.states.values(), subject.library, exclusive)
+    own = _uses(subject.plot.states.values(), subject.library, exclusive)
     for number, handler in beside:
         used = [plot.states.values() for plot in subject.library if plot.name == handler.do.use]
-        for component in sorted(own & _used(chain.from_iterable(used), subject.library, exclusive)):
+        for component in sorted(own & _uses(chain.from_iterable(used), subject.library, exclusive)):
             message = (
                 f"the '{handler.label}' waits for its plot at component '{component}',"
                 " which executes one skill at a time"
@@ -64,7 +64,7 @@ def _handlers(subject: Subject, exclusive: Collection[str]) -> Iterator[Finding]
             yield subject.finding(("handlers", number), "turns", message, fix, level="warning")
 
 
-def _used(states: Iterable[AnyState], library: Library, exclusive: Collection[str]) -> set[str]:
+def _uses(states: Iterable[AnyState], library: Library, exclusive: Collection[str]) -> set[str]:
     """Return the components whose skills these states and their contents start, without states with a priority."""
     found, seen = set[str](), set[str]()
     waiting = [*_inside(states)]

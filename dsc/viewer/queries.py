@@ -108,11 +108,11 @@ def knowledge(log: RecordLog) -> RecordReplay[Known]:
     """Return the replay of the knowledge."""
     begin = Known(WorldState(Schema()), 0, RecordedRun())
     return RecordReplay(
-        log, TYPES | {"knowledge"}, begin, lambda k: Known(k.state.copy(), k.version, k.run.copy()), _known
+        log, TYPES | {"knowledge"}, begin, lambda k: Known(k.state.copy(), k.version, k.run.copy()), _find_known
     )
 
 
-def _known(before: Known, record: Mapping[str, Any]) -> Known:
+def _find_known(before: Known, record: Mapping[str, Any]) -> Known:
     data = dict(record)
     if record["type"] in TYPES:
         before.run.take(record)
@@ -183,8 +183,8 @@ class PageQueries:
         result = {
             "version": view.version,
             "things": dict(islice(things.items(), MOST_ANSWERS)),
-            "facts": [_listed(fact) for fact in facts[:MOST_ANSWERS]],
-            "values": [[*_listed(fluent), value] for fluent, value in islice(values.items(), MOST_ANSWERS)],
+            "facts": [_list(fact) for fact in facts[:MOST_ANSWERS]],
+            "values": [[*_list(fluent), value] for fluent, value in islice(values.items(), MOST_ANSWERS)],
         }
         return {**result, "more": True} if max(map(len, (things, facts, values))) > MOST_ANSWERS else result
 
@@ -201,7 +201,7 @@ def _why(view: View, condition: Expression, params: Mapping[str, Any], left: Lef
         return Explanation(to_text(condition), holds, detail=str(error)).to_json()
 
 
-def _listed(fact: Fact) -> list[Any]:
+def _list(fact: Fact) -> list[Any]:
     return [fact.predicate, *fact.args]
 
 

@@ -150,7 +150,7 @@ def read_trace(path: Path) -> RecordLog:
     first = next(lines, "")
     _require_header(first, path)
     complaints: list[str] = []
-    return RecordLog(first, _numbered(lines, path, complaints), complaints=complaints)
+    return RecordLog(first, _number_lines(lines, path, complaints), complaints=complaints)
 
 
 def damaged(seq: int, t: float, line: int, why: str, text: str) -> str:
@@ -159,7 +159,7 @@ def damaged(seq: int, t: float, line: int, why: str, text: str) -> str:
     return json.dumps({"seq": seq, "t": t, "type": DAMAGED, "cause": None, **data})
 
 
-def _numbered(lines: Iterable[str], path: Path, complaints: list[str]) -> Iterator[str]:
+def _number_lines(lines: Iterable[str], path: Path, complaints: list[str]) -> Iterator[str]:
     """Yield the lines of records without a gap; records of type `damaged` replace lost ones."""
     last, before, lost = 0, "", list[tuple[int, str]]()
 
@@ -194,7 +194,7 @@ def _seq_of(line: str, expected: int) -> int | None:
     if line.endswith("}") and (line.isascii() or not _NO_CHARACTER.search(line)):
         if line.startswith(f'{{"seq": {expected}, '):
             return expected
-        seq = parsed.get("seq") if isinstance(parsed := _parsed(line), dict) else None
+        seq = parsed.get("seq") if isinstance(parsed := _parse(line), dict) else None
         return seq if isinstance(seq, int) and not isinstance(seq, bool) else None
     return None
 
@@ -202,7 +202,7 @@ def _seq_of(line: str, expected: int) -> int | None:
 def _why_unreadable(line: str) -> str:
     if _NO_CHARACTER.search(line):
         return "it has bytes that are no UTF-8"
-    parsed = _parsed(line)
+    parsed = _parse(line)
     if isinstance(parsed, str):
         return f"it ends in the middle ({parsed})" if not line.endswith("}") else f"it is no JSON ({parsed})"
     return (
@@ -212,7 +212,7 @@ def _why_unreadable(line: str) -> str:
     )
 
 
-def _parsed(line: str) -> Any:
+def _parse(line: str) -> Any:
     """Return the object in the line, or the reason if the line is not JSON; `None` for other JSON."""
     try:
         parsed = from_json(line)
@@ -222,7 +222,7 @@ def _parsed(line: str) -> Any:
 
 
 def _require_header(line: str, path: Path) -> None:
-    parsed, begins = _parsed(line), f'{{"format": "{FORMAT}", …}}'
+    parsed, begins = _parse(line), f'{{"format": "{FORMAT}", …}}'
     place = Place(str(path), 1)
     if not line.strip():
         raise ParseError(f"the file is empty, or its first line is; a trace begins with {begins}", place=place)

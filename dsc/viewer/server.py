@@ -67,7 +67,7 @@ class Viewer:
         self.port, self.token = entrance.port, entrance.token
         self._keys = Keys(entrance.token, entrance.code)
         self._answers = PageQueries(log)
-        self._calm = Calm(self._routed())
+        self._calm = Calm(self._route())
         self._rounds = Broadcast(log, self._status)
         config = uvicorn.Config(
             self.application(),
@@ -87,15 +87,15 @@ class Viewer:
         """Return the application, which the access check protects."""
         return Access(self._calm, self._keys, self.port)
 
-    def _routed(self) -> ASGIApp:
+    def _route(self) -> ASGIApp:
         control = self._control
-        controlled = self._forbidden if control is None else self._asked(lambda said, _: control.obey(said), CONTROL)
+        controlled = self._forbidden if control is None else self._answer(lambda said, _: control.obey(said), CONTROL)
         routes = [
             Route("/", self._page),
             Route("/record/{seq:str}", self._record),
             Route("/data/{name:str}", self._datum),
-            Route("/query", self._asked(self._answers.query, QUERY), methods=["POST"]),
-            Route("/facts", self._asked(self._answers.facts, FACTS), methods=["POST"]),
+            Route("/query", self._answer(self._answers.query, QUERY), methods=["POST"]),
+            Route("/facts", self._answer(self._answers.facts, FACTS), methods=["POST"]),
             Route("/control", controlled, methods=["POST"]),
             WebSocketRoute("/socket", self._stream),
             Mount("/", StaticFiles(directory=STATIC, check_dir=False)),
@@ -119,14 +119,14 @@ class Viewer:
             self._thread.join(timeout=5)
         self._socket.close()
 
-    def _failed(self, _: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
+    def _answer_failure(self, _: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
         self._calm.complain(context.get("exception"))
 
     def _serve(self) -> None:
         asyncio.run(self._serve_quietly())
 
     async def _serve_quietly(self) -> None:
-        asyncio.get_running_loop().set_exception_handler(self._failed)
+        asyncio.get_running_loop().set_exception_handler(self._answer_failure)
         await self._server.serve(sockets=[self._socket])
 
     async def _page(self, _: Request) -> Response:
@@ -150,7 +150,7 @@ class Viewer:
             return PlainTextResponse("no such data; --data FOLDER names their folder", status_code=404)
         return FileResponse(self._data / name)
 
-    def _asked(self, answer: Callable[[Mapping[str, Any], Left], Any], form: Fields) -> Callable[[Request], Any]:
+    def _answer(self, answer: Callable[[Mapping[str, Any], Left], Any], form: Fields) -> Callable[[Request], Any]:
         async def answering(request: Request) -> Response:
             try:
                 said = asked(await _body(request), form)

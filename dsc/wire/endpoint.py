@@ -253,11 +253,11 @@ class Endpoint:
             self.dropped["no frame"] += 1
         elif said["what"] in _TO_CALLER:
             if said["life"] == self.life:
-                self._answered(said)
+                self._answer(said)
         elif (peer := self._peer(sender, said["life"])) is None:
             self.dropped["too many peers"] += 1
         elif said["what"] == "call":
-            self._called(sender, peer, said)
+            self._call(sender, peer, said)
         else:
             self._received(sender, peer, said)
 
@@ -291,7 +291,7 @@ class Endpoint:
             except Exception:  # noqa: BLE001  # a faulty push must not stop other pushes
                 self.dropped[f"push '{kind}' that cannot be read"] += 1
 
-    def _answered(self, said: Mapping[str, Any]) -> None:
+    def _answer(self, said: Mapping[str, Any]) -> None:
         call = self._asked.get(said["n"])
         if call is None or call.answer.done():
             return
@@ -305,7 +305,7 @@ class Endpoint:
         else:
             waiting.set_exception(RefusedError(text_of(said["body"], str)))
 
-    def _called(self, sender: str, peer: _Peer, said: Mapping[str, Any]) -> None:
+    def _call(self, sender: str, peer: _Peer, said: Mapping[str, Any]) -> None:
         number = said["n"]
         if said["low"] > peer.forgotten:
             peer.forgotten = said["low"]

@@ -48,7 +48,7 @@ class Heartbeat:
         self._watches: dict[str, Callable[[], None]] = {}  # by activator, how to end its watch
         self._stirred = asyncio.Event()
         self.active = False
-        endpoint.receive("heartbeat", self._received)
+        endpoint.receive("heartbeat", self._receive)
 
     @property
     def activators(self) -> frozenset[str]:
@@ -94,9 +94,9 @@ class Heartbeat:
 
     def need(self, sender: str) -> None:
         """Add an active component that needs this one, without waiting for its heartbeat."""
-        self._received(sender, {"needs": [self._endpoint.address]})
+        self._receive(sender, {"needs": [self._endpoint.address]})
 
-    def _received(self, sender: str, said: Any) -> None:
+    def _receive(self, sender: str, said: Any) -> None:
         if self._endpoint.address not in said["needs"]:
             self._remove(sender)
             return

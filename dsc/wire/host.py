@@ -76,15 +76,15 @@ class Host:
         self._answer("take", "take", lambda said: component.receive(said["port"], said["message"]))
         self._answer("diagnose", "diagnose", lambda _: component.diagnose())
         self._is_active = asyncio.Event()
-        self._heart = Heartbeat(self.endpoint, self._needed, self._activated, busy=self._actions.is_any_active)
+        self._heart = Heartbeat(self.endpoint, self._find_needs, self._activate, busy=self._actions.is_any_active)
         loop = asyncio.get_running_loop()
         self._claims = Endpoint(f"host of {component.name} {self.endpoint.life}", transport)
         self._claims.receive("host", self._note_host)
         self._tasks = [loop.create_task(self._heart.run()), loop.create_task(self._claim())]
-        self._changed()
-        component.life.listen(self._changed)
+        self._publish_change()
+        component.life.listen(self._publish_change)
         for port in component.requirements.values():
-            port.redirections.listen(self._changed)
+            port.redirections.listen(self._publish_change)
 
     def _answer(self, kind: str, hook: str, call: Callable[[Any], Awaitable[Any]]) -> None:
         """Answer calls of that kind with the result of a hook."""
@@ -99,9 +99,9 @@ class Host:
 
     async def close(self) -> None:
         """Stop all services without a message, then the component; clients treat the component as failed."""
-        self._component.life.leave(self._changed)
+        self._component.life.leave(self._publish_change)
         for port in self._component.requirements.values():
-            port.redirections.leave(self._changed)
+            port.redirections.leave(self._publish_change)
         await self._claims.close()
         await self.endpoint.close()
         await self._actions.close()
@@ -129,9 +129,9 @@ class Host:
             self._actions.cancel()
             self._tasks.append(asyncio.get_running_loop().create_task(self.endpoint.close()))
 
-    def _changed(self) -> None:
+    def _publish_change(self) -> None:
         life = self._component.life
-        needs = list(self._needed())  # may change the life
+        needs = list(self._find_needs())  # may change the life
         said = {"life": life.state, "reason": life.reason, "bug": life.bug is not None, "mode": life.mode}
         said["program"] = self.endpoint.life
         self._condition.put({**said, "needs": needs})
@@ -139,7 +139,7 @@ class Host:
         if life.state is not Life.ALIVE:
             self._actions.cancel()
 
-    def _needed(self) -> tuple[str, ...]:
+    def _find_needs(self) -> tuple[str, ...]:
         """Return the needs of the component; its error leads to FatalError, and counts as no needs."""
         component = self._component
         if component.life.bug is not None:
@@ -187,7 +187,7 @@ class Host:
         await self._is_active.wait()
         return self._condition.newest
 
-    async def _activated(self, active: bool) -> None:  # noqa: FBT001
+    async def _activate(self, active: bool) -> None:  # noqa: FBT001
         life = self._component.life
         if active:
             await life.come_alive()

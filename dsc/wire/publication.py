@@ -112,7 +112,7 @@ class Subscription:
         self._port = port
         self._numbers: dict[str, int] = {}  # the newest number of each instance of the publisher, the present one last
         self._at = -math.inf
-        endpoint.receive(_kind(publisher, port), self._pushed)
+        endpoint.receive(_kind(publisher, port), self._push)
 
     @property
     def age(self) -> float:
@@ -141,7 +141,7 @@ class Subscription:
         """Return to the age before the first message, since the publisher is gone; the value stays known."""
         self._at = -math.inf
 
-    def _pushed(self, sender: str, newest: Any) -> None:
+    def _push(self, sender: str, newest: Any) -> None:
         if sender == self._publisher:
             self.take(newest)
 

@@ -57,7 +57,7 @@ class RemoteComponent(Component):
         self._endpoint = endpoint
         self._skills = skills
         self._run = endpoint.life
-        self._condition = Subscription(endpoint, name, CONDITION, self._changed)
+        self._condition = Subscription(endpoint, name, CONDITION, self._receive_change)
         self._heart = Heartbeat(endpoint, lambda: [name], _ignore, root=True)
         self._domain: str | None = None
         self._plots: tuple[ActionPlot, ...] = ()
@@ -263,7 +263,7 @@ class RemoteComponent(Component):
             async with asyncio.timeout(seconds):
                 await self._presence_changed.wait()
 
-    def _changed(self, condition: Any, _: float) -> None:
+    def _receive_change(self, condition: Any, _: float) -> None:
         match condition:
             case {
                 "life": str(life), "reason": str(), "bug": bool(), "mode": str(mode), "needs": [*needs],
@@ -395,20 +395,20 @@ class RemoteComponent(Component):
             NoAnswerError: the host does not answer.
             RefusedError: the component refuses the value.
         """
-        with self._reverted():
+        with self._revert_on_error():
             self.parameter_values.set(parameter, value)
             await self._ask("set", {"parameter": parameter, "value": value})
 
     async def configure_all(self, values: Mapping[str, Any]) -> None:
         """Set parameters at the host as one set; raise as `configure`."""
-        with self._reverted():
+        with self._revert_on_error():
             with self.parameter_values.as_one_set(values):
                 for parameter, value in values.items():
                     self.parameter_values.set(parameter, value)
             await self._ask("set all", dict(values))
 
     @contextmanager
-    def _reverted(self) -> Iterator[None]:
+    def _revert_on_error(self) -> Iterator[None]:
         """Return a context manager that restores the values of the parameters after an error."""
         before = dict(self.parameters)
         try:

@@ -33,7 +33,7 @@ def arrange(nodes: Sequence[LayerNode], links: Sequence[LayerLink], *, sideways:
     """
     if sideways:
         turned = [replace(node, width=node.height, height=node.width) for node in nodes]
-        return _turned(arrange(turned, [replace(k, width=k.height, height=k.width) for k in links]))
+        return _turn(arrange(turned, [replace(k, width=k.height, height=k.width) for k in links]))
     grid = build_grid(nodes, links)
     order_cells(grid)
     axes = place_cells(grid)
@@ -45,7 +45,7 @@ def arrange(nodes: Sequence[LayerNode], links: Sequence[LayerLink], *, sideways:
     return _Levels(nodes, grid, axes, ports).arrangement(links)
 
 
-def _turned(drawing: Arrangement) -> Arrangement:
+def _turn(drawing: Arrangement) -> Arrangement:
     def turn(point: Point) -> Point:
         return point[1], point[0]
 

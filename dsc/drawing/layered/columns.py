@@ -173,11 +173,11 @@ def _spread(axis: float, width: float, wanted: Sequence[float]) -> list[float]:
     ]
     places = fit(wishes, [gap] * (len(wanted) - 1))
     tight = min(TIGHT, gap)
-    places = [-place for place in _capped([-place for place in reversed(places)], -low, tight)][::-1]
-    return _capped(places, high, tight)
+    places = [-place for place in _cap([-place for place in reversed(places)], -low, tight)][::-1]
+    return _cap(places, high, tight)
 
 
-def _capped(places: Sequence[float], limit: float, tight: float) -> list[float]:
+def _cap(places: Sequence[float], limit: float, tight: float) -> list[float]:
     """Return the places, of which as few as possible are reduced so that no place exceeds the limit."""
     result: list[float] = []
     for place in reversed(places):
