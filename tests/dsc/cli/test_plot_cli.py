@@ -190,7 +190,7 @@ def test_yaml_gives_the_same_plot_back_with_rules_as_rules_or_carried_out() -> N
     assert any(t.rule for _, state, _ in expanded.walk() for _, t in getattr(state, "transitions", tuple)())
 
 
-def test_what_cannot_be_shown_says_why(tmp_path: Path) -> None:
+def test_show_of_an_invalid_plot_raises_an_error_with_its_reason(tmp_path: Path) -> None:
     assert isinstance(run("show", tmp_path / "missing.yaml").exception, InputError)
     ruled = GOOD + "rules:\n  - {on: x, do: {then: retry}}\n"
     file = written(tmp_path, good=ruled)
@@ -279,7 +279,7 @@ def test_with_a_robot_skills_are_checked_too(robot, name):
         ("some_robot:broken", "'some_robot:broken' cannot be called: RuntimeError: no arm today ("),
     ],
 )
-def test_what_is_no_robot_is_named(robot, named, said):
+def test_an_invalid_robot_name_is_refused_with_its_reason(robot, named, said):
     with pytest.raises(InputError) as refused:
         robot_of(named)
     assert said in str(refused.value)

@@ -169,7 +169,7 @@ def test_a_blocking_skill_runs_in_a_thread_and_reports(run):
     assert not given_up
 
 
-def test_what_a_thread_has_observed_is_known_even_if_it_breaks():
+def test_an_observation_in_a_thread_is_known_even_if_the_skill_fails():
     ran = Ran(
         "{plot: p, states: {a: {entry: {trigger: arm.sees_and_breaks}, on: {ok: e}}, e: {final: true}}}", arm=Worker()
     )
@@ -177,7 +177,7 @@ def test_what_a_thread_has_observed_is_known_even_if_it_breaks():
     assert ran.kb.ask("(p)")
 
 
-def test_what_a_thread_raises_reaches_the_chart():
+def test_an_exception_in_a_thread_becomes_the_problem_of_the_run():
     ran = Ran("{plot: p, states: {a: {entry: {trigger: arm.raises}, on: {ok: e}}, e: {final: true}}}", arm=Worker())
     assert "the bus is stuck" in (ran.end.problem or "")
 
@@ -242,7 +242,7 @@ def test_a_skill_in_a_process_has_the_turn_of_its_component_while_another_waits(
         ("stops", "BrokenText"),
     ],
 )
-def test_what_goes_wrong_in_a_process_is_told(name, why):
+def test_a_failure_in_a_process_raises_an_error_with_its_reason(name, why):
     with pytest.raises(SkillError if name == "dies" else ProgrammingError, match=why):
         execute(Far(), name)
 

@@ -160,7 +160,7 @@ def test_a_reactive_tree_turns_elsewhere_and_stops_what_it_began():
 
 
 @pytest.mark.parametrize(("then", "limit"), [("broken", 60), ("waits", 60), ("waits", 5)])
-def test_what_an_action_of_a_tree_has_observed_is_known_however_the_tree_ends(then, limit):
+def test_an_observation_in_a_tree_is_known_at_any_end_of_the_tree(then, limit):
     ran = serve(f"takes_then, with: {{then: {then}}}, within: 20", Butler(), limit)
     assert ran.end.finished
     assert ran.kb.ask("(seen cup1)")
@@ -185,7 +185,7 @@ def test_a_sequence_asks_conditions_again_if_it_is_reactive(reactive, end):
     ("served", "a tree ends with a class of an outcome, as in success=Served, not with 'served'"),
     (Counted, "a tree ends with Counted, for whose attributes it has no values"),
 ])  # fmt: skip
-def test_how_a_tree_ends_is_declared(success, why):
+def test_a_tree_skill_refuses_an_outcome_it_cannot_make(success, why):
     with pytest.raises(InputError, match=why):
         tree_skill(success, NotServed)
 
@@ -212,7 +212,7 @@ def test_an_action_of_a_tree_that_ends_with_no_outcome_is_a_programming_error():
 @pytest.mark.parametrize(
     ("how", "reason"), [("raise", "the gripper is stuck"), ("exit", "SystemExit: the driver says no")]
 )
-def test_what_an_action_of_a_tree_raises_is_a_programming_error(how, reason):
+def test_an_exception_in_a_tree_action_is_a_programming_error(how, reason):
     ran = serve(f"raises, with: {{how: {how}}}", Butler())
     assert any(reason in event["attributes"].get("reason", "") for event in ran.of_type("event"))
 
@@ -268,7 +268,7 @@ SEEK = """
 """
 
 
-def test_what_a_plot_that_is_a_skill_emits_on_the_way_comes_at_once_and_its_outputs_at_the_end():
+def test_a_plot_skill_emits_reports_at_once_and_outputs_at_the_end():
     ran = Ran(
         """
         plot: p

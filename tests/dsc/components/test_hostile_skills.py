@@ -192,7 +192,7 @@ PLACE = re.compile(r" \(\S+:[0-9]+\)$")
 
 @pytest.mark.parametrize("where", ["awaited", "later", "in_thread", "tree", "tests"])
 @pytest.mark.parametrize("kind", RAISED)
-def test_whatever_ends_a_skill_is_one_programming_error(kind, where):
+def test_any_exception_in_a_skill_is_one_programming_error(kind, where):
     ran = Ran(ANSWERS.replace("SKILL", where), arm=Hostile(raising(RAISED[kind])))
     (event,) = answers(ran)
     assert event["name"] == "programming_error"
@@ -203,7 +203,7 @@ def test_whatever_ends_a_skill_is_one_programming_error(kind, where):
 
 @pytest.mark.parametrize("where", ["awaited", "in_thread", "reports", "reports_from_thread"])
 @pytest.mark.parametrize("kind", RETURNED)
-def test_whatever_a_skill_says_that_cannot_be_is_one_programming_error(kind, where):
+def test_an_impossible_outcome_or_report_is_one_programming_error(kind, where):
     ran = Ran(ANSWERS.replace("SKILL", where), arm=Hostile(RETURNED[kind]))
     (event,) = answers(ran)
     assert event["name"] == ("ok" if kind == "odd event" and event["name"] == "ok" else "programming_error")
@@ -211,7 +211,7 @@ def test_whatever_a_skill_says_that_cannot_be_is_one_programming_error(kind, whe
 
 
 @pytest.mark.parametrize("kind", RAISED)
-def test_what_cannot_be_said_while_it_is_told_something_fails_the_next_skill(kind):
+def test_an_exception_while_a_component_takes_a_message_fails_the_next_skill(kind):
     text = ANSWERS.replace("{trigger: arm.SKILL, within: 100}", "[{send: arm.told}, {trigger: arm.goes, within: 100}]")
     ran = Ran(text, arm=Hostile(raising(RAISED[kind])))
     assert [event["name"] for event in answers(ran)] == ["programming_error"]

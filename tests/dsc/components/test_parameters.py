@@ -41,7 +41,7 @@ def test_each_instance_begins_with_what_its_builder_says_and_has_values_of_its_o
         ("light", [1], "'base.light' is a boolean"),
     ],
 )
-def test_what_does_not_fit_is_refused_and_changes_nothing(parameter, value, said):
+def test_an_invalid_setting_is_refused_and_changes_no_parameter(parameter, value, said):
     base = Base()
     before = dict(base.parameters)
     with pytest.raises(InputError, match=re.escape(said)):
@@ -88,17 +88,17 @@ def findings_of(text, setting):
         ("light, to: true", "'base.light' is not changed by plots, but by rules"),
     ],
 )
-def test_what_a_plot_may_not_set_is_found_before_it_runs(setting, said):
+def test_an_invalid_setting_in_a_plot_is_found_before_the_run(setting, said):
     (finding,) = findings_of(HOLDER, setting)
     assert said in finding
 
 
 @pytest.mark.parametrize("setting", ["speed, to: 1", "speed, to: ?x", "mode, to: brisk"])
-def test_what_a_plot_may_set(setting):
+def test_a_valid_setting_in_a_plot_has_no_finding(setting):
     assert [one for one in findings_of(HOLDER, setting) if "?x" not in one] == []
 
 
-def test_what_rules_may_set_and_what_not():
+def test_rules_set_only_parameters_open_to_rules():
     assert findings_of(ANSWERING, "light, to: true") == []
     (finding,) = findings_of(ANSWERING, "port, to: tty")
     assert "p.yaml:7:" in finding
@@ -222,19 +222,19 @@ def axle(**said):
     return made
 
 
-def test_what_follows_has_a_value_from_the_beginning_and_whenever_its_reasons_are_said_anew():
+def test_a_derived_parameter_has_an_initial_value_and_follows_each_change_of_its_source():
     assert axle().parameters == {"period": 6, "processor": "a", "worst": 3}
     assert axle(worst=5).parameters["period"] == 10
     assert axle(worst=5, period=7).parameters["period"] == 7
     assert axle(period=7, worst=5).parameters["period"] == 10
 
 
-def test_what_relies_on_what_is_said_anew_is_unbound_all_along_the_chain():
+def test_a_setting_resets_all_parameters_that_depend_on_it():
     bound = axle(worst=5, period=8, label="measured", processor="b")
     assert bound.parameters == {"period": 6, "processor": "b", "worst": 3}
 
 
-def test_what_was_said_is_taken_back():
+def test_a_parameter_set_to_none_loses_the_value_it_was_given():
     assert axle(worst=5, period=7, label="x").parameters["label"] == "x"
     assert axle(worst=5, label="x", period=None).parameters == {"processor": "a", "worst": 5, "period": 10}
     made = axle(label="x")
@@ -242,7 +242,7 @@ def test_what_was_said_is_taken_back():
     assert "label" not in made.parameters
 
 
-def test_what_follows_is_in_its_range_or_nothing_changes():
+def test_a_derived_value_out_of_range_refuses_the_change():
     made = axle()
     with pytest.raises(InputError, match=r"'axle\.period' is 100 or less; found 120"):
         asyncio.run(made.configure("worst", 60))

@@ -213,7 +213,7 @@ def test_a_message_that_cannot_be_taken_is_told():
     assert "no ink" in end.problem
 
 
-def test_what_a_component_does_not_take_is_refused():
+def test_a_component_refuses_unknown_names_and_missing_parameters():
     battery = Battery()
     with pytest.raises(UnknownNameError, match="did you mean 'label'"):
         asyncio.run(battery.receive("labl", {}))

@@ -108,7 +108,7 @@ def test_several_timeouts_of_a_state_each_come_in_time():
     assert ran.at == pytest.approx(0.7)
 
 
-def test_what_was_observed_is_known_even_if_the_state_was_left_meanwhile():
+def test_an_observation_is_known_even_after_its_state_is_left():
     ran = Ran(
         """
         plot: p
@@ -172,7 +172,7 @@ BREAKS = """
         ("no_data", "object"),
     ],
 )
-def test_whatever_a_skill_does_wrong_is_a_programming_error(how, reason):
+def test_any_fault_of_a_skill_is_a_programming_error(how, reason):
     ran = Ran(BREAKS.replace("HOW", how))
     assert ran.end.finished
     (event,) = ran.end.emitted
@@ -392,7 +392,7 @@ def test_a_skill_that_has_failed_by_what_it_reported_answers_no_more(what, and_t
     assert not ran.kb.ask("(p)")
 
 
-def test_what_goes_wrong_in_a_plot_inside_comes_to_the_state_that_holds_it():
+def test_an_error_in_a_nested_plot_reaches_the_holding_state():
     inner = "{plot: inner, states: {a: {entry: {trigger: arm.breaks}, on: {ok: e}}, e: {final: true}}}"
     middle = "{plot: middle, states: {a: {use: inner, on: {done: e}}, e: {final: true}}}"
     ran = Ran(

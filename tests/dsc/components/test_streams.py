@@ -126,7 +126,7 @@ def connected(check):
     run_simulated(main())
 
 
-def test_who_comes_late_hears_the_newest():
+def test_a_listener_wired_late_receives_the_newest_value():
     async def main():
         laser, mapper = Laser(), Mapper()
         laser.scan.put(metres=1, points=[])
@@ -174,7 +174,7 @@ def test_a_timed_port_is_silent_when_its_component_is_gone(end):
         ({"metres": 1, "points": object()}, "only plain data"),
     ],
 )
-def test_what_is_pushed_has_its_types(values, said):
+def test_a_stream_refuses_values_that_break_its_declaration(values, said):
     with pytest.raises(InputError) as refused:
         Laser().scan.put(**values)
     assert said in str(refused.value)

@@ -86,7 +86,7 @@ def line_of(text):
         ("loses_a_task", "a task that nobody awaits: KeyError: 'voice'", 'raise KeyError("voice")'),
     ],
 )  # fmt: skip
-def test_what_nobody_awaits_is_a_programming_error_of_the_run(name, said, line):
+def test_an_unawaited_coroutine_or_task_is_a_programming_error_of_the_run(name, said, line):
     assert ended(name).programming_error == f"{said} ({__file__}:{line_of(line)})"
 
 

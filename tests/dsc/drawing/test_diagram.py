@@ -207,7 +207,7 @@ def test_transitions_between_two_states_share_an_edge_and_equal_ones_a_line() ->
     assert [text.text for text in edge.label] == ["x, y, after 2.5 s", "z / n := 1"]
 
 
-def test_what_stays_in_a_state_is_written_in_it() -> None:
+def test_a_transition_without_a_target_is_written_in_its_state() -> None:
     root = lay_out(plot_of("  a: {on: {x: {assign: {n: 1}}, y: a}}"))
     assert "x / n := 1" in [text.text for text in root.boxes[1].texts]
     (loop,) = [edge for edge in root.edges if edge.source == "a"]
@@ -254,7 +254,7 @@ def test_the_cases_of_a_selection_stand_at_its_edges_by_their_values() -> None:
 
 
 @pytest.mark.parametrize("direction", ["down", "right"])
-def test_what_comes_back_to_a_diamond_does_not_meet_what_goes_out(direction: str) -> None:
+def test_edges_into_a_diamond_share_no_point_with_edges_out_of_it(direction: str) -> None:
     plot = plot_of("  c: {choice: [{when: (< ?n 1), to: a}, b]}\n  a: {on: {x: c}}\n  b: {on: {x: c}}")
     drawn = lay_out(plot, direction=direction).edges  # type: ignore[arg-type]
     leaving = {edge.points[0] for edge in drawn if edge.source == "c"}

@@ -233,7 +233,7 @@ def test_histories_are_circles_with_their_default(direction: str) -> None:
             assert on_border(point, circles[name].boxes[0] if name in circles else named(root, name))
 
 
-def test_what_leads_into_a_state_is_drawn_over_it() -> None:
+def test_the_label_of_an_edge_into_a_state_is_drawn_over_the_state() -> None:
     svg = draw(plot("plot: p\ndialect: scxml\nstates:\n  a: {on: {x: b}}\n  c: {states: {b: }}"))
     assert svg.index('class="label mid"') > svg.index(">b</text>")
 

@@ -127,7 +127,7 @@ def test_candidates_take_the_arguments_they_have_and_defaults_for_the_rest(kb):
     assert frame.variables == {"speed": 3}
 
 
-def test_what_the_macrostep_told_counts_for_the_choice(kb):
+def test_a_choice_counts_the_values_changed_in_its_macrostep(kb):
     text = """
         plot: p
         states:
@@ -152,7 +152,7 @@ def test_what_the_macrostep_told_counts_for_the_choice(kb):
         ("dynamic: [odd]", "{plot: odd, when: (nonsense), states: {s: }}"),
     ],
 )
-def test_what_cannot_be_chosen_is_an_error_of_the_chart(kb, dynamic, candidate):
+def test_an_impossible_candidate_is_an_error_of_the_chart(kb, dynamic, candidate):
     chosen = Chosen(kb, dynamic, candidate)
     assert len(chosen.step.errors) == 1
     assert chosen.active == ("h",)

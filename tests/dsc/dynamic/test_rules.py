@@ -285,7 +285,7 @@ def test_give_up_takes_what_the_state_wires_for_it():
     assert run.active == ["given_up"]
 
 
-def test_what_give_up_takes_hears_the_outcome_as_its_reason():
+def test_gave_up_carries_the_name_of_the_outcome_as_its_reason():
     text = """
         plot: p
         variables: {why: text}
@@ -404,7 +404,7 @@ def test_rules_answer_their_own_event_alone():
     assert run.active == ["elsewhere"]
 
 
-def test_what_a_state_wires_itself_beats_every_rule():
+def test_a_transition_of_the_state_itself_beats_every_rule():
     text = HOLDER.replace("on: {done: fine,", "on: {failed: elsewhere, done: fine,")
     run = run_of(["{on: failed, do: {then: retry}}"], text)
     run.send("bad")
@@ -529,7 +529,7 @@ def test_a_plot_without_rules_is_what_it_is():
     assert Library([holder, plot(STEP)]).expanded(holder) is holder
 
 
-def test_what_a_rule_makes_can_be_written_and_read_like_any_plot():
+def test_a_plot_expanded_by_rules_can_be_written_and_read_again():
     holder = plot(HOLDER + "      - {on: failed, when: (p ?event.item), do: {use: recover, tell: (q), then: retry}}\n")
     expanded = Library([holder, plot(STEP), plot(RECOVER)]).expanded(holder)
     assert parse_plot(plot_to_yaml(expanded)) == expanded
@@ -571,7 +571,7 @@ def test_a_rule_keeps_all_that_the_transition_it_takes_says():
     assert failed.rule == "failed: continue"
 
 
-def test_what_is_passed_on_giving_up_may_be_the_reason():
+def test_a_transition_on_giving_up_passes_the_reason():
     text = """
         plot: p
         states:
@@ -664,7 +664,7 @@ KINDS = """
         ("{before: do_it, do: {use: count, with: {n: ?step.item}}}", "'n' is of type number"),
     ],
 )
-def test_what_a_rule_hands_over_fits_by_type(rule, said):
+def test_values_passed_by_a_rule_must_fit_by_type(rule, said):
     count = plot("plot: count\nparameters: {n: number}\nstates: {e: {final: true}}")
     made = [plot(KINDS.replace("RULE", rule)), plot(STEP), count]
     schema = Schema.parse("(define (domain d) (:types item) (:constants cup1 - item))")

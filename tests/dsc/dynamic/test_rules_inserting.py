@@ -182,7 +182,7 @@ def test_a_rule_goes_elsewhere_instead_of_into_a_step():
     assert run.active == ["other"]
 
 
-def test_what_is_passed_arrives_behind_an_insertion():
+def test_passed_values_reach_a_step_behind_an_inserted_plot():
     text = HOLDER.replace(
         "start: {on: {go: step}}",
         "start: {on: {go: {to: step, assign: {mine: ?event.item}, pass: {item: ?mine, light: ?event.light}}}}",

@@ -64,7 +64,7 @@ def test_actions_of_a_transition_are_done_between_leaving_and_entering_in_order(
     assert run.variables()["n"] == 4
 
 
-def test_what_is_told_is_seen_by_later_guards_of_the_same_macrostep():
+def test_changed_facts_are_seen_by_later_guards_of_the_same_macrostep():
     run = Run(plot("""
         plot: p
         states:
@@ -79,7 +79,7 @@ def test_what_is_told_is_seen_by_later_guards_of_the_same_macrostep():
     assert step_.knowledge == Delta(removed=(Fact("q"),), added=(Fact("p"),))
 
 
-def test_what_is_told_and_taken_back_in_one_macrostep_is_one_change():
+def test_a_fact_added_and_removed_in_one_macrostep_is_one_change():
     run = Run(plot("{plot: p, states: {a: {on: {e: {to: b, tell: (p)}}}, b: {always: {to: c, tell: (not (p))}}, c: }}"))
     run.start()
     assert run.send("e").knowledge == Delta(removed=(Fact("p"),))

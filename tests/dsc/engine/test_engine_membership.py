@@ -20,7 +20,7 @@ OPEN = parse_condition("(open door)")
         ("(forall (?x) (imply (open ?x) (in-state b)))", "(forall (?x) (imply (open ?x) F))"),
     ],
 )  # fmt: skip
-def test_what_is_asked_about_states_is_answered_and_the_rest_is_left(text, settled):
+def test_conditions_on_active_states_are_settled_and_the_rest_is_kept(text, settled):
     expected = parse_condition(settled.replace("T", "(and)").replace("F", "(or)"))
     assert settle(parse_condition(text), {"a"}.__contains__) == expected
 

@@ -128,7 +128,7 @@ def test_the_order_of_a_bound_plots_states_counts():
         {"plot": "made", "states": {"a": {"states": {"b": {}}, "initial": "a"}}},
     ],
 )
-def test_what_is_no_plot_cannot_be_bound_and_is_an_error_of_the_chart(value):
+def test_an_invalid_plot_value_cannot_be_bound_and_is_an_error_of_the_chart(value):
     host = plot(
         "{plot: p, variables: {what: any}, states: {a: {on: {go: {to: h, assign: {what: ?event.what}}}}, h: {use: ?what}}}"
     )

@@ -42,7 +42,7 @@ def test_the_configuration_is_legal_after_every_step(plots, happened):
 
 @SOME
 @given(EVERY_KIND, happenings())
-def test_what_is_entered_was_not_active_and_what_is_left_was(plots, happened):
+def test_a_microstep_enters_only_inactive_states_and_exits_only_active_states(plots, happened):
     active: set[str] = set()
     running: set[str] = set()
     for step in Played(*plots).steps(happened):

@@ -237,5 +237,5 @@ def test_large_charts_run_as_the_semantics_are_written(first, scxml):
         ),
     ],
 )
-def test_what_the_engine_once_did_otherwise(text, happened):
+def test_the_engine_equals_the_reference_on_plots_with_former_faults(text, happened):
     play([plot(text)], happened)

@@ -118,7 +118,7 @@ def test_a_machine_that_was_not_started_or_has_ended_does_nothing():
         (("root", "form"), {"plot": 3}, "plot"),
     ],
 )
-def test_what_is_no_state_is_refused_by_what_is_wrong_in_it(path, value, said):
+def test_an_invalid_state_is_refused_with_the_path_of_its_error(path, value, said):
     run = rich()
     run.start()
     form = json.loads(json.dumps(run.machine.state.to_json()))
@@ -141,7 +141,7 @@ def test_a_state_nested_too_deeply_is_refused():
         read_state(form, run.library)
 
 
-def test_what_is_active_inside_a_state_is_its_own_activation_and_those_of_its_content():
+def test_activations_inside_a_state_are_its_own_and_those_of_its_content():
     waiting = "{plot: q, states: {a: {after: {seconds: 5, to: b}}, b: {final: true}}}"
     run = Run(plot("{plot: p, states: {h: {use: q, on: {done: e}}, e: {final: true}}}"), plot(waiting))
     run.start()

@@ -179,7 +179,7 @@ def test_the_first_event_that_waited_comes_first_and_the_others_are_gone_with_th
     assert run.active == ["late"]
 
 
-def test_what_leaves_nothing_does_not_wait():
+def test_an_event_that_leaves_no_state_does_not_wait():
     run = started(LINGERING)
     assert run.send("note").moved
 
@@ -227,7 +227,7 @@ def test_completion_waits_too_and_a_guard_is_asked_again():
     assert run.active == ["a"]
 
 
-def test_what_waits_is_stored_with_the_state():
+def test_a_waiting_event_is_stored_with_the_state():
     run, other = started(LINGERING), started(LINGERING)
     run.send("go", x=1)
     stored = json.loads(json.dumps(run.machine.state.to_json()))

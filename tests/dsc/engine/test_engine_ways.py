@@ -44,7 +44,7 @@ def test_a_state_left_by_another_transition_is_interrupted():
     assert modes(again.send("stop")) == ["-b"]
 
 
-def test_what_runs_in_a_plot_inside_is_interrupted_when_its_holder_is_left():
+def test_a_nested_plot_is_interrupted_when_its_holder_is_left():
     run = started(
         f"{{plot: p, states: {{h: {{use: q, {breakable('h')}, on: {{stop: out}}}}, out: }}}}",
         f"{{plot: q, states: {{a: {{{breakable('a')}}}}}}}",
@@ -182,7 +182,7 @@ def test_an_output_has_its_initial_value_until_it_is_assigned():
     assert run.variables()["w"] == "none"
 
 
-def test_what_is_passed_is_for_the_target_alone():
+def test_passed_values_are_for_the_target_alone():
     run = started(
         "{plot: p, states: {a: {on: {go: {to: o, pass: {x: 1}}}}, o: {states: {h: {use: q, with: {x: 2}}}}}}",
         "{plot: q, parameters: {x: number}, states: {s: }}",
@@ -191,7 +191,7 @@ def test_what_is_passed_is_for_the_target_alone():
     assert run.variables("h") == {"x": 2}
 
 
-def test_what_is_passed_reaches_the_candidates_of_a_dynamic_state():
+def test_passed_values_reach_the_candidates_of_a_dynamic_state():
     library = Library(
         map(
             plot,
@@ -210,7 +210,7 @@ def test_what_is_passed_reaches_the_candidates_of_a_dynamic_state():
     assert step.decisions[0].decision.chosen is None
 
 
-def test_what_cannot_be_passed_is_an_error_of_the_plot():
+def test_a_value_that_cannot_be_passed_is_an_error_of_the_plot():
     run = started(
         "{plot: p, states: {a: {on: {go: {to: h, pass: {x: ?event.nothing}}}}, h: {use: q, on: {error: e}}, e: }}",
         "{plot: q, parameters: {x: {type: number, default: 5}}, states: {s: }}",

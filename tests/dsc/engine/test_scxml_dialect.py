@@ -157,7 +157,7 @@ def test_an_event_is_only_withdrawn_in_the_plot_that_sent_it():
     assert run.finished
 
 
-def test_what_comes_at_once_has_no_id():
+def test_an_event_without_delay_has_no_id():
     with pytest.raises(InputError, match="cannot be withdrawn"):
         plot("{plot: p, dialect: scxml, states: {a: {entry: {emit: e, id: x}}}}")
 

@@ -219,7 +219,7 @@ def test_unknown_keys_are_refused(form):
         {"plot": "p", "states": {"s": {"select": "?x", "cases": {float("inf"): "s"}, "else": "s"}}},
     ],
 )
-def test_what_is_no_plot_is_refused(form):
+def test_an_invalid_plot_form_is_refused(form):
     with pytest.raises(InputError):
         ActionPlot.model_validate(form)
 
@@ -254,7 +254,7 @@ def test_what_is_no_plot_is_refused(form):
         (None, "a mapping was expected; found nothing"),
     ],
 )
-def test_what_is_wrong_is_said_in_our_words_with_its_path(form, said):
+def test_an_error_of_a_plot_form_names_its_path_without_words_of_pydantic(form, said):
     with pytest.raises(InputError) as error:
         ActionPlot.model_validate(form)
     assert said in str(error.value)
@@ -274,7 +274,7 @@ def test_the_form_reads_back_as_the_same_plot():
     assert again.digest == EVERYTHING.digest
 
 
-def test_where_a_plot_was_written_is_no_part_of_it():
+def test_equality_of_plots_ignores_their_source():
     one, other = plot("{plot: p, states: {s: {}}}", "a.yaml"), plot("plot: p\nstates:\n  s: {}", "b.yaml")
     assert one == other
     assert hash(one) == hash(other)
@@ -325,7 +325,7 @@ def test_the_actions_of_a_transition_are_done_before_its_own_shorthand():
     assert transition.emitted == ("a", "b")
 
 
-def test_what_is_passed_and_cleared_is_no_action_of_a_transition():
+def test_pass_and_clear_of_a_transition_are_no_actions():
     assert Transition.model_validate({"to": "s", "pass": {"a": 1}, "clear": "t"}).effect == ()
 
 

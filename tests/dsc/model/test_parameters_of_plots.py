@@ -57,7 +57,7 @@ def findings(plot, *others):
         ("mood: brisc", "'wait.mood' is one of calm, brisk; found brisc; did you mean 'brisk'?"),
     ],
 )
-def test_what_is_handed_to_a_plot_is_in_its_range(handed, said):
+def test_a_value_passed_to_a_plot_outside_its_range_is_a_finding(handed, said):
     (finding,) = findings(parse_plot(USING.replace("WITH", handed), "p.yaml"), wait())
     assert said in finding
 
@@ -133,7 +133,7 @@ def test_another_default_is_another_text():
     assert before.with_default("seconds", 20, "operator").to_form()["parameters"]["seconds"]["default"] == 20
 
 
-def test_what_only_the_run_knows_is_checked_when_the_plot_is_entered():
+def test_a_value_known_only_at_run_time_is_checked_when_the_plot_is_entered():
     holder = USING.replace("plot: p\n", "plot: p\nvariables: {n: {type: number, initial: 70}}\n").replace(
         "WITH", "seconds: ?n"
     )
@@ -222,7 +222,7 @@ def test_an_operator_changes_a_plot_for_the_next_time_it_is_entered():
         ("wait", "seconds", [1], "'wait.seconds' is from 1 to 60; found [1]"),
     ],
 )
-def test_what_an_operator_may_not_say_is_refused_at_once_and_changes_nothing(owner, name, value, said):
+def test_an_invalid_setting_by_an_operator_is_refused_and_changes_no_value(owner, name, value, said):
     def act(sequencer):
         with pytest.raises(InputError, match=re.escape(said)):
             sequencer.set_parameter(owner, name, value)
@@ -230,7 +230,7 @@ def test_what_an_operator_may_not_say_is_refused_at_once_and_changes_nothing(own
     assert driven(act) == ([0.5, 0.5], 22.0)
 
 
-def test_what_rules_and_plots_may_change_an_operator_may_too():
+def test_an_operator_may_set_a_parameter_open_to_rules():
     assert driven(lambda run: run.set_parameter("base", "light", value=True)) == ([0.5, 0.5], 22.0)
 
 
@@ -252,7 +252,7 @@ KEPT = """
 """
 
 
-def test_what_an_operator_said_outlives_a_crash_and_is_replayed(tmp_path):
+def test_settings_by_an_operator_outlive_a_crash_and_are_replayed(tmp_path):
     def prepare(sequencer):
         sequencer.set_parameter("wait", "seconds", 3, after=0.5)
         sequencer.set_parameter("robot", "speed", 7, after=1.5)

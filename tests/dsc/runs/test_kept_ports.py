@@ -181,7 +181,7 @@ def test_mode_and_life_are_as_they_were(tmp_path):
         assert (run.robot.mode, run.robot.life.state) == ("careful", "init"), what
 
 
-def test_what_was_to_start_anew_before_the_crash_starts_once_after_it(tmp_path):
+def test_a_component_to_be_restarted_before_a_crash_starts_once_after_it(tmp_path):
     whole = crashes(tmp_path, LIVES)
     _, done, folder = whole.copies[-1]
     robot = Station(done)

@@ -101,7 +101,7 @@ def test_a_message_comes_back(message, forms, short):
     ],
     ids=lambda what: type(what).__name__,
 )
-def test_what_is_awaited_comes_back(what, forms, short):
+def test_an_awaited_item_survives_writing_and_reading(what, forms, short):
     form = written(awaited_form(what, short))
     assert json.dumps(PLOT) not in json.dumps(form)
     assert awaited_of(type(what).__name__, form, lambda digest: json.loads(forms[digest])) == what

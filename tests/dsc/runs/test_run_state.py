@@ -81,7 +81,7 @@ NOBODY = SimpleNamespace(caused_by={})
     ],
     ids=["answer", "report", "timer", "event sent later", "cancelled", "left", "revoked", "overtaken", "come and gone"],
 )
-def test_what_is_pending_is_the_same_by_changes_and_as_a_whole(happens):
+def test_pending_items_by_changes_equal_those_of_the_whole_state(happens):
     state, found = RunState(Shortener(lambda *_: None)), RunSnapshot()
     state.ask([WORK, TIMEOUT, LATER, SetParameter("robot", "speed", 1)], 1, 0.0, NOBODY)
     found.apply(json.loads(state.change()))

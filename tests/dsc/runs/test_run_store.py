@@ -37,7 +37,7 @@ def test_wherever_it_is_broken_off_it_comes_to_the_same_end_by_the_same_steps(tm
         assert run.outcome() == crashes.whole.outcome(), what
 
 
-def test_what_was_handed_in_to_come_later_comes_when_it_should(tmp_path):
+def test_delayed_events_and_changes_come_at_their_time_after_a_crash(tmp_path):
     chart = """
         plot: p
         receives: {go: {n: number}}
@@ -177,7 +177,7 @@ def test_events_that_let_nothing_leave_are_committed_together_and_with_what_leav
     assert seen == [0, 1, 1, 1, 4, 4]  # the start alone; three events at once; the action, and then its answer
 
 
-def test_what_is_in_force_is_told_again_before_anything_goes_on(tmp_path):
+def test_parameters_and_modes_in_force_are_set_again_before_a_run_resumes(tmp_path):
     chart = """
         plot: p
         states:
@@ -222,7 +222,7 @@ def test_parameters_in_force_come_back_as_one_set_whatever_order_they_were_set_i
     assert run.robot.told == [("speed", 2), ("wheels", 16)]
 
 
-def test_what_a_component_has_refused_is_not_in_force_after_a_restart(tmp_path):
+def test_a_refused_parameter_value_is_not_in_force_after_a_restart(tmp_path):
     chart = """
         plot: p
         states:
@@ -590,7 +590,7 @@ def asked(tmp_path, after_crash, status, failure="skill_error"):
         ("repeat", Ended(Outcome("fetched")), 0),
     ],
 )
-def test_what_a_component_says_of_an_action_decides_what_becomes_of_it(tmp_path, after_crash, status, begun):
+def test_the_status_of_an_action_decides_whether_it_begins_again(tmp_path, after_crash, status, begun):
     (end, known, at), times = asked(tmp_path, after_crash, status)
     assert end == RunEnd(finished=True)
     assert times == begun
@@ -662,7 +662,7 @@ def test_an_action_that_was_cancelled_at_the_last_moment_is_stopped_and_not_done
     assert stopped == [[], [("a2.0", "fetch", {})], []]
 
 
-def test_what_an_action_observed_that_had_ended_when_it_was_cancelled_is_known_after_a_restart(tmp_path):
+def test_an_observation_of_a_cancelled_but_ended_action_is_known_after_a_restart(tmp_path):
     class Quick(Stubborn):
         async def abandon(self, action_id, skill_name, arguments):
             return Ended(Outcome("fetched", observed=Delta(added=(fact("q"),))))

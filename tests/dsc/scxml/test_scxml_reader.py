@@ -84,7 +84,7 @@ def test_conditions_are_translated(text, read):
 @pytest.mark.parametrize(
     "text", ["f(x)", "x ? 1 : 2", "{a: 1}", "[1]", "'a' + x", "x +", "x y", "(x", "_sessionid", "x.y", "(" * 200]
 )
-def test_what_terms_cannot_say_is_named(text):
+def test_an_expression_without_a_term_is_refused(text):
     with pytest.raises(NotExpressibleError):
         term(text, {"x": "x"})
 
@@ -205,7 +205,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("body", "message"), REFUSED)
-def test_what_ecmascript_would_convert_or_not_find_is_refused_by_name(body, message):
+def test_inexpressible_ecmascript_is_refused_with_its_reason_and_place(body, message):
     with pytest.raises(NotExpressibleError, match=message and re.escape(message)) as caught:
         scxml(body)
     assert str(caught.value).startswith("c.scxml:1")

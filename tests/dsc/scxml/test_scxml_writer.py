@@ -32,14 +32,14 @@ CHART = """<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0" name="c"
 </scxml>"""
 
 
-def test_what_is_read_can_be_written_and_read_again():
+def test_a_chart_that_was_read_can_be_written_and_read_again():
     written = to_scxml(parse_scxml(CHART))
     assert to_scxml(parse_scxml(written)) == written
     assert "'back ' + x" not in written
     assert '"back " + x' in written.replace("&quot;", '"')
 
 
-def test_what_is_sent_and_cancelled_by_id_is_read_and_written():
+def test_send_and_cancel_by_id_are_read_and_written():
     text = """<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0" name="c">
     <datamodel><data id="made" expr="'none'"/></datamodel>
     <state id="a"><onentry>
@@ -78,7 +78,7 @@ def test_a_plain_dsc_plot_can_be_written():
         "{on: {go: {assign: {x: 1, y: ?x}}}}",
     ],
 )
-def test_what_scxml_cannot_say_is_named(state):
+def test_a_state_that_scxml_cannot_express_is_refused(state):
     with pytest.raises(NotExpressibleError):
         to_scxml(plot(f"plot: p\nvariables: {{x: number, y: number}}\nstates: {{a: {state}, end: {{final: true}}}}"))
 
@@ -97,7 +97,7 @@ def test_what_scxml_cannot_say_is_named(state):
         ),
     ],
 )
-def test_what_scxml_has_nothing_for_is_named_as_in_the_plot(element, keys):
+def test_an_element_without_scxml_counterpart_is_named_as_in_the_plot(element, keys):
     with pytest.raises(NotExpressibleError) as caught:
         to_scxml(plot(f"plot: p\n{keys}\n"))
     assert caught.value.element == element

@@ -130,7 +130,7 @@ def test_many_small_sleeps_do_not_drift():
     assert run_simulated(main()) == pytest.approx(100)
 
 
-def test_what_is_due_at_one_moment_comes_in_the_order_in_which_it_was_asked_for():
+def test_calls_due_at_one_moment_come_in_the_order_of_their_requests():
     async def main():
         clock, woken = LoopClock(), []
 
@@ -147,7 +147,7 @@ def test_what_is_due_at_one_moment_comes_in_the_order_in_which_it_was_asked_for(
     assert run_simulated(main()) == [*range(20)] * 2
 
 
-def test_what_is_due_may_cancel_what_is_due_with_it():
+def test_a_due_call_may_cancel_another_call_due_at_the_same_moment():
     async def main():
         clock, called = LoopClock(), []
         others: list[Any] = []
@@ -206,7 +206,7 @@ def test_real_time_is_always_released():
     assert run_real(main())
 
 
-def test_what_was_cancelled_is_not_kept_until_it_would_have_been_due():
+def test_a_cancelled_call_is_not_kept_until_its_due_moment():
     class Something:
         def __call__(self):
             woken.append(self)

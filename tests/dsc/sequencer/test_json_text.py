@@ -31,10 +31,10 @@ def test_it_reads_as_what_the_standard_library_writes(value):
     assert "\n" not in text
 
 
-def test_what_is_no_number_of_json_is_written_as_python_reads_it():
+def test_an_infinite_number_is_written_as_python_reads_it():
     assert json.loads(text_of([math.inf, -math.inf])) == [math.inf, -math.inf]
 
 
-def test_what_is_no_plain_data_is_refused():
+def test_a_value_that_is_not_plain_data_is_refused():
     with pytest.raises(TypeError, match="not JSON serializable"):
         text_of({"a": object()})

@@ -44,7 +44,7 @@ def test_an_unfinished_run_is_replayed_as_far_as_it_came(tmp_path):
     assert 0 < replay(folder / "run.kb").steps < replay(tmp_path / "alive" / "run.kb").steps
 
 
-def test_what_was_handed_in_and_what_changed_beside_the_run_is_replayed_too(tmp_path):
+def test_posted_events_and_changes_beside_the_run_are_replayed_too(tmp_path):
     chart = "{plot: p, receives: {go: {n: number}}, states: {a: {on: {go: {to: e, when: (and (q) (told))}}}, e: {final: true}}}"
 
     def meddled(sequencer):

@@ -255,7 +255,7 @@ def test_a_change_of_knowledge_from_outside_is_seen_at_once():
 # -- knowledge and trace -----------------------------------------------------------------------------------
 
 
-def test_what_was_observed_is_known_before_the_event_is_handled():
+def test_an_observation_is_known_before_its_event_is_handled():
     ran = Ran("""
         plot: p
         states:
@@ -436,7 +436,7 @@ def test_events_of_the_executive_itself_cannot_be_posted_from_outside(name):
 # -- listening, and what is still to come ------------------------------------------------------------------
 
 
-def test_whoever_listens_is_told_every_step_before_its_actions_leave():
+def test_a_listener_receives_every_step_before_its_actions_leave():
     def prepare(sequencer):
         sequencer.listen(lambda step: heard.append((step, list(arm.log))))
         sequencer.post(Event("nonsense"), after=1)
@@ -474,14 +474,14 @@ def test_a_run_waits_for_what_is_still_to_come_and_for_no_longer():
     assert any("b" in micro["entered"] for step in ran.of_type("step") for micro in step["microsteps"])
 
 
-def test_what_is_still_to_come_when_a_run_ends_is_dropped():
+def test_an_event_still_pending_when_a_run_ends_is_dropped():
     ran = Ran(GRASP, prepare=lambda sequencer: sequencer.post(Event("slipped"), after=50))
     assert ran.end.finished
     assert ran.at == pytest.approx(2)
     assert [event["name"] for event in ran.of_type("event")] == ["grasped"]
 
 
-def test_what_was_still_to_come_does_not_come_in_the_next_run():
+def test_an_event_pending_at_the_end_of_a_run_does_not_come_in_the_next_run():
     heard: list[Any] = []
 
     async def main():
@@ -498,7 +498,7 @@ def test_what_was_still_to_come_does_not_come_in_the_next_run():
     assert [step.event and step.event.name for step in heard] == [None, "after"] * 2
 
 
-def test_what_is_wrong_is_refused_at_once_however_late_it_would_come():
+def test_an_invalid_event_or_change_is_refused_at_once_despite_its_delay():
     def prepare(sequencer):
         with pytest.raises(InputError, match="fired by the executive itself"):
             sequencer.post(Event("done"), after=5)

@@ -274,7 +274,7 @@ def test_a_client_of_a_hosted_component_preempts_another():
     assert (arm.most, order(arm)) == (1, ["inner", "inner cancelled", "urgent", "inner"])
 
 
-def test_who_waits_for_a_skill_of_another_client_knows_the_holder():
+def test_a_run_that_waits_for_a_skill_of_another_client_names_the_holder():
     records: list[Record] = []
     said = []
     waits = "{trigger: arm.move, with: {to: right}, within: 2}"

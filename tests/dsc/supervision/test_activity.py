@@ -107,7 +107,7 @@ def test_a_component_that_nobody_needs_is_left_alone():
     assert not [what for _, what in log if what.startswith("power")]
 
 
-def test_what_two_need_is_off_when_neither_does():
+def test_a_shared_component_is_off_when_no_other_component_needs_it():
     log: Log = []
     text = """
         plot: p
@@ -227,7 +227,7 @@ def test_a_mode_that_was_left_on_ends_with_the_run():
 
 
 @pytest.mark.parametrize("late", [False, True])
-def test_what_a_mode_needs_counts_also_if_it_is_entered_while_a_skill_is_at_work(late):
+def test_a_mode_entered_during_a_skill_adds_its_needs_to_the_skill(late):
     log: Log = []
     lamp = Device("lamp", log)
     text = """
@@ -282,7 +282,7 @@ def test_a_skill_after_a_change_of_mode_waits_for_what_the_mode_needs():
     assert [at for at, what in log if what == "camera looks"] == [0, 3]
 
 
-def test_what_was_started_anew_is_switched_on_anew():
+def test_a_restarted_component_is_switched_on_again():
     log: Log = []
     power = Device("power", log)
 
@@ -300,7 +300,7 @@ def test_what_was_started_anew_is_switched_on_anew():
     assert (2, "camera looks") in log
 
 
-def test_what_cannot_be_switched_on_fails_its_skills_and_says_why():
+def test_a_component_that_cannot_be_switched_on_fails_its_skills_with_the_reason():
     log: Log = []
     camera = Device("camera", log)
     camera.refuses = 1
@@ -309,7 +309,7 @@ def test_what_cannot_be_switched_on_fails_its_skills_and_says_why():
     assert at == 0
 
 
-def test_what_is_needed_and_cannot_be_switched_on_is_tried_again():
+def test_a_needed_component_that_cannot_be_switched_on_is_tried_again():
     log: Log = []
     power = Device("power", log)
     power.refuses = 2
@@ -319,7 +319,7 @@ def test_what_is_needed_and_cannot_be_switched_on_is_tried_again():
     assert next(at for at, what in log if what == "camera looks") == 3
 
 
-def test_what_does_not_come_off_does_not_keep_the_run():
+def test_a_component_that_cannot_be_switched_off_does_not_keep_the_run():
     class Stuck(Device):
         async def activate(self, active):
             if not active:
@@ -348,7 +348,7 @@ def test_a_component_is_on_while_it_puts_things_in_order():
     assert log[-3:] == [(8, "arm is folded"), (8, "arm off"), (8, "power off")]
 
 
-def test_who_takes_the_place_of_another_is_on_instead_of_it():
+def test_a_replacement_component_is_on_instead_of_the_replaced_component():
     old: Log = []
     new: Log = []
 

@@ -136,7 +136,7 @@ def test_a_mode_that_a_component_does_not_have_is_refused():
     assert "did you mean 'fast'" in why(end)
 
 
-def test_what_is_needed_in_a_mode_is_started_first():
+def test_a_component_needed_by_a_mode_is_started_first():
     base, laser = Base(starting=1), Laser(starting=1)
     _, at = drive("laser", laser, base, mode="scanning")
     assert base.log == ["start", "stop"]
@@ -146,7 +146,7 @@ def test_what_is_needed_in_a_mode_is_started_first():
     assert alone.log == []
 
 
-def test_what_is_deployed_late_is_waited_for():
+def test_a_skill_waits_for_a_needed_component_deployed_late():
     async def late(sequencer):
         await asyncio.sleep(10)
         sequencer.dispatcher.deploy(Base())
@@ -156,13 +156,13 @@ def test_what_is_deployed_late_is_waited_for():
     assert at == pytest.approx(15)
 
 
-def test_what_never_comes_is_waited_for_within_the_skills_bound():
+def test_a_skill_waits_for_a_missing_component_only_within_its_bound():
     end, at = drive("laser", Laser(), mode="scanning")
     assert end.finished
     assert at == pytest.approx(300)
 
 
-def test_what_is_lost_ends_the_skill_and_is_back_for_the_next():
+def test_a_lost_component_ends_the_skill_and_is_back_for_the_next_skill():
     base = Base()
 
     async def unplug(_):
@@ -193,7 +193,7 @@ def test_what_is_lost_ends_the_skill_and_is_back_for_the_next():
     assert "it needs component 'base', which is in 'fatal_error': unplugged" in reasons[1].attributes["reason"]
 
 
-def test_what_is_missing_is_named_when_the_time_is_over():
+def test_a_timeout_names_the_missing_component():
     text = DRIVE.replace("timed_out: e", "timed_out: {to: e, emit: broken, with: {why: ?event.reason}}")
     bass = Base()
     bass.name = "bass"
@@ -220,7 +220,7 @@ class Moody(Base):
             raise OSError("port busy")
 
 
-def test_what_cannot_start_is_started_anew_after_longer_and_longer_pauses():
+def test_a_component_that_cannot_start_is_restarted_after_growing_pauses():
     base = Moody(8)
     end, at = drive("laser", Laser(), base, mode="scanning")
     assert end.finished
@@ -228,7 +228,7 @@ def test_what_cannot_start_is_started_anew_after_longer_and_longer_pauses():
     assert at == pytest.approx(126)
 
 
-def test_what_crashes_is_started_anew_for_the_next_skill():
+def test_a_crashed_component_is_restarted_for_the_next_skill():
     base, laser = Moody(0), Laser()
 
     async def crash(_):
@@ -244,7 +244,7 @@ def test_what_crashes_is_started_anew_for_the_next_skill():
     assert at == pytest.approx(11)
 
 
-def test_what_is_shut_down_is_not_started_by_who_needs_it():
+def test_a_component_that_is_shut_down_is_not_started_by_a_skill_that_needs_it():
     base = Base()
     base.life.become(Life.SHUTDOWN)
 
@@ -320,7 +320,7 @@ def test_a_life_has_its_order():
     assert life.reason == ""
 
 
-def test_who_waits_for_the_same_start_waits_together():
+def test_concurrent_waits_for_a_component_share_one_start():
     base = Base(starting=3)
 
     async def main():

@@ -66,7 +66,7 @@ def test_runs_add_up():
     coverage.assert_complete()
 
 
-def test_what_a_rule_adds_to_a_plot_is_not_asked_for():
+def test_coverage_does_not_require_states_added_by_rules():
     names = {item.key[1] for item in Coverage(PLOTS).missing("fetch") if item.kind == "state"}
     assert names == {name for name, _, _ in FETCH.walk()}
 

@@ -173,7 +173,7 @@ def test_an_error_of_the_store_that_is_none_of_ours_is_raised(tmp_path):
         crashes.survive(live)
 
 
-def test_what_the_dead_program_writes_is_not_found_by_the_next(tmp_path):
+def test_writes_after_a_crash_are_absent_from_the_copy_for_the_next_life(tmp_path):
     """It is torn down inside this process, and writes in vain: the copy was made before."""
     lives = Lives(tmp_path, 5, 0.3, most=1)
     lives.crashes.survive(lives.live)

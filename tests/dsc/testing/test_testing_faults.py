@@ -176,7 +176,7 @@ def test_an_answer_that_is_late_is_given_at_once_when_the_action_is_cancelled():
     assert known >= {(False, "stop"), (True, "stop"), (True, "did")}
 
 
-def test_what_happens_depends_on_seed_and_action_alone():
+def test_faults_depend_on_seed_and_action_alone():
     ids = [f"a{n}.0" for n in range(400)]
 
     def drawn(seed, order):

@@ -89,7 +89,7 @@ def test_a_seed_is_an_order():
     ("one", "other"),
     [*itertools.permutations(["left.work said", "right.work said", "timer after", "outside stop", "somebody"], 2)],
 )
-def test_what_comes_from_two_places_comes_in_either_order(one, other):
+def test_inputs_from_two_places_come_in_either_order(one, other):
     for seed in range(60):
         order = heard(Interleaving(seed))
         if one in order and other in order and order.index(one) < order.index(other):
@@ -97,7 +97,7 @@ def test_what_comes_from_two_places_comes_in_either_order(one, other):
     pytest.fail(f"{one} never came before {other}")
 
 
-def test_what_comes_from_one_place_keeps_its_order():
+def test_inputs_from_one_place_keep_their_order():
     for seed in range(60):
         order = [one for one in heard(Interleaving(seed)) if one.startswith("left")]
         assert order == ["left.work said", "left.work did"][: len(order)]

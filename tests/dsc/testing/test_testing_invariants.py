@@ -71,12 +71,12 @@ def test_a_run_is_looked_at_as_it_is(run):
         ),
     ],
 )
-def test_what_is_wrong_is_said(run, invariant, wrong):
+def test_a_violated_invariant_has_its_reason(run, invariant, wrong):
     assert any(wrong in one for one in violations(run.path, [invariant]))
 
 
 @pytest.mark.parametrize("executed", [{"a1.0": "cup1"}, {"a1.0": "cup1"}.keys(), {"a1.0"}])
-def test_what_was_executed_is_not_told_in_a_way_that_has_no_place_for_a_second_time(executed):
+def test_executed_once_refuses_a_collection_that_cannot_hold_an_id_twice(executed):
     with pytest.raises(InputError, match="has an id once"):
         executed_once(executed)
 

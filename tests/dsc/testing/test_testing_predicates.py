@@ -103,7 +103,7 @@ def test_knowledge(run):
 @pytest.mark.parametrize(
     "what", ["(holding ?i)", "(increase (failures cup) 1)", "(forall (?i - item) (lost ?i))", "(holding"]
 )
-def test_what_nobody_can_be_told_is_an_error(run, what):
+def test_a_statement_that_is_not_a_fact_is_an_error_of_told(run, what):
     with pytest.raises(InputError):
         told(run, what)
 
@@ -128,7 +128,7 @@ def test_a_question_about_what_cannot_happen_is_an_error_and_not_a_no(run, quest
     assert not question(run.steps)  # bare steps do not know what else could have happened
 
 
-def test_what_rules_added_can_be_asked_about(run):
+def test_states_and_transitions_added_by_rules_can_be_queried(run):
     assert entered(run, "go_no_path_0_wait/pause")
     assert not took(run, "go_no_path_0_wait", target="without")
 

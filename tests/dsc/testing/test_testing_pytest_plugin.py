@@ -45,7 +45,7 @@ def test_tests_of_a_session_add_up_and_the_summary_has_the_report(tmp_path):
     assert any(line.split() == ["p", "2", "of", "2", "2", "of", "2", "-"] for line in done.stdout.splitlines())
 
 
-def test_who_does_not_use_it_does_not_see_it(tmp_path):
+def test_a_session_without_selected_tests_reports_no_plot_coverage(tmp_path):
     assert "plot coverage" not in run_pytest(tmp_path, "-k", "nothing").stdout
 
 

@@ -63,7 +63,7 @@ def test_one_answer_is_for_every_call_and_a_function_makes_its_own():
     assert again.knowledge.ask("(lost cup)")
 
 
-def test_what_a_skill_observes_is_a_change_or_an_effect_over_its_arguments():
+def test_an_observation_of_a_skill_is_a_change_or_an_effect_over_its_arguments():
     looking = plot("""
         plot: look
         parameters: {item: item}
@@ -182,7 +182,7 @@ def test_a_run_waits_for_events_that_are_still_to_come():
     assert too_few.seconds == pytest.approx(5)
 
 
-def test_what_was_still_to_come_when_the_run_ended_is_nobodys_business():
+def test_an_event_still_pending_at_the_end_of_the_run_is_ignored():
     run = fetch({"base.drive": "arrived", "arm.grasp": "grasped"}, events=[(1000, "stop")])
     assert run.emitted == (Event("fetched", {"item": "cup"}),)
     assert run.seconds == pytest.approx(2)
@@ -205,7 +205,7 @@ def test_others_change_the_knowledge():
         ({"changes": [(1, Delta(added=(fact("opne"),)))]}, "did you mean 'open'"),
     ],
 )
-def test_what_cannot_be_handed_in_is_refused_before_anything_runs(coming, said):
+def test_an_invalid_event_or_change_is_refused_before_the_run(coming, said):
     with pytest.raises(InputError, match=said):
         fetch({}, **coming)
 
@@ -251,7 +251,7 @@ def test_a_script_names_components_and_skills(name):
         ),
     ],
 )
-def test_where_the_script_and_the_run_do_not_fit_the_rehearsal_says_so(skills, said):
+def test_a_script_that_does_not_fit_the_run_raises_an_error(skills, said):
     with pytest.raises(InputError, match=said):
         fetch(skills)
 
@@ -277,7 +277,7 @@ def test_a_failed_assertion_about_a_call_fails_the_test_whatever_the_plot_makes_
 
 
 @pytest.mark.parametrize("replies", [[None], lambda _call: None, ["grasped", 3]])
-def test_what_is_no_answer_is_refused(replies):
+def test_a_reply_that_is_not_an_outcome_is_refused(replies):
     with pytest.raises(InputError, match=r"the script of 'arm.grasp' answers (None|3), which is not an outcome's name"):
         fetch({"base.drive": "arrived", "arm.grasp": replies})
 

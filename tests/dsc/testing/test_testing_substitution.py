@@ -46,7 +46,7 @@ def test_a_plot_that_is_not_there_cannot_be_replaced():
         ("parameters: {item: item, force: {type: number, default: 2}}, emits: {slipped: },", "emits 'slipped' without its attribute 'item'"),
     ],
 )  # fmt: skip
-def test_what_a_holder_would_notice_is_refused_and_says_where(interface, said):
+def test_a_stub_with_an_incompatible_interface_is_refused_with_its_place(interface, said):
     stub = plot("{plot: stub, " + interface + " states: {e: {final: true}}}", "stub.yaml")
     with pytest.raises(SchemaError) as refused:
         LIBRARY.substitute("pick", stub)

@@ -87,7 +87,7 @@ def test_a_plot_that_is_not_there_is_named():
         cloned(plots.plot("place"), plots, "b_")
 
 
-def test_what_a_profile_says_of_originals_is_said_of_their_clones():
+def test_profile_values_of_originals_apply_to_their_clones():
     profile = parse_profile(
         "profile: sim\nrobot: r\nplots: {look: {height: 900}, other: {height: 1}}\ndevices: {look: {left: lidar}}"
     )

@@ -53,6 +53,6 @@ def test_both_spellings_of_every_kind_fit():
         "{final: false}",
     ],
 )
-def test_what_is_no_state_does_not_fit(state):
+def test_an_invalid_state_does_not_fit_the_schema(state):
     data = load_document(f"plot: p\nstates:\n  a: {state}\n  b: {{final: true}}\n").data
     assert complaints(data) != []

@@ -66,7 +66,7 @@ def test_without_a_profile_everything_is_as_it_was_built():
         ("base: {port: a, cycle: 0.1}", 3, "needs (<= ?speed (* 0.5 ?cycle)), but cycle is 0.1, speed is 0.5"),
     ],
 )
-def test_what_is_wrong_has_its_place_and_changes_nothing(components, line, said):
+def test_an_invalid_profile_is_refused_with_its_place_and_changes_no_parameter(components, line, said):
     base = Base()
     before = dict(base.parameters)
     with pytest.raises(InputError, match=re.escape(said)) as error:
@@ -75,7 +75,7 @@ def test_what_is_wrong_has_its_place_and_changes_nothing(components, line, said)
     assert base.parameters == before
 
 
-def test_what_has_to_be_bound_is_missed_without_a_profile_too():
+def test_an_unbound_required_parameter_is_refused_without_a_profile_too():
     with pytest.raises(InputError, match=re.escape("'base.port' has no value")):
         configure([Base()])
 

@@ -227,7 +227,7 @@ def test_a_file_that_is_not_there_has_a_neighbour_that_is(tmp_path):
         load_plot(tmp_path / "kitchn.yaml")
 
 
-def test_what_is_no_text_or_no_file_is_refused(tmp_path):
+def test_a_binary_file_and_a_folder_are_refused(tmp_path):
     (tmp_path / "binary.yaml").write_bytes(b"plot: p\nabout: \xff\xfe")
     with pytest.raises(InputError, match="byte 0xff") as caught:
         load_plot(tmp_path / "binary.yaml")

@@ -191,7 +191,7 @@ def test_a_file_that_never_ends_is_left_at_the_limit(complaints):
     ]
 
 
-def test_what_is_no_file_is_said(dsc, tmp_path):
+def test_a_path_that_is_not_a_readable_file_is_reported(dsc, tmp_path):
     assert dsc("plot", "check", tmp_path) == (2, f"{tmp_path}: cannot read the file: Is a directory [readable]\n")
     assert dsc("plot", "check", tmp_path / "no.yaml")[0] == 2
     assert dsc("plot", "check", tmp_path / ("a" * 300)) == (

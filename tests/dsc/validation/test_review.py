@@ -251,7 +251,7 @@ def test_candidates_about_which_nothing_is_said(conditions):
     assert about_candidates(*(candidate(f"c{n}", when) for n, when in enumerate(conditions))) == []
 
 
-def test_what_only_one_candidate_is_handed_is_not_mistaken_for_the_others():
+def test_a_parameter_of_one_candidate_is_distinct_from_that_of_another():
     low = candidate("low", "(< ?n 3)", parameters={"n": "number"})
     assert about_candidates(low, candidate("other", "(< ?n 2)", parameters={"n": "number"})) == []
     (warning, *_) = about_candidates(low, candidate("lower", "(< ?n 2)"), extra="with: {n: 1}, ")

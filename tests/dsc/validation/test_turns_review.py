@@ -53,7 +53,7 @@ def test_a_handler_that_waits_for_its_plot_is_named():
         HANDLER.replace("MORE", "priority: -1,"),
     ],
 )
-def test_who_declares_a_priority_is_not_warned(text):
+def test_a_plot_that_declares_a_priority_has_no_warning(text):
     assert said(text) == []
 
 

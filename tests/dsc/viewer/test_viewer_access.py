@@ -152,7 +152,7 @@ def test_cookies_of_other_programs_do_not_hide_ours(get, keys, foreign) -> None:
     assert get("/", foreign.encode("latin-1")).status_code == 403
 
 
-def test_what_is_refused_is_kept_nowhere(get) -> None:
+def test_a_refusal_is_not_cached_and_sends_no_referrer(get) -> None:
     answer = get("/?token=wrong")
     assert (answer.headers["cache-control"], answer.headers["referrer-policy"]) == ("no-store", "no-referrer")
 

@@ -183,7 +183,7 @@ def test_a_parameter_is_set_within_what_is_left_to_operators() -> None:
         ({"do": "event", "name": "done"}, "is fired by the executive itself"),
     ],
 )
-def test_what_makes_no_sense_changes_nothing(command, message) -> None:
+def test_an_invalid_command_is_refused_and_the_run_reaches_its_goal(command, message) -> None:
     watched = Watched()
     with pytest.raises(InputError, match=message.replace("(", r"\(")):
         watched.control.obey(command)

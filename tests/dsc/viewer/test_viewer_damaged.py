@@ -91,7 +91,7 @@ def test_a_last_line_that_was_cut_is_said_and_the_rest_is_there(tmp_path) -> Non
         ([HEADER, *LINES[:3], "junk", *LINES[5:]], "this is not record"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_shown_is_refused_with_its_line(tmp_path, lines, message) -> None:
+def test_a_damaged_trace_is_refused_with_its_line(tmp_path, lines, message) -> None:
     with pytest.raises(InputError) as refused:
         read(tmp_path, *lines)
     assert message in str(refused.value)

@@ -78,7 +78,7 @@ def test_all_that_a_run_says_gets_there_as_its_trace_has_it(live):
         assert end == {"seq": len(texts) + 1, "t": 0.5, "type": "end", "cause": None}
 
 
-def test_that_there_is_no_more_is_told(live):
+def test_the_end_of_a_live_run_is_sent_to_the_page(live):
     with socket(live) as connection:
         live.end()
         until(connection, ended=True, live=False)

@@ -55,7 +55,7 @@ def test_the_page_has_no_scripts_inside_and_asks_nobody_else():
     assert all(not address.startswith(("http", "//")) for address in re.findall(r'(?:src|href)="([^"]*)"', page))
 
 
-def test_what_others_wrote_is_named_with_its_licence():
+def test_every_bundled_package_is_named_with_its_version_in_the_licences():
     packages = json.loads((SOURCE / "package.json").read_text())["dependencies"] if SOURCE.exists() else {}
     said = (STATIC / "licenses.md").read_text()
     assert [name for name, version in packages.items() if f"{name} - {version}" not in said] == []

@@ -64,7 +64,7 @@ def test_a_run_that_has_ended_is_its_records(tmp_path):
         assert (log.header["run"], log.header["seed"]) == ("ping", 7)
 
 
-def test_what_a_run_adds_is_followed_until_its_end(tmp_path):
+def test_records_of_a_running_run_are_followed_until_its_end(tmp_path):
     seen: list[tuple[Any, Any, int]] = []
 
     def halfway() -> None:

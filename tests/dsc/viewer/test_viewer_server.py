@@ -156,7 +156,7 @@ def test_the_knowledge_of_any_moment_is_asked(run, page) -> None:
     assert (first["holds"], first["why"]["truth"]) == (False, False)
 
 
-def test_what_is_known_of_one_thing(run, page) -> None:
+def test_facts_about_an_object_all_name_it(run, page) -> None:
     said = page.post("/facts", json={"seq": len(run[0]), "about": "cup1"}).json()
     assert said["facts"]
     assert all("cup1" in fact for fact in said["facts"])
@@ -173,7 +173,7 @@ def test_what_is_known_of_one_thing(run, page) -> None:
         ("/query", [1], "a request is one JSON object"),
     ],
 )
-def test_what_makes_no_sense_is_said_in_one_line(page, path, asked, message) -> None:
+def test_an_invalid_request_is_answered_with_status_400_and_its_error(page, path, asked, message) -> None:
     answer = page.post(path, json=asked)
     assert (answer.status_code, message in answer.json()["error"]) == (400, True)
 

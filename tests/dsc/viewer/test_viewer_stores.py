@@ -61,7 +61,7 @@ def test_a_store_that_was_compacted_begins_where_it_is_known(store):
         assert log.record(1)["values"] == [["weight", "cup", 0.2]]
 
 
-def test_what_others_add_is_followed(store):
+def test_changes_by_another_writer_are_followed(store):
     with records_of(store) as log:
         before, more = len(log), threading.Event()
         log.on_more(more.set)
@@ -88,7 +88,7 @@ def test_an_empty_store_is_a_world_without_facts(tmp_path):
         (None, "there is no file"),
     ],
 )
-def test_what_is_neither_a_trace_nor_a_store_is_said(tmp_path, content, said):
+def test_a_file_that_is_neither_a_trace_nor_a_store_is_refused(tmp_path, content, said):
     file = tmp_path / "thing"
     if content is not None:
         file.write_bytes(content)

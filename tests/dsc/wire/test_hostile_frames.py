@@ -114,7 +114,7 @@ FRAMES = (
 
 @given(st.lists(st.tuples(st.sampled_from(["peer", "robot", "x"]), FRAMES), max_size=8))
 @settings(max_examples=EXAMPLES, deadline=None)
-def test_whatever_arrives_the_host_answers_an_honest_caller_afterwards(frames):
+def test_a_host_answers_an_honest_caller_after_any_frames(frames):
     problems = []
 
     async def main():
@@ -138,7 +138,7 @@ def test_whatever_arrives_the_host_answers_an_honest_caller_afterwards(frames):
 
 @given(SAID, PLAIN, PLAIN)
 @settings(max_examples=EXAMPLES, deadline=None)
-def test_whatever_a_host_answers_its_user_has_an_error_of_one_kind_or_a_component(said, hull, condition):
+def test_any_answer_of_a_host_gives_a_component_or_an_error_of_one_kind(said, hull, condition):
     async def main():
         transport = LocalTransport()
         host = Endpoint("robot", transport)
