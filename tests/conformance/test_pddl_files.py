@@ -38,13 +38,13 @@ def test_there_are_files_of_every_kind(pairs, sorted_out):
     assert {":task", ":process", ":observe", "#t", ":constraints"} <= {error.construct for error in refused.values()}
 
 
-def test_what_is_refused_stands_in_the_line_that_is_named(sorted_out):
+def test_a_refused_construct_stands_in_the_line_that_the_error_names(sorted_out):
     for error in sorted_out[1].values():
         line = Path(error.place.source).read_text(encoding="utf-8").splitlines()[error.place.line - 1]
         assert line.lower().index(error.construct) >= error.place.column - 1
 
 
-def test_what_is_read_is_what_the_peer_reads(pairs, sorted_out):
+def test_accepted_files_are_read_as_by_the_peer_reader(pairs, sorted_out):
     taken, _ = sorted_out
     for pair in pairs:
         if pair.name in taken:
