@@ -91,6 +91,6 @@ def test_an_arc_that_is_removed_ends_the_turn_and_a_new_one_comes_next():
 
 
 @pytest.mark.parametrize("hidden", ["anna", "wall"])
-def test_what_cannot_be_seen_takes_its_turn_only(hidden):
+def test_an_object_that_cannot_be_seen_takes_only_its_own_turn(hidden):
     seen = looks(Head("anna"), 60, f"(want-see robot {hidden}) (want-see robot bert)")
     assert seen.count("bert") > 12

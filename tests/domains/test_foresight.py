@@ -66,7 +66,7 @@ def test_the_believed_world_is_the_real_one_as_far_as_it_was_seen():
         (["pick-up can1 table", "drive table sink", "throw-away can1 sink"], 2, "a can does not go to the sink"),
     ],
 )
-def test_what_physics_does_not_allow_is_foreseen_with_a_reason(plan, at, said):
+def test_a_physically_impossible_step_fails_in_the_simulation_with_a_reason(plan, at, said):
     verdict = Physics().foresee(Plan(tuple(map(step, plan))), seen(make_world()))
     assert (verdict.valid, verdict.failing_step) == (False, at)
     assert said in verdict.why

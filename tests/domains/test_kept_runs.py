@@ -136,7 +136,7 @@ STRANGERS = {
 
 
 @pytest.mark.parametrize("stranger", STRANGERS)
-def test_what_has_the_name_of_the_world_and_is_none_stays_as_it_is(tmp_path, planner, stranger):
+def test_a_foreign_file_at_the_path_of_the_world_is_refused_and_unchanged(tmp_path, planner, stranger):
     spoil, message = STRANGERS[stranger]
     spoil(tmp_path / "run.kb-world")
     before = [(path.name, path.lstat(), path.is_fifo() or path.read_bytes()) for path in sorted(tmp_path.iterdir())]

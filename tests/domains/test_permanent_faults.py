@@ -73,7 +73,7 @@ def test_surfaces_and_the_operator_stay_reachable():
         assert world.faults.unreachable == []
 
 
-def test_what_hides_behind_a_touched_item_is_touched_too():
+def test_an_item_hidden_behind_a_touched_item_is_touched():
     back, rear = new_item("cup", "back", behind="front"), new_item("cup", "rear", behind="back")
     world = TableWorld([new_item("can", "front"), back, rear])
     world.faults.ungraspable["front"] = GRASP_FAILED
@@ -84,7 +84,7 @@ def test_what_hides_behind_a_touched_item_is_touched_too():
     assert world.touched() == {"front"}
 
 
-def test_what_is_in_a_carrier_stuck_in_another_is_touched_too():
+def test_an_item_in_a_carrier_stuck_in_another_carrier_is_touched():
     world = at_table(0, faults=0.0)
     world.items.move(world.items["cup1"], "cup2")
     world.items.move(world.items["cup2"], "cup3")

@@ -48,7 +48,7 @@ def test_items_by_name_beside_numbered_ones():
     assert (world.faults.seed, world.faults.chance, world.robot_at) == (7, 0.25, "shelf")
 
 
-def test_what_the_command_line_says_wins():
+def test_the_seed_and_faults_of_a_call_override_those_of_the_scenario():
     scenario = Scenario.parse(NAMED)
     world = scenario.world(seed=0, faults=0.0)
     assert (world.faults.seed, world.faults.chance) == (0, 0.0)

@@ -183,7 +183,7 @@ def with_a_missing_item_in_a_cup() -> Robot:
     return robot
 
 
-def test_what_was_missing_in_a_carrier_that_is_thrown_away_is_accounted_for():
+def test_a_missing_item_in_a_discarded_carrier_counts_as_disposed():
     robot = with_a_missing_item_in_a_cup()
     robot.do("look_into", carrier="cup2", surface="table")
     robot.do("pick_up", item="cup2", surface="table")
@@ -192,7 +192,7 @@ def test_what_was_missing_in_a_carrier_that_is_thrown_away_is_accounted_for():
     assert (robot.all("disposed"), robot.all("missing")) == (["cup1", "cup2"], [])
 
 
-def test_what_was_missing_and_is_in_the_hand_is_not_missing():
+def test_a_missing_item_that_the_robot_takes_out_is_no_longer_missing():
     robot = with_a_missing_item_in_a_cup()
     robot.do("take_out", item="cup1", carrier="cup2", surface="table")
     assert robot.all("missing") == []

@@ -44,7 +44,7 @@ def test_every_promise_holds_in_every_run(planners):
 
 
 @pytest.mark.parametrize("seed", [1193, 3193, 4208])
-def test_what_was_done_just_before_an_operator_stopped_it_is_known_after_a_crash(seed, planners):
+def test_an_action_just_before_an_operator_stop_is_known_after_a_crash(seed, planners):
     assert lived(seed, planners).wrong == []
 
 
@@ -75,7 +75,7 @@ def test_a_broken_promise_is_counted_once_for_each_run():
     assert "no report 1, hangs 1" in lines[-1]
 
 
-def test_what_goes_on_and_on_is_a_hang(planners, tmp_path, monkeypatch):
+def test_a_run_that_does_not_end_is_reported_as_a_hang(planners, tmp_path, monkeypatch):
     monkeypatch.setattr(soak_run, "MOST_STEPS", 3)
     outcome = Trial(0, FAULTS, planners, tmp_path).run()
     assert outcome.wrong == [("hangs", "more than 3 macrosteps")]

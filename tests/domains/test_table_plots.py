@@ -71,7 +71,7 @@ def missing(run):
     return sorted(str(item) for (item,) in run.knowledge.match("missing", (None,)))
 
 
-def test_what_is_not_in_view_is_missing_from_the_outermost_carrier_inwards():
+def test_an_item_out_of_view_is_missing_and_so_are_the_items_inside_it():
     stacked = FACTS + " (inside cup3 cup2) (lies-at cup4 floor) (in-view cup1)"
     assert missing(looked("(and)", stacked)) == ["cup1", "cup2", "cup3"]
     run = looked("(and (in-view cup1) (in-view cup2))", stacked)
@@ -79,7 +79,7 @@ def test_what_is_not_in_view_is_missing_from_the_outermost_carrier_inwards():
     assert run.emitted == (Event("recognised", {"surface": "table", "count": 1}),)
 
 
-def test_what_somebody_said_while_the_camera_looked_is_not_forgotten():
+def test_an_item_moved_elsewhere_during_a_look_is_not_recorded_as_missing():
     """The item was on the table when the look began; by its end it is known to be elsewhere."""
     run = looked(
         "(and (in-view cup1) (in-view cup2) (not (lies-at cup3 table)) (lies-at cup3 floor))",

@@ -131,7 +131,7 @@ def test_a_full_hand_makes_calls_impossible(world, robot, call):
     assert {**world.state(), "done": None} == {**before, "done": None}
 
 
-def test_what_is_inside_another_is_not_gone_but_not_free_either(robot):
+def test_an_item_inside_another_item_cannot_be_picked_up(robot):
     robot.pick_up("cup1", "table")
     robot.stack("cup1", "cup2", "table")
     assert robot.pick_up("cup1", "table").outcome == "not_possible"
@@ -185,7 +185,7 @@ def test_room_that_is_taken_cannot_be_given_up_too(world, robot):
     assert robot.take_out("can1", "crisp_can2", "table").sightings[0].room == "one"
 
 
-def test_what_was_thrown_away_fits_nothing_new(robot):
+def test_a_discarded_item_is_in_no_pair_of_fitting_items(robot):
     robot.recognise("table")
     robot.pick_up("cup1", "table")
     robot.drive("sink")
@@ -215,7 +215,7 @@ def test_the_goal_counts_what_ever_stood_on_the_table(world):
     assert [(left.item, left.where, left.reason) for left in world.left()] == [("cup1", "floor", None)]
 
 
-def test_what_comes_to_the_table_inside_another_counts_too():
+def test_an_item_that_reaches_the_table_inside_another_item_counts_as_left():
     world = TableWorld([new_item("cup", "cup1", surface="shelf"), new_item("cup", "cup2", surface="shelf")])
     world.items.move(world.items["cup1"], "cup2")
     world.move_item("cup2", "table")
