@@ -44,7 +44,7 @@ def test_a_sample_of_mutations_ends_as_it_may(target):
 
 
 @pytest.mark.parametrize("file", KEPT, ids=lambda file: f"{file.parent.name}/{file.name}")
-def test_what_was_found_before_ends_as_it_may(file):
+def test_a_corpus_file_causes_no_finding(file):
     found = fuzz.tried(fuzz.Case(file.parent.name, file.read_bytes()))
     assert found is None, found.said
 
