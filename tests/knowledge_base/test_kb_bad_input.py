@@ -93,7 +93,7 @@ def test_questions(kb, text: str, kind: type[InputError], where: str, nearest: s
 
 
 @pytest.mark.parametrize("wrong", [3, None, b"(quiet)", ["quiet"]])
-def test_what_is_no_text_is_no_condition(wrong) -> None:
+def test_a_condition_that_is_not_text_is_refused(wrong) -> None:
     with pytest.raises(ParseError, match="a condition is written as text, not as"):
         parse_condition(wrong)
 

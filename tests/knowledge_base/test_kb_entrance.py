@@ -88,7 +88,7 @@ def test_a_condition_is_text(kb, question, text, params):
     one_line(error)
 
 
-def test_who_asks_a_fact_is_told_to_write_it_as_text(kb):
+def test_the_error_for_a_fact_passed_to_ask_shows_it_as_text(kb):
     with pytest.raises(InputError, match=r"write it as text: \(heavy cup1\)"):
         kb.ask(fact("heavy", "cup1"))
 
@@ -160,7 +160,7 @@ def test_a_condition_fires_on_terms_that_are_known(kb, how):
         (SCHEMA, "a\0b", None, "a store's path is text"),
     ],
 )
-def test_what_cannot_be_opened_leaves_no_file(tmp_path, monkeypatch, schema, path, durability, means):
+def test_a_store_that_cannot_be_opened_leaves_no_file(tmp_path, monkeypatch, schema, path, durability, means):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=means):
         KnowledgeBase.open(schema, path, durability)
@@ -189,7 +189,7 @@ BAD = ["(> (/ 1 0) 1)", "(> (* 1e308 1e308) 1)", "(= (- (* 1e308 10) 1) 0)"]
 
 @pytest.mark.parametrize("bad", BAD)
 @pytest.mark.parametrize("text", ["{}", "(not {})", "(and {} (heavy cup1))", "(or (quiet) {})", "(imply {} (quiet))"])
-def test_what_cannot_be_computed_is_an_error_where_nothing_else_decides(kb, bad, text):
+def test_an_incomputable_part_that_decides_a_condition_is_an_error(kb, bad, text):
     for question in ("ask", "query", "explain"):
         with pytest.raises(InputError, match="cannot be computed"):
             getattr(kb, question)(text.format(bad))

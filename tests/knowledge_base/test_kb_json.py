@@ -110,7 +110,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("kind", BAD)
-def test_what_is_wrong_is_named(tmp_path, kind):
+def test_an_invalid_json_world_is_refused_with_its_file_and_the_reason(tmp_path, kind):
     text, message = BAD[kind]
     path = tmp_path / "world.json"
     path.write_text(text)

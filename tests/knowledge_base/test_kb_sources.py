@@ -95,7 +95,7 @@ def test_installed_conditions_fire_at_the_present_version(kb, source):
     assert told == [(1, True), (2, False)]
 
 
-def test_whoever_waits_is_woken(kb, source):
+def test_a_source_update_wakes_a_waiting_task(kb, source):
     async def wait():
         firing = asyncio.ensure_future(kb.install("(= (pose cup1 map) (geometry 7))").wait())
         await asyncio.sleep(0)
@@ -189,7 +189,7 @@ def test_closing_gives_back_what_was_set(kb):
     kb.bind_source("weight", "cup1", reference="scale 2").update(9)
 
 
-def test_what_is_fed_cannot_be_set(kb, source):
+def test_a_value_from_a_source_cannot_be_set(kb, source):
     source.update((1,))
     for content in ((1,), (2,), ()):
         with pytest.raises(SchemaError, match=r"\(pose cup1 map\) is fed by 'tf:map/cup1' and cannot be set"):
@@ -239,7 +239,7 @@ def test_a_failed_removal_closes_nothing(kb, source):
         (("weight", "cup1"), "", InputError, "a source's reference is text"),
     ],
 )
-def test_what_cannot_be_bound(kb, source, args, reference, kind, message):
+def test_an_invalid_binding_of_a_source_is_refused(kb, source, args, reference, kind, message):
     with pytest.raises(kind, match=message):
         kb.bind_source(*args, reference=reference)
     assert kb.sources() == [source]
@@ -258,7 +258,7 @@ def test_nothing_is_bound_inside_a_transaction(kb):
         ((float("inf"),), InputError, "finite"),
     ],
 )
-def test_what_cannot_be_fed(kb, source, content, kind, message):
+def test_an_invalid_source_update_is_refused_and_keeps_the_latest_value(kb, source, content, kind, message):
     source.update((1,))
     with pytest.raises(kind, match=message):
         source.update(content)

@@ -51,7 +51,7 @@ def test_a_statement_and_its_negation_are_refused_with_both_places(kb) -> None:
         told(["(clean mug)", "(cup red)", "(and (clean red) (not (clean mug)))"], kb, "FACT")
 
 
-def test_what_holds_already_is_no_change(kb) -> None:
+def test_a_statement_that_holds_already_is_no_change(kb) -> None:
     assert not told(["(on mug table)", "(cup mug)", "(= (weight mug) 2)"], kb)
 
 
@@ -82,7 +82,7 @@ def test_a_thing_is_taken_back_by_any_of_its_types(kb) -> None:
         ("", "SAID 1:1:1: the text is empty where an effect is expected"),
     ],
 )
-def test_what_cannot_be_told_says_where_and_why(kb, statement: str, message: str) -> None:
+def test_an_invalid_statement_is_refused_with_a_reason(kb, statement: str, message: str) -> None:
     with pytest.raises(InputError) as caught:
         told([statement], kb, "SAID")
     assert message in str(caught.value)
@@ -99,7 +99,7 @@ def test_what_cannot_be_told_says_where_and_why(kb, statement: str, message: str
         ("(clean ?x)", "the variable '?x' is not bound"),
     ],
 )
-def test_what_cannot_be_taken_back_says_where_and_why(kb, statement: str, message: str) -> None:
+def test_an_invalid_retraction_is_refused_with_a_reason(kb, statement: str, message: str) -> None:
     with pytest.raises(InputError) as caught:
         retracted([statement], kb, "SAID")
     assert message in str(caught.value)

@@ -110,7 +110,7 @@ def test_one_change_after_the_other_is_their_composition(first, second) -> None:
     assert described(one)[2:] == described(two)[2:]
 
 
-def test_who_asks_late_gets_the_same_graph(kb) -> None:
+def test_a_graph_built_late_equals_an_updated_graph(kb) -> None:
     early, late = kb, KnowledgeBase.from_json(kb.to_json())
     followed = early.graph
     for world in (early, late):
@@ -176,7 +176,7 @@ def test_the_effective_change_is_announced_with_version_and_author(kb) -> None:
     assert change.delta == Delta(added=(Fact("quiet"),))
 
 
-def test_what_changes_nothing_is_not_announced(kb) -> None:
+def test_a_change_without_effect_is_not_announced(kb) -> None:
     heard: list[Change] = []
     version = kb.version
     kb.subscribe(heard.append)

@@ -120,7 +120,7 @@ def test_names_like_those_of_a_store_are_free_where_there_is_none(tmp_path) -> N
         ("x" * 300, "File name too long"), ("loop", "Too many levels"), ("a\0b", "null"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_written_is_refused_at_once(tmp_path, name: str, why: str) -> None:
+def test_an_unwritable_output_is_refused_at_once(tmp_path, name: str, why: str) -> None:
     (tmp_path / "file").touch()
     (tmp_path / "loop").symlink_to("loop")
     with pytest.raises(InputError, match=why):
@@ -152,7 +152,7 @@ def test_a_new_file_has_the_mode_that_new_files_have(tmp_path) -> None:
     assert (tmp_path / "out").stat().st_mode == (tmp_path / "plain").stat().st_mode
 
 
-def test_what_cannot_be_encoded_leaves_everything_as_it_was(tmp_path) -> None:
+def test_an_output_that_cannot_be_encoded_leaves_all_files_unchanged(tmp_path) -> None:
     for name in ("a", "b"):
         (tmp_path / name).write_text("old")
     first, second = Output(tmp_path / "a", "--to"), Output(tmp_path / "b", "--to")
@@ -293,7 +293,7 @@ def test_a_stream_empties_only_what_begins_like_its_own(tmp_path) -> None:
         assert (tmp_path / name).read_text() == before
 
 
-def test_what_comes_after_the_check_is_kept_too(tmp_path) -> None:
+def test_a_file_that_appears_after_the_check_is_not_overwritten(tmp_path) -> None:
     streamed, written = Output(tmp_path / "a", "--trace", over="{"), Output(tmp_path / "b", "--to")
     (tmp_path / "a").write_text("notes")
     with pytest.raises(InputError, match="not a file of that kind"), streamed.stream():

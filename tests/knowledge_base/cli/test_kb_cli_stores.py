@@ -44,7 +44,7 @@ def test_a_new_store_says_what_may_be_said_and_takes_no_files_place(tmp_path) ->
         run("new", str(tmp_path / "a.kb"), "--domain", str(tmp_path / "domain.pddl"))
 
 
-def test_what_was_told_can_be_asked(store) -> None:
+def test_query_and_show_return_the_stored_facts_and_values(store) -> None:
     assert json.loads(run("query", store, "(on ?c ?where)", "--json"))["answers"] == [{"c": "mug", "where": "table"}]
     assert json.loads(run("query", store, "(on ?c ?where)", "--json", "-p", "where=table"))["answers"] == [{"c": "mug"}]
     assert json.loads(run("show", store, "--json")) == {
@@ -157,7 +157,7 @@ def test_a_drawing_is_svg(store, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("command", [("tell", "(clean mug)"), ("history",), ("at", "1"), ("import", "x.json")])
-def test_what_is_no_store_is_said_and_not_made(tmp_path, command: tuple[str, ...]) -> None:
+def test_a_missing_store_is_reported_and_not_created(tmp_path, command: tuple[str, ...]) -> None:
     (tmp_path / "my.kb").write_bytes(b"")
     verb, *rest = command
     with pytest.raises(InputError):
@@ -253,7 +253,7 @@ def test_a_key_that_was_used_says_so(store) -> None:
     )
 
 
-def test_how_a_query_will_be_looked_up(store) -> None:
+def test_the_option_explain_shows_the_lookup_steps_of_a_query(store) -> None:
     assert "(on ?c table)" in run("query", store, "(on ?c table)", "--explain")
     assert json.loads(run("query", store, "(on ?c table)", "--explain", "--json"))["steps"]
 

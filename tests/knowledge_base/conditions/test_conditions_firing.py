@@ -98,7 +98,7 @@ def test_each_fires_at_every_change_of_the_set_of_witnesses(kb) -> None:
     assert [truth for truth, _ in told] == [True, True, True, False]
 
 
-def test_what_is_true_already_does_not_fire(kb) -> None:
+def test_a_condition_that_is_true_already_does_not_fire(kb) -> None:
     tell(kb, ("on", "cup1", "shelf"))
     condition = kb.install("(on ?x ?p)", {"p": "shelf"})
     told = heard(condition)
@@ -141,7 +141,7 @@ def test_a_cancelled_condition_is_silent(kb) -> None:
     assert (told, condition.cancelled, condition.truth) == ([], True, False)
 
 
-def test_what_another_listener_cancels_is_not_told(kb) -> None:
+def test_a_condition_cancelled_by_another_listener_does_not_fire(kb) -> None:
     first, second = kb.install("(quiet)"), kb.install("(quiet)")
     first.subscribe(lambda _: second.cancel())
     told = heard(second)
@@ -207,7 +207,7 @@ def test_a_break_that_the_timer_overlooks_is_a_break(kb) -> None:
     assert told == []
 
 
-def test_what_is_true_already_begins_to_hold(kb) -> None:
+def test_a_condition_that_is_true_already_fires_after_its_hold_time(kb) -> None:
     tell(kb, ("quiet",))
     clock = FakeClock()
     told = heard(kb.install("(quiet)", hold_s=5, clock=clock))
@@ -382,7 +382,7 @@ def test_threads_that_install_cancel_and_commit_at_once_lose_nothing(kb) -> None
         ("(level can1 (+ (weight cup1) 1))", Delta(values={fact("weight", "cup1"): 4}), (False, True)),
     ],
 )
-def test_whatever_a_condition_reads_reaches_it(kb, text, change, truths) -> None:
+def test_a_condition_reflects_a_change_to_any_of_its_inputs(kb, text, change, truths) -> None:
     tell(kb, ("heavy", "cup1"), ("heavy", "cup2"), ("on", "cup1", "shelf"), ("level", "can1", 5))
     weigh(kb, "cup1", 2)
     condition = kb.install(text, {"new": "can9"} if "?new" in text else {})

@@ -33,7 +33,7 @@ def texts(svg: str) -> list[str]:
     return [node.text or "" for node in root.iter("{http://www.w3.org/2000/svg}text")]
 
 
-def test_what_is_said_of_one_thing_stands_on_its_card_and_of_two_on_an_arrow() -> None:
+def test_facts_about_one_object_appear_on_its_card_and_about_two_on_an_arrow() -> None:
     kb = world(fact("on", "c0", "table"), fact("clean", "c0"), fact("label", "c0", "Red <cup>"))
     kb.apply(Delta(values={fact("weight", "c0"): 0.25, fact("far", "c0", "table"): 3}), "me")
     shown = texts(draw(kb, "c0"))

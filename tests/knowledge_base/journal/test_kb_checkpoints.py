@@ -101,7 +101,7 @@ def test_a_log_that_grows_faster_than_it_is_tidied_up_is_kept_short_by_its_write
         assert kb.version == 1000
 
 
-def test_what_has_left_nothing_in_the_log_asks_for_nothing(path, monkeypatch):
+def test_an_empty_transaction_requests_no_checkpoint(path, monkeypatch):
     monkeypatch.setattr(write_transaction, "TIDY_UP_AFTER", 1)
     asked = []
 

@@ -158,7 +158,7 @@ def test_changes_since_a_version_come_in_order_with_author_and_delta(kb):
         (lambda kb: kb.at(version=1, time=1.0), "takes a version or a time"),
     ],
 )
-def test_what_is_not_there_is_said(kb, ask, means):
+def test_an_invalid_version_or_range_of_the_history_is_refused(kb, ask, means):
     with pytest.raises(InputError, match=means):
         ask(kb)
 
@@ -388,7 +388,7 @@ def test_closing_inside_a_transaction_drops_it(kb):
     assert not kb.ask("(quiet)")
 
 
-def test_what_cannot_be_written_as_text_is_refused(path):
+def test_an_author_or_key_with_a_lone_surrogate_is_refused(path):
     with opened(path) as kb:
         wrong: list[dict[str, Any]] = [{"author": "\ud800"}, {"author": "a", "key": "\ud800"}]
         for how in wrong:
@@ -469,7 +469,7 @@ def test_others_write_along_or_not_at_all(path):
         lambda c: c.executescript("CREATE TABLE runs (what TEXT)"),
     ],
 )
-def test_who_writes_along_cannot_end_the_commit(path, along):
+def test_rows_written_along_with_a_change_cannot_end_its_transaction(path, along):
     with opened(path) as kb:
         with pytest.raises(StoreError, match="rows written along with a change neither begin nor end a transaction"):
             kb.apply(QUIET, author="runs", along=along)
@@ -479,7 +479,7 @@ def test_who_writes_along_cannot_end_the_commit(path, along):
         assert [change.author for change in again.changes()] == ["a"]
 
 
-def test_who_tries_to_end_the_commit_and_goes_on_does_no_harm(path):
+def test_a_suppressed_attempt_to_commit_does_not_prevent_the_change(path):
     def stubborn(connection):
         with contextlib.suppress(sqlite3.Error):
             connection.commit()

@@ -65,7 +65,7 @@ def test_a_system_without_nameless_files_makes_it_under_another_name_first(tmp_p
     assert sorted(file.name for file in tmp_path.iterdir()) == ["s.kb", "x"]
 
 
-def test_what_cannot_be_made_leaves_nothing(tmp_path, monkeypatch):
+def test_a_store_that_cannot_be_created_leaves_no_file(tmp_path, monkeypatch):
     link = os.link
 
     def full(source, target, **how):

@@ -55,7 +55,7 @@ def test_the_rest_of_a_damaged_store_is_one_still(tmp_path, size) -> None:
     assert store_owning(tmp_path / "rest") == tmp_path / "rest"
 
 
-def test_what_is_no_database_belongs_to_no_store(tmp_path) -> None:
+def test_a_path_that_is_no_database_belongs_to_no_store(tmp_path) -> None:
     (tmp_path / "text").write_text("SQLite format 3\n" * 100, encoding="utf-8")
     (tmp_path / "empty").touch()
     (tmp_path / "short").write_text("x", encoding="utf-8")  # SQLite takes it for an empty database
@@ -107,7 +107,7 @@ OPENINGS: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.parametrize("opening", OPENINGS)
 @pytest.mark.parametrize("stranger", STRANGERS)
-def test_what_is_no_store_stays_as_it_is(tmp_path, stranger, opening) -> None:
+def test_a_path_that_is_no_store_is_refused_and_unchanged(tmp_path, stranger, opening) -> None:
     STRANGERS[stranger](tmp_path / "mine")
     refused(tmp_path, lambda: OPENINGS[opening](tmp_path / "mine"), name="mine" if "pipe" not in stranger else "")
 

@@ -107,7 +107,7 @@ def test_a_replica_can_be_fed_by_sources_of_its_own(writer, replica):
     assert source.closed
 
 
-def test_who_writes_has_nobody_to_follow(writer, tmp_path):
+def test_refresh_is_refused_for_a_writer_and_in_memory(writer, tmp_path):
     with pytest.raises(ConflictError, match=r"world.kb: version 1 is the newest, as this is the store's only writer"):
         writer.refresh()
     with pytest.raises(ConflictError, match="version 0 is the newest; in memory"):
@@ -123,7 +123,7 @@ def test_nothing_is_taken_in_inside_a_transaction(writer, replica):
         replica.refresh()
 
 
-def test_what_the_writer_forgot_cannot_be_taken_in(writer, replica):
+def test_a_refresh_over_compacted_versions_is_refused(writer, replica):
     writer.apply(ON_SHELF, author="writer")
     writer.apply(OFF_SHELF, author="writer")
     writer.compact()

@@ -148,7 +148,7 @@ FOREIGN = {
 
 @pytest.mark.parametrize("read_only", [False, True])
 @pytest.mark.parametrize("kind", FOREIGN)
-def test_what_is_no_store_or_damaged_is_refused_in_one_line(path, kind, read_only):
+def test_a_foreign_or_damaged_store_is_refused_with_a_message_of_one_line(path, kind, read_only):
     spoil, message = FOREIGN[kind]
     spoil(path)
     with pytest.raises(StoreError, match=message) as caught:

@@ -62,7 +62,7 @@ def test_each_change_keeps_its_version_and_the_file_gets_all_at_once(path):
     assert on_file(path)[0] == 3
 
 
-def test_who_hears_of_a_change_in_a_block_can_look_back(path):
+def test_a_listener_in_a_together_block_reads_past_versions(path):
     heard = []
     with KnowledgeBase.open(SCHEMA, path) as kb:
         kb.subscribe(lambda change: heard.append((kb.changes(since=change.version - 1), kb.at(version=change.version))))
@@ -146,7 +146,7 @@ def test_other_threads_wait_with_their_changes_and_not_with_their_questions(path
     assert on_file(path) == (2, ["p", "q"])
 
 
-def test_where_there_is_no_file_or_no_right_to_write_it_is_refused(path):
+def test_a_together_block_requires_a_writable_file_and_no_open_transaction(path):
     with pytest.raises(StoreError, match="in memory"), KnowledgeBase(SCHEMA).together():
         pass
     KnowledgeBase.open(SCHEMA, path).close()

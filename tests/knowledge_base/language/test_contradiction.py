@@ -36,7 +36,7 @@ from knowledge_base.world.state import WorldState
         ["(not (and))"],
     ],
 )
-def test_what_cannot_hold_together(together):
+def test_conditions_that_exclude_each_other_are_contradictory(together):
     assert contradictory(*map(condition, together))
 
 
@@ -53,7 +53,7 @@ def test_what_cannot_hold_together(together):
         ["(and)"],
     ],
 )
-def test_what_may_hold_together(together):
+def test_compatible_conditions_are_not_contradictory(together):
     assert not contradictory(*map(condition, together))
 
 
@@ -67,12 +67,12 @@ def test_what_may_hold_together(together):
         ("(p)", "(and)"),
     ],
 )
-def test_what_follows_from_what(narrow, wide):
+def test_a_narrow_condition_implies_a_wide_one_and_not_the_reverse(narrow, wide):
     assert implied(condition(wide), by=condition(narrow))
     assert not implied(condition(narrow), by=condition(wide))
 
 
-def test_what_covers_everything():
+def test_conditions_are_complete_only_if_one_of_them_always_holds():
     assert complete([condition("(< (f ?x) 4)"), condition("(>= (f ?x) 4)")])
     assert complete([condition("(p)"), condition("(not (p))")])
     assert complete([condition("(and (p) (q))"), condition("(not (p))"), condition("(not (q))")])
@@ -80,7 +80,7 @@ def test_what_covers_everything():
     assert not complete([])
 
 
-def test_what_a_condition_is_about():
+def test_the_subjects_of_a_condition_are_its_atoms_and_compared_terms():
     about = subjects(condition("(or (< 3 (f ?x)) (not (and (p) (= ?y cup))))"))
     assert about == {"(f ?x)", "(p)", "?y"}
 
@@ -95,7 +95,7 @@ BINDINGS = st.fixed_dictionaries({name: st.sampled_from(sorted(THINGS)) for name
 
 @PROPERTY
 @given(expressions(), expressions(), deltas(), BINDINGS)
-def test_what_holds_together_somewhere_is_never_called_contradictory(one, other, delta, bindings):
+def test_contradictory_implied_and_complete_agree_with_evaluation(one, other, delta, bindings):
     world = Overlay(WorldState(SCHEMA))
     try:
         world.apply(delta)

@@ -203,7 +203,7 @@ def weights() -> KnowledgeBase:
         (f"(forall (?i - item) (or (known ?i) {RATIO}))", True, None),
     ],
 )
-def test_what_cannot_be_computed_does_no_harm_where_another_part_decides(weights, text, truth, leaf) -> None:
+def test_an_incomputable_operand_is_harmless_if_another_operand_decides(weights, text, truth, leaf) -> None:
     params = {} if text.startswith(("(exists", "(forall")) else {"i": "a"}
     assert weights.ask(text, params) is truth
     why = weights.explain(text, params)
@@ -221,7 +221,7 @@ def test_what_cannot_be_computed_does_no_harm_where_another_part_decides(weights
     "text",
     [RATIO, f"(and (known ?i) {RATIO})", f"(or (good ?i) {RATIO})", f"(imply (known ?i) {RATIO})", f"(not {RATIO})"],
 )
-def test_where_it_would_decide_it_is_an_error(weights, text: str) -> None:
+def test_an_incomputable_operand_that_decides_is_an_error(weights, text: str) -> None:
     for ask in (weights.ask, weights.explain):
         with pytest.raises(InputError, match="division by zero"):
             ask(text, {"i": "a"})
@@ -232,7 +232,7 @@ def test_a_mistake_in_a_part_that_does_not_decide_is_an_error_all_the_same(weigh
         explain(parse_condition("(and (good a) (god a))"), weights)
 
 
-def test_what_it_costs_does_not_multiply_with_nesting() -> None:
+def test_the_size_of_an_explanation_does_not_multiply_with_nesting() -> None:
     kb = KnowledgeBase(WEIGHTS)
     kb.apply(Delta(nodes={f"i{n}": "item" for n in range(20)}), author="test")
     names = [f"?v{n}" for n in range(8)]

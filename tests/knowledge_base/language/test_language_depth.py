@@ -63,7 +63,7 @@ def nested(form: str, leaf: str, depth: int) -> str:
 
 @pytest.mark.parametrize("leaf", LEAVES)
 @pytest.mark.parametrize("form", FORMS)
-def test_what_can_be_read_can_be_used_in_every_way(kb, form: str, leaf: str) -> None:
+def test_a_condition_of_maximal_depth_supports_every_operation(kb, form: str, leaf: str) -> None:
     text = nested(form, leaf, MAX_DEPTH)
     flips = text.count("(not") + text.count("(imply") * (form == "premise")
 

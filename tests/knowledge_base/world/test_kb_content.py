@@ -144,7 +144,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("fluent", "content", "kind", "message"), REFUSED)
-def test_what_a_function_cannot_be_worth_is_refused(kb, fluent, content, kind, message):
+def test_an_invalid_function_value_is_refused_without_effect(kb, fluent, content, kind, message):
     before = kb.to_json()
     with pytest.raises(kind, match=message):
         kb.apply(Delta(values={fluent: content}), author="test")
@@ -315,7 +315,7 @@ def test_a_problem_has_the_goal_and_text_in_quotes(kb):
         (Delta(), {"goal": "(on ?x map)"}, "not bound"),
     ],
 )
-def test_what_a_problem_cannot_say_is_an_error(kb, delta, how, message):
+def test_to_pddl_refuses_an_invalid_number_name_or_goal(kb, delta, how, message):
     kb.apply(delta, author="test")
     with pytest.raises(InputError, match=message):
         kb.to_pddl(**{"domain": "kitchen", **how})

@@ -136,12 +136,12 @@ def test_bad_replacements(kb, delta, kind, message):
         ("quiet", SchemaError, "'quiet' has no argument that others could settle"),
     ],
 )
-def test_what_cannot_be_functional(name, kind, message):
+def test_a_predicate_that_is_unknown_or_without_arguments_cannot_be_functional(name, kind, message):
     with pytest.raises(kind, match=message):
         OPEN.with_functional(name)
 
 
-def test_that_a_predicate_is_functional_lasts(tmp_path):
+def test_functional_predicates_are_kept_in_stores_and_copies(tmp_path):
     path = tmp_path / "world.kb"
     with KnowledgeBase.open(HOUSE, path) as kb:
         kb.apply(Delta(nodes=NODES, added=(fact("at", "cup", "hall"),)), author="test")

@@ -71,7 +71,7 @@ def test_first_come_first_served(crowd: Crowd) -> None:
     assert crowd.goes() == ["change 1", "question 1", "question 2", "change 2", "question 3"]
 
 
-def test_who_asks_again_and_again_waits_for_a_change(crowd: Crowd) -> None:
+def test_a_repeated_query_waits_for_an_earlier_change(crowd: Crowd) -> None:
     with crowd.turn:
         crowd.asks("question 1", lambda: crowd.asks("question 3"))
         crowd.changes("change")
@@ -79,14 +79,14 @@ def test_who_asks_again_and_again_waits_for_a_change(crowd: Crowd) -> None:
     assert crowd.goes() == ["question 1", "change", "question 2", "question 3"]
 
 
-def test_who_changes_again_and_again_waits_for_a_question(crowd: Crowd) -> None:
+def test_a_repeated_change_waits_for_an_earlier_query(crowd: Crowd) -> None:
     with crowd.turn.changing():
         crowd.changes("change 1", lambda: crowd.changes("change 2"))
         crowd.asks("question")
     assert crowd.goes() == ["change 1", "question", "change 2"]
 
 
-def test_who_waits_for_the_end_of_a_long_turn_is_next(crowd: Crowd) -> None:
+def test_a_change_that_waits_for_the_end_of_alone_precedes_later_changes(crowd: Crowd) -> None:
     with crowd.turn.alone():
         crowd.changes("change 1", lambda: crowd.changes("change 3"))
         crowd.changes("change 2")
@@ -95,7 +95,7 @@ def test_who_waits_for_the_end_of_a_long_turn_is_next(crowd: Crowd) -> None:
     assert crowd.goes() == ["question", "change 1", "change 2", "change 3"]
 
 
-def test_who_changes_something_may_be_alone_with_it_while_others_wait_for_that(crowd: Crowd) -> None:
+def test_a_changing_thread_enters_alone_while_another_change_waits(crowd: Crowd) -> None:
     def is_alone() -> None:
         with crowd.turn.alone(), crowd.turn.alone(), crowd.turn.changing():
             crowd.asks("question")
@@ -124,7 +124,7 @@ def test_alone_means_that_others_ask_and_do_not_change(crowd: Crowd) -> None:
     assert crowd.goes() == ["own change", "change"]
 
 
-def test_who_is_alone_next_waits_for_the_end_of_a_change_that_came_first(crowd: Crowd) -> None:
+def test_alone_waits_for_the_end_of_an_earlier_change(crowd: Crowd) -> None:
     def change() -> None:
         while crowd.turn.waiting[0] == 0 and "alone" not in crowd.order:
             time.sleep(0)
@@ -156,7 +156,7 @@ def test_nothing_is_changed_inside_a_question(crowd: Crowd) -> None:
         pass
 
 
-def test_who_is_interrupted_while_waiting_keeps_nobody_waiting(crowd: Crowd, monkeypatch) -> None:
+def test_an_interrupted_wait_leaves_no_thread_in_the_line(crowd: Crowd, monkeypatch) -> None:
     """An interrupt ends the wait at a gate with an exception."""
 
     class Interrupted:
@@ -234,7 +234,7 @@ def asks(turn: ReadWriteLock) -> None:
 
 @pytest.mark.parametrize("other", [None, changes, is_alone, asks])
 @pytest.mark.parametrize("work", [changes, changes_within_a_change, is_alone, changes_and_asks_alone, asks])
-def test_whoever_is_interrupted_at_any_moment_leaves_nothing_taken(
+def test_an_interrupt_at_any_moment_leaves_the_lock_free(
     work: Callable[[ReadWriteLock], None], other: Callable[[ReadWriteLock], None] | None
 ) -> None:
     was_interrupted, moment = True, 0
