@@ -107,7 +107,7 @@ def test_goal_facts_that_exclude_each_other_are_named(world_of, goal, why):
     assert why_unsolvable(domain, world, parse_condition(goal)) == (why,)
 
 
-def test_what_would_have_to_come_before_itself_is_said(world_of):
+def test_a_cycle_of_needed_steps_is_explained(world_of):
     domain = PlanningDomain.parse("""(define (domain d) (:predicates (empty) (full) (done))
       (:action take :parameters () :precondition (empty) :effect (and (full) (not (empty))))
       (:action put :parameters () :precondition (full) :effect (and (empty) (done) (not (full)))))""")
@@ -125,7 +125,7 @@ def test_what_would_have_to_come_before_itself_is_said(world_of):
         (9, "(> (fuel) 9)", "(> (fuel) 9) cannot hold: (fuel) is at most 9"),
     ],
 )
-def test_who_only_uses_up_a_number_does_not_make_enough_of_it(world_of, fuel, goal, why):
+def test_an_action_that_only_decreases_a_number_cannot_satisfy_a_lower_bound(world_of, fuel, goal, why):
     domain = PlanningDomain.parse("""(define (domain d) (:predicates (there)) (:functions (fuel))
       (:action drive :parameters () :precondition (>= (fuel) 7) :effect (and (there) (decrease (fuel) 7)))
       (:action idle :parameters () :effect (decrease (fuel) 1)))""")

@@ -77,7 +77,7 @@ def _plans(found, domain, chance):
 
 
 @pytest.mark.parametrize(("goal", "why"), [("(> (f b) 1)", "(> (f b) 1) is false: 0 < 1"), ("(r)", "(r) is false")])
-def test_what_is_missing_at_the_end_is_said(goal, why):
+def test_the_verdict_on_a_plan_names_the_goal_that_it_misses(goal, why):
     domain = domain_of([("(and)", [], ["(p ?x)"], 0)])
     world = world_of(domain, (frozenset(), (0, 0, 0)), 0)
     verdict = validate(Plan((PlanStep("a0", ("a",)),)), domain, world, parse_condition(goal))

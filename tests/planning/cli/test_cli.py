@@ -279,7 +279,7 @@ class Anytime:
     ("function", "steps", "cost"),
     [("total-cost", 2, "cost 6, engine anytime"), ("driven", 1, "cost 1, engine anytime")],
 )
-def test_where_actions_have_costs_a_cheaper_plan_is_waited_for(run, tmp_path, monkeypatch, function, steps, cost):
+def test_a_cheaper_plan_is_awaited_if_actions_have_costs(run, tmp_path, monkeypatch, function, steps, cost):
     monkeypatch.setattr("planning.cli.solving.PlannerRace", Anytime)
     monkeypatch.setattr("planning.cli.solving.PATIENT_SECONDS", 0.05)
     monkeypatch.setattr(Anytime, "stopped", False)
@@ -322,7 +322,7 @@ JARS = """(define (domain jars) (:requirements :no-such-thing) (:types jar)
 SEAL = "(define (problem p) (:domain jars) (:objects a - jar) (:goal (sealed a)) (:metric minimize (price a)))"
 
 
-def test_where_no_engine_can_be_asked_the_condition_and_who_could_are_named(run, tmp_path, monkeypatch):
+def test_an_unsupported_condition_is_named_with_the_engines_that_support_it(run, tmp_path, monkeypatch):
     monkeypatch.setattr(registry.Engine, "lacks", lambda one: "pip install x" if "numeric" in one.features else "")
     (tmp_path / "jars.pddl").write_text(JARS)
     result = run(problem=SEAL, domains=[tmp_path / "jars.pddl"])

@@ -81,7 +81,7 @@ def test_the_cheaper_plan_is_carried_out_and_without_costs_the_shorter_one(text,
 
 
 @pytest.mark.parametrize(("text", "costs"), [(TRIP, (11, 7)), (FREE, (2, 3))])
-def test_what_steps_cost(text, costs):
+def test_the_cost_of_a_plan_is_the_total_cost_or_one_per_step(text, costs):
     domain, world = trip(text)
     cost = StepCosts(domain, Library()).total
     assert tuple(cost(steps(one), domain, world) for one in (SHORT, LONG)) == costs
@@ -89,7 +89,7 @@ def test_what_steps_cost(text, costs):
 
 
 @pytest.mark.parametrize("failures", [(), (EngineFailed("other", "it crashed"),)])
-def test_who_failed_beside_the_winner_is_told(failures):
+def test_the_record_of_a_found_plan_names_the_engines_that_failed(failures):
     domain, world = trip(TRIP)
     robot = ObedientRobot(domain)
     robot.knowledge = world

@@ -44,7 +44,7 @@ def test_the_same_problem_is_asked_once_and_the_answer_says_so():
     assert second.simulated_seconds == FOUND.simulated_seconds  # so that a run does not depend on what was run before
 
 
-def test_what_differs_in_anything_is_another_problem():
+def test_a_problem_that_differs_in_any_part_is_solved_anew():
     counting: Any = Counting(FOUND)
     others = [
         replace(PROBLEM, init=(START, GOAL)),
@@ -63,7 +63,7 @@ def test_a_proof_is_remembered_and_running_out_of_time_is_not():
         assert counting.asked == asked
 
 
-def test_what_was_not_asked_for_longest_is_forgotten():
+def test_a_full_cache_drops_the_least_recently_used_problem():
     counting: Any = Counting(FOUND)
     one, two, three = (replace(PROBLEM, domain=name) for name in "abc")
     solve(CachingPlanner(counting, largest=2), one, two, one, three, one)

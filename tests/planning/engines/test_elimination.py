@@ -48,7 +48,7 @@ def test_actions_that_the_goal_is_reached_without_are_left_out(chosen, left):
     assert indispensable(ERRAND, chosen) == left
 
 
-def test_what_only_served_a_needless_action_goes_with_it():
+def test_an_action_that_only_serves_a_needless_action_is_removed_too():
     key, door = Fact("key"), Fact("door-open")
     take = GroundAction(PlanStep("take-key"), (), (key,), ())
     unlock = GroundAction(PlanStep("unlock"), (key,), (door,), ())
@@ -76,7 +76,7 @@ _facts = st.lists(st.sampled_from([Fact("p", (i,)) for i in range(5)]), max_size
 @given(
     st.lists(st.tuples(_facts, _facts, _facts), min_size=1, max_size=5), _facts, st.lists(st.integers(0, 4), max_size=8)
 )
-def test_what_is_left_is_a_plan_of_which_nothing_can_be_spared(actions, init, tried):
+def test_the_remaining_actions_are_a_plan_without_a_needless_action(actions, init, tried):
     made = [
         GroundAction(PlanStep(f"a{i}"), needs, adds, tuple(one for one in gone if one not in adds))
         for i, (needs, adds, gone) in enumerate(actions)

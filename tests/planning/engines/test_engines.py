@@ -274,7 +274,7 @@ def test_a_forgotten_process_is_ended(scripted):
     assert gone([pid])
 
 
-def test_what_an_engine_leaves_among_its_temporary_files_goes_with_its_process(scripted):
+def test_temporary_files_of_an_engine_are_deleted_with_its_process(scripted):
     leaving = "import tempfile\nfor line in sys.stdin:\n    said = {'failed': tempfile.mkdtemp()}, {'ended': 0}\n"
     process = scripted(READY + leaving + "    print(*map(json.dumps, said), sep='\\n', flush=True)\n")
     process.start(60)
@@ -286,7 +286,7 @@ def test_what_an_engine_leaves_among_its_temporary_files_goes_with_its_process(s
     assert left.parent != Path(tempfile.gettempdir())
 
 
-def test_what_is_said_before_the_end_is_heard_in_order(scripted):
+def test_messages_before_the_end_arrive_in_order(scripted):
     process = scripted(answering('{"actions": [1]}', '{"actions": [2]}'))
     process.start(60)
     heard: list[Any] = []

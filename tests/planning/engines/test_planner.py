@@ -47,7 +47,7 @@ def test_no_plan_is_an_outcome():
     assert found.reason == "the search was exhausted"
 
 
-def test_what_is_unreachable_is_not_even_asked():
+def test_an_unreachable_goal_is_proven_unsolvable_without_an_engine():
     problem = Problem("d", {}, (), (), (), unreachable=("(tidy cup1)",))
     found = outcome("raise SystemExit(1)", problem)
     assert isinstance(found, ProvenUnsolvable)
@@ -155,7 +155,7 @@ def test_cheaper_plans_follow_the_first_and_dearer_ones_do_not():
     assert asyncio.run(run(answering(LONGER, LONGER, SOLVED, LONGER))) == [3, 2]
 
 
-def test_what_goes_wrong_after_a_plan_does_not_take_it_back():
+def test_an_engine_fault_after_a_plan_does_not_discard_the_plan():
     for rest in ("sys.stdin.readline(); time.sleep(600)", "os._exit(3)", "print('rubbish', flush=True)"):
         found = outcome(READY + f"sys.stdin.readline(); print({SOLVED!r}, flush=True); {rest}")
         assert isinstance(found, PlanFound), rest

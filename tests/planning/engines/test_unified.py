@@ -95,7 +95,7 @@ DOMAIN = PlanningDomain.parse("""
 """)
 
 
-def test_what_is_known_and_wanted_is_a_problem_of_theirs() -> None:
+def test_a_world_and_a_goal_convert_to_unified_planning_and_back() -> None:
     kb = KnowledgeBase(DOMAIN.schema)
     with kb.transaction("test") as tx:
         tx.add_node("van1", "van")
@@ -114,7 +114,7 @@ def test_what_is_known_and_wanted_is_a_problem_of_theirs() -> None:
     assert known(domain, start).ask("(and (at box home) (= (distance home depot) 3))")
 
 
-def test_what_they_cannot_read_is_named() -> None:
+def test_a_construct_that_unified_planning_cannot_read_is_named() -> None:
     kb = KnowledgeBase(DOMAIN.schema)
     with pytest.raises(InputError, match="'boxed'"):
         to_unified(DOMAIN, kb, "(boxed)")

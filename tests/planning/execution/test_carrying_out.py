@@ -87,7 +87,7 @@ def test_the_order_of_a_plan_that_continues_is_computed_outside_of_the_event_loo
     assert threads[0] is not threading.main_thread()
 
 
-def test_what_was_not_observed_in_time_is_done_again_without_the_planner():
+def test_a_step_without_its_observed_effect_is_repeated_without_the_planner():
     run = Run("(in cup b)", {"(take cup a)": [Delta()]})
     assert run.how == "reached"
     assert run.done == ["(take cup a)", "(take cup a)", "(go a b)", "(put cup b)"]
@@ -112,14 +112,14 @@ def test_a_step_that_fails_again_and_again_is_done_without_for_a_while():
     assert not any(action.step == PlanStep("go", ("a", "b")) for action in run.planner.asked[-1].actions)
 
 
-def test_where_there_is_no_plan_without_a_failed_step_it_is_tried_again():
+def test_a_failed_step_is_readmitted_if_every_plan_needs_it():
     run = Run("(at b)", {"(go a b)": [FAILED] * 2}, links=("a b", "b a"))
     assert run.how == "reached"
     assert run.done == ["(go a b)"] * 3
     assert run.said("readmitted") == [{"steps": ["(go a b)"]}]
 
 
-def test_what_fails_for_ever_is_given_up_with_a_reason():
+def test_a_step_that_always_fails_ends_the_plan_with_a_reason():
     run = Run("(at b)", {"(go a b)": [FAILED] * 99}, links=("a b", "b a"))
     assert run.how == "(go a b) has failed before, in the same way and the same situation: failed"
     assert run.said("gave_up") == [{"plot": "plan_3", "reason": run.how}]
@@ -131,7 +131,7 @@ def test_without_a_budget_for_new_plans_it_is_given_up_with_a_reason():
     assert run.how == "the budget of 0 new plans is used up: failed"
 
 
-def test_what_little_is_broken_is_mended_and_the_rest_of_the_plan_kept():
+def test_a_local_repair_keeps_the_rest_of_the_plan():
     dropped = Delta(removed=(fact("at", "b"), fact("holding", "cup")), added=(fact("at", "c"), fact("in", "cup", "c")))
     run = Run("(and (in cup d) (clean d) (clean c))", {"(go b c)": [dropped]}, links=("a b", "b c", "c d"))
     assert run.how == "reached"
@@ -180,7 +180,7 @@ def test_a_running_step_that_is_hit_itself_is_interrupted_and_the_reason_can_be_
     )
 
 
-def test_what_somebody_else_did_is_skipped_and_said():
+def test_a_step_achieved_by_another_author_is_skipped_and_recorded():
     run = Run("(and (clean a) (clean b) (clean c))", then=[(0.5, Delta(added=(fact("clean", "b"),)))])
     assert run.how == "reached"
     assert "(sweep b)" not in run.done
@@ -266,7 +266,7 @@ def test_a_plan_that_fails_in_the_simulation_is_rejected_and_another_one_found()
     assert run.said("rejected") == [{"step": "(go b c)", "reason": "the floor is wet", "engine": "breadth"}]
 
 
-def test_where_every_plan_fails_in_the_simulation_nothing_is_carried_out():
+def test_a_robot_executes_no_step_if_every_plan_fails_in_the_simulation():
     run = Run("(at b)", foresight=Slippery("(go a b)", "(go c b)"))
     assert run.done == []
     assert run.how.startswith("the simulation foresees that every plan fails: (go a b): the floor is wet")

@@ -110,7 +110,7 @@ def test_a_transient_failure_is_retried_with_derived_conditions():
 @pytest.mark.parametrize(
     "goal", ["(and (busy) (not (busy)))", "(exists (?a ?b - room) (and (at ?a) (at ?b) (not (= ?a ?b))))"]
 )
-def test_what_cannot_be_reached_is_never_claimed(goal):
+def test_an_unreachable_goal_ends_with_the_outcome_no_plan(goal):
     assert Run(goal).outcome.name == "no_plan"
 
 

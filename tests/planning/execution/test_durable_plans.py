@@ -151,7 +151,7 @@ def test_a_changed_planning_action_is_refused_with_the_difference(whole, planner
         assert robot.resume().finished
 
 
-def test_how_long_an_action_takes_and_what_is_derived_belong_to_the_domain():
+def test_the_statements_of_a_domain_cover_durations_and_derived_predicates():
     text = """
     (define (domain d) (:types lamp) (:predicates (on ?l - lamp) (dark))
       (:derived (dark) (forall (?l - lamp) (not (on ?l))))
@@ -209,7 +209,7 @@ def test_a_store_brings_its_own_knowledge(planner, tmp_path):
         Robot(DOMAIN, [], [], KnowledgeBase(DOMAIN.schema), planner, store=tmp_path / "run.kb", clock="simulated")
 
 
-def test_what_is_known_and_what_was_run_lasts_from_one_program_to_the_next(planner, tmp_path):
+def test_knowledge_and_runs_persist_from_one_program_to_the_next(planner, tmp_path):
     with executive(planner, tmp_path / "run.kb") as robot:
         robot.knowledge.apply(Delta(nodes={"a": "lamp"}, added=(fact("works", "a"),)), "me")
         assert robot.achieve("(on a)").finished

@@ -178,7 +178,7 @@ def test_wherever_it_is_broken_off_it_goes_on_as_it_would_have(tmp_path, goal, h
         kept.check(path, robot)
 
 
-def test_what_the_planner_has_answered_is_not_lost_when_something_else_was_heard_before_it(tmp_path):
+def test_a_pending_planner_event_is_not_lost_after_another_change(tmp_path):
     spoon = Delta(nodes={"spoon": "thing"})
 
     def also(sequencer):

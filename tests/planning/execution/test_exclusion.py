@@ -21,11 +21,11 @@ def pairs(problem):
     return list(goal_mutexes(problem, WorkLimit()))
 
 
-def test_what_one_action_takes_for_giving_the_other_excludes_it():
+def test_an_action_that_deletes_one_fact_to_add_another_makes_them_exclusive():
     assert pairs(Problem("d", {}, (HOME,), (HOME, AWAY, TIRED), (GO,))) == [(HOME, AWAY), (HOME, TIRED)]
 
 
-def test_what_can_be_had_one_after_the_other_does_not():
+def test_facts_that_hold_together_after_two_actions_are_not_exclusive():
     back = GroundAction(PlanStep("back"), (AWAY,), (HOME,), (AWAY,))
     assert pairs(Problem("d", {}, (HOME,), (HOME, AWAY, TIRED), (GO, back))) == [(HOME, AWAY)]
 
@@ -34,7 +34,7 @@ _some = st.lists(st.sampled_from(FACTS), max_size=2).map(lambda facts: tuple(dic
 
 
 @given(st.lists(st.tuples(_some, _some, _some), max_size=4), _some)
-def test_what_is_said_to_exclude_each_other_never_holds_together(actions, init):
+def test_facts_reported_as_exclusive_never_hold_together(actions, init):
     made = [
         GroundAction(PlanStep(f"a{i}"), needs, adds, tuple(one for one in gone if one not in adds))
         for i, (needs, adds, gone) in enumerate(actions)

@@ -68,13 +68,13 @@ def test_an_end_with_a_step_that_is_done_without_is_not_kept():
     assert local_repair(PlanProgress(STEPS, DOMAIN, GOAL), {STEPS[3]}, DOMAIN, world("d"), GOAL) is None
 
 
-def test_what_lacks_something_that_nothing_brings_is_not_mended():
+def test_a_missing_condition_that_no_action_achieves_is_not_repaired():
     here = world("d")
     here.apply(Delta(removed=(fact("sells", "c", "egg"),)), "test")
     assert local_repair(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL) is None
 
 
-def test_what_lacks_too_much_is_not_mended():
+def test_a_plan_with_too_many_missing_conditions_is_not_repaired():
     here = world("d")
     here.apply(Delta(removed=(fact("open", "b"), fact("open", "c"), fact("sells", "b", "nut"))), "test")
     assert local_repair(PlanProgress(STEPS, DOMAIN, GOAL), set(), DOMAIN, here, GOAL) is None

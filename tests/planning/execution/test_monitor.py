@@ -71,7 +71,7 @@ class Watched:
         self.kb.apply(DOMAIN.effects(self.progress.steps[number - 1], self.kb), "bob")
 
 
-def test_what_a_late_step_needs_is_watched_from_the_beginning():
+def test_the_monitor_reports_a_lost_condition_of_a_later_step():
     plan = Watched()
     plan.begin(1)
     change = plan.change("eve", gone="in p2 store")
@@ -81,7 +81,7 @@ def test_what_a_late_step_needs_is_watched_from_the_beginning():
     )
 
 
-def test_what_a_step_will_bring_is_not_missed_before():
+def test_the_monitor_ignores_the_loss_of_a_fact_that_a_later_step_adds():
     plan = Watched()
     plan.begin(1)
     plan.change("eve", now="at bob office")
@@ -127,7 +127,7 @@ def test_a_thing_that_is_gone_breaks_the_plan():
     assert [type(one) for one in plan.news] == [Broken] * len(plan.news) != []
 
 
-def test_what_touches_no_link_is_not_looked_at(monkeypatch):
+def test_a_change_outside_all_links_is_not_checked(monkeypatch):
     plan = Watched()
     plan.begin(1)
     looked = []
@@ -145,7 +145,7 @@ def test_the_goal_reached_by_somebody_else_is_heard_at_once():
     assert plan.news[-1] == GoalReached("eve")
 
 
-def test_what_somebody_else_did_already_is_skipped_when_the_next_step_begins():
+def test_an_effect_of_another_author_shortens_the_plan_when_the_next_step_begins():
     plan = Watched()
     plan.begin(1)
     plan.do(1)
@@ -243,7 +243,7 @@ def test_a_closed_monitor_says_nothing():
     assert plan.news == []
 
 
-def test_what_the_running_step_itself_has_broken_is_said_with_who_when_and_for_which_step():
+def test_a_break_by_the_running_step_names_its_author_its_version_and_the_step():
     plan = Watched()
     plan.begin(1)
     plan.change("bob", gone="open office")
@@ -326,7 +326,7 @@ def test_a_later_step_that_can_be_the_next_one_is_not_announced_while_one_is_at_
     assert plan.news == []
 
 
-def test_what_a_step_that_is_done_needed_is_not_watched_any_more(monkeypatch):
+def test_a_change_to_a_condition_of_a_finished_step_is_not_checked(monkeypatch):
     plan = Watched()
     plan.begin(1)
     plan.do(1)

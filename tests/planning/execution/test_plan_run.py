@@ -161,7 +161,7 @@ def test_two_attempts_at_equal_goals_are_different_after_a_restart():
 
 
 @pytest.mark.parametrize("state", PlanState)
-def test_what_is_remembered_of_a_plan_is_plain_data_and_is_recalled(state):
+def test_a_plan_run_converts_to_plain_data_and_back(state):
     run = plan_run(replaces="plan_0", state=state, successor=Successor(ROUND_ABOUT, "plan_2", 1), searching_since=2.5)
     run.begun.add(1)
     run.news.extend([Broken("no", "(at b)", 2, "somebody", 7), Shorter(STEPS[1:]), GoalReached("me")])

@@ -60,7 +60,7 @@ def a_world(facts=(), weights=(0, 0, 0), total=0):
     steps=st.lists(st.sampled_from(STEPS), max_size=5),
     goal=st.sampled_from(GOALS),
 )
-def test_what_is_needed_before_a_plan_holds_where_the_plan_reaches_the_goal(facts, weights, steps, goal):
+def test_the_needs_of_a_plan_hold_exactly_where_the_plan_is_valid(facts, weights, steps, goal):
     world = a_world(facts, weights)
     wanted = parse_condition(goal)
     needed = needed_before(steps, wanted)
@@ -79,7 +79,7 @@ def test_a_part_is_needed_by_the_first_step_that_needs_it_or_by_the_goal():
     assert found["(lit)"] == found["(open c)"] == 3
 
 
-def test_what_a_step_brings_is_not_needed_before_it():
+def test_a_fact_that_a_step_adds_is_not_needed_before_it():
     assert needs("(and (lit) (open c))", PlanStep("unpack", ("b",))).keys() >= {"(or (open b) (lit))"}
     assert "(lit)" not in needs("(and (lit) (open c))", PlanStep("unpack", ("b",)))
 

@@ -151,7 +151,7 @@ def started(records):
 
 @pytest.mark.parametrize("omitted", ["cup", "pot"])
 @pytest.mark.parametrize("parallel", [True, False])
-def test_what_comes_after_a_step_that_is_left_out_begins_once(omitted, parallel):
+def test_the_step_after_an_omitted_step_begins_once(omitted, parallel):
     """The step that is left out counts as done, so that nobody thinks there are steps of no use."""
     rule = "rules: [{before: light, when: (dirty ?step.thing), do: {tell: (lit ?step.thing), then: continue}}]"
     records: list[Record] = []
@@ -242,7 +242,7 @@ def test_a_step_that_would_begin_is_left_for_another_state():
     assert [one for one in studio.done if one[1] == "pot"] == [("light", "pot"), ("wipe", "pot"), ("show wide", "pot")]
 
 
-def test_what_a_rule_passes_arrives_with_the_state_it_leads_to():
+def test_a_parameter_passed_by_a_rule_reaches_the_target_state():
     rules = (
         "rules: [{on: blurred, do: {use: wipe, with: {thing: ?event.thing}, then: told, pass: {what: ?event.thing}}}]"
     )

@@ -119,7 +119,7 @@ def test_a_step_that_plans_for_itself_may_need_anything_and_is_alone():
     assert plot.state("step_1").after == ()  # nobody knows how long that takes
 
 
-def test_what_a_rule_uses_counts_as_well():
+def test_components_used_by_rules_determine_the_lanes_too():
     library = crew(emits=("stuck",))
     library.add(primitive("help", None, "helper", parameters=()))
     rules = parse_plot("""
@@ -131,7 +131,7 @@ rules: [{on: stuck, do: {use: help, then: retry}}]
     assert lanes(plot) == [[1], [2, 3, 4, 5]]
 
 
-def test_what_no_rule_answers_leads_to_the_end_of_its_own_region():
+def test_an_event_without_a_rule_leads_to_the_end_of_its_own_region():
     library = crew(emits=("stuck",))
     expanded = library.expanded(made(library))
     assert [t.target for t in expanded.state("step_2").on["stuck"]] == ["replan_2"]

@@ -111,7 +111,7 @@ def test_a_conflict_names_both_places_and_what_differs(files, first, second, bef
     assert said.index(before) < said.index(here)
 
 
-def test_what_a_piece_only_uses_another_may_say_more_about():
+def test_a_fragment_may_declare_more_about_a_type_that_another_only_uses():
     use = "(define (domain use) (:types cup - item) (:predicates (clean ?i - item)))"
     for pieces in ([use, "(define (domain b) (:types item - thing thing))"], [use, use]):
         assert PlanningDomain.from_fragments(pieces).schema.is_a("cup", "item")
@@ -170,7 +170,7 @@ PARTS = [
     st.lists(st.sets(st.integers(0, 3), min_size=1), min_size=len(PARTS), max_size=len(PARTS)),
     st.permutations(range(4)),
 )
-def test_how_a_domain_is_cut_and_in_which_order_it_comes_does_not_matter(owners, order):
+def test_a_domain_is_independent_of_the_division_and_order_of_its_fragments(owners, order):
     def piece(number):
         own = [part for part, fragments in zip(PARTS, owners, strict=True) if number in fragments]
         return f"(define (domain d) {' '.join(merged_sections(own))})"

@@ -109,7 +109,7 @@ def test_a_condition_with_millions_of_instances_is_one_link(row):
     assert "forall" in str(order.links[0])
 
 
-def test_what_falsifies_one_of_many_instances_waits_and_what_makes_it_true_precedes(row):
+def test_steps_that_change_one_of_many_instances_are_ordered_around_their_user(row):
     assert ordered(row, "cold", "heat o3").before == {(1, 2)}
     assert ordered(row, "heat o3", "cool o3", "cold").before == {(1, 2), (2, 3)}
     assert ordered(row, "cold", "heat o0").before == set()  # nothing is before o0
@@ -178,7 +178,7 @@ def test_steps_that_have_nothing_to_do_with_each_other_do_not_wait(shop):
     assert order_of(shop, "drill a", "drill b", "light").before == set()
 
 
-def test_what_only_adds_to_a_number_may_be_done_in_any_order_unless_somebody_asks_how_much_it_is(shop):
+def test_steps_that_only_add_to_a_number_are_unordered_unless_a_step_reads_it(shop):
     assert order_of(shop, "drill a", "drill b", goal="(> (spent) 1)").before == set()
     assert order_of(shop, "paint a", "paint b").before == {(1, 2)}
 
@@ -201,7 +201,7 @@ def test_a_disjunction_is_one_link_from_what_made_it_true(shop):
     assert order.before == {(1, 3)}
 
 
-def test_what_several_steps_bring_about_together_holds_when_the_last_is_done(shop):
+def test_a_link_from_several_steps_stands_after_the_last_of_them(shop):
     order = order_of(shop, "drill a", "drill b", goal="(> (spent) 1)")
     links = [link for link in order.links if link.user == 3]
     assert [link.provider for link in links] == [1, 2]
@@ -220,7 +220,7 @@ def test_a_plan_that_does_not_lead_to_the_goal_has_no_links(shop):
         order_of(shop, "drill a", goal="(drilled b)")
 
 
-def test_what_follows_from_facts_is_brought_about_by_who_brings_about_the_facts(world_of):
+def test_a_derived_fact_is_provided_by_the_steps_that_add_its_base_facts(world_of):
     domain = PlanningDomain.parse("""
 (define (domain kitchen) (:types pan)
   (:predicates (hot ?p - pan) (oiled ?p - pan) (ready ?p - pan) (fried ?p - pan))
@@ -284,7 +284,7 @@ def test_no_more_pairs_are_kept_than_by_unified_planning(texts, domain_file, cle
     assert all(order.earlier[n] <= allowed[n] for n in allowed)
 
 
-def test_who_uses_up_a_number_does_not_provide_what_is_left_of_it(world_of):
+def test_a_step_that_decreases_a_number_does_not_provide_the_remainder(world_of):
     domain = PlanningDomain.parse("""
 (define (domain drive) (:types place) (:predicates (at ?p - place)) (:functions (fuel) (warmth))
   (:action go :parameters (?from ?to - place) :precondition (and (at ?from) (>= (- (fuel) 2) 1) (not (< (warmth) 1)))
@@ -301,7 +301,7 @@ def test_who_uses_up_a_number_does_not_provide_what_is_left_of_it(world_of):
     assert order.before == {(1, 2), (2, 3), (3, 4)}
 
 
-def test_what_is_so_only_while_a_step_lasts_is_not_so_afterwards(world_of):
+def test_a_fact_that_holds_only_during_a_step_does_not_hold_after_it(world_of):
     domain = PlanningDomain.parse("""
 (define (domain paint) (:requirements :durative-actions :negative-preconditions) (:types thing)
   (:predicates (painted ?t - thing) (busy))

@@ -42,7 +42,7 @@ def timed(*steps):
 MENDING = timed(("strike m", 0, 5), ("mend f m", 0, 2), ("mend g m", 2.5, 2))
 
 
-def test_what_must_hold_all_the_time_is_provided_by_who_has_begun(cellar):
+def test_an_over_all_condition_is_provided_by_a_running_step(cellar):
     order = linked(MENDING, CELLAR, cellar, parse_condition("(and (mended f) (mended g))"))
     assert list(map(str, order.links)) == [
         "0 -(unused m)-> 1", "0 -(free)-> 2", "1 -(light m)-> 2", "1 -(light m)-> 3", "2 -(free)-> 3",
@@ -89,14 +89,14 @@ def fuel_links(plan, world):
     return [str(link) for link in links if "fuel" in str(link)]
 
 
-def test_who_uses_up_a_number_does_not_provide_what_is_left(road):
+def test_a_step_that_decreases_a_number_does_not_provide_the_remainder(road):
     plan = timed(("drive a b", 0, 2), ("fill", 2.5, 1), ("drive b c", 4, 2))
     assert fuel_links(plan, road) == [
         "0 -(>= (fuel) 3)-> 1", "0 -(>= (fuel) 0)-> 1", "2 -(>= (fuel) 3)-> 3", "2 -(>= (fuel) 0)-> 3",
     ]  # fmt: skip
 
 
-def test_who_uses_up_a_number_at_the_moment_at_which_another_adds_to_it_does_not_provide_it(road):
+def test_a_decrease_at_the_moment_of_an_increase_does_not_provide_the_number(road):
     plan = timed(("fill", 0, 1), ("drive a b", 1, 2), ("fill", 3, 1), ("drive b c", 4.5, 2))
     assert [link for link in fuel_links(plan, road) if link.endswith("-> 4")] == [
         "1 -(>= (fuel) 3)-> 4", "1 -(>= (fuel) 0)-> 4", "3 -(>= (fuel) 3)-> 4", "3 -(>= (fuel) 0)-> 4",

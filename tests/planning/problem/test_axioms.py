@@ -136,7 +136,7 @@ def test_there_is_a_plan_if_and_only_if_the_axioms_say_so(opened, stuck, parts):
         assert all(step.action in domain.actions for step in plan.steps)
 
 
-def test_what_was_derived_is_gone_when_what_it_followed_from_is():
+def test_a_derived_fact_ends_with_the_facts_that_it_follows_from():
     """The goal asks for a way and for its last room to be stuck, which ends the way."""
     domain, world = grid(fact("at", "a"), fact("open", "a", "b"), fact("open", "b", "c"))
     assert plan_for(domain, world, "(reach a c)").steps == ()
@@ -156,7 +156,7 @@ def test_what_was_derived_is_gone_when_what_it_followed_from_is():
         ("(imply (sees a) (lit a))", "the goal asks for the opposite of 'reach'"),
     ],
 )
-def test_that_something_does_not_follow_cannot_be_asked_for(goal, said):
+def test_a_goal_that_negates_a_derived_predicate_is_refused(goal, said):
     with pytest.raises(UnsupportedGoalError, match=said):
         plan_for(*grid(fact("at", "a")), goal)
 

@@ -98,7 +98,7 @@ def test_a_schedule_that_mends_while_the_match_burns_is_valid():
     ],
     ids=["goes out", "before the light", "too short", "too long", "used twice"],
 )
-def test_what_is_wrong_with_a_schedule_is_said_of_a_step(timed, failing, why):
+def test_the_verdict_on_an_invalid_schedule_names_the_failing_step_and_the_reason(timed, failing, why):
     found = said(cellar(1, 1), *timed)
     assert (found.valid, found.failing_step) == (False, failing)
     assert why in found.why
@@ -115,7 +115,7 @@ def test_two_that_need_the_same_hand_at_one_moment_disturb_each_other():
     assert (found.valid, "at the same moment" in found.why) == (False, True)
 
 
-def test_what_is_needed_all_the_time_may_end_with_it():
+def test_an_over_all_condition_may_end_together_with_its_step():
     assert said(cellar(1, 1, burns=4.0), ("strike m0", 0.0, 4.0), ("mend f0 m0", 0.0, 4.0)).valid
 
 
@@ -152,7 +152,7 @@ def test_the_posed_problem_has_a_form_with_durations_that_survives_json():
     assert (strike.span.least, strike.span.most) == (5.0, 5.0)
 
 
-def test_what_cannot_be_reached_whatever_goes_on_at_the_same_time_is_proven():
+def test_a_goal_that_concurrent_actions_cannot_reach_is_proven_unreachable():
     problem = posed(matches=0)
     assert problem.unreachable == ("(mended f0)", "(mended f1)")
     assert not problem.one_at_a_time

@@ -50,7 +50,7 @@ def test_numbers_that_nobody_changes_ask_nothing_of_an_engine(jars):
     assert found(jars, "(forall (?j - jar) (and (washed ?j) (> (size ?j) 1)))") == []
 
 
-def test_who_could_plan_is_said_with_how_to_get_it(jars):
+def test_the_error_for_an_unsupported_goal_names_capable_engines_and_their_install(jars):
     goal = parse_condition("(exists (?j - jar) (sealed ?j))")
     said = why_no_engine(jars, goal, Unsupported("", ("numeric",), (("enhsp", "pip install x"),)))
     assert said.endswith("(> (litres ?j) 2); no installed engine can do that, enhsp could (pip install x)")

@@ -71,7 +71,7 @@ def test_a_derived_predicate_that_holds_is_a_goal_that_holds():
     assert build_problem(*rooms(), parse_condition("(connected a c)")).goal == ()
 
 
-def test_what_nobody_changes_is_the_least_fixpoint():
+def test_a_static_derived_predicate_is_the_least_fixpoint():
     """Nothing is connected through a closed room, so the way leads into it."""
     domain, world = rooms(fact("closed", "b"))
     assert len(plan_for(domain, world, "(at robby c)").steps) == 2

@@ -42,7 +42,7 @@ def least_cost(domain, start, limit, goal):
 
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(ACTIONS, START, GOAL)
-def test_what_is_posed_has_a_plan_exactly_if_there_is_one_and_at_the_same_cost(actions, start, goal_text):
+def test_a_problem_has_a_plan_exactly_if_the_domain_has_one_of_the_same_cost(actions, start, goal_text):
     facts, numbers, limit = start
     domain, goal, state = domain_of(actions), parse_condition(goal_text), (frozenset(facts), numbers)
     world = world_of(domain, state, limit)

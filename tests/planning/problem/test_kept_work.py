@@ -64,7 +64,7 @@ def test_a_way_to_do_a_step_that_is_added_later_is_used_in_the_next_plan():
 
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(st.lists(st.sampled_from(STEPS), max_size=6), st.sampled_from(GOALS))
-def test_what_no_step_touches_is_needed_as_if_each_had_been_asked(steps, goal_text):
+def test_causal_needs_equal_a_full_regression_over_all_steps(steps, goal_text):
     goal = parse_condition(goal_text)
     needed = dict.fromkeys(conjuncts(goal))
     for step in reversed(steps):

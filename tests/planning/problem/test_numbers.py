@@ -79,7 +79,7 @@ def test_goals_about_numbers_are_reached(jars, goal, steps):
     assert len(found(jars, kitchen(jars), goal).steps) == steps
 
 
-def test_what_no_action_changes_is_folded_in(jars):
+def test_a_number_that_no_action_changes_is_replaced_by_its_value(jars):
     problem = build_problem(jars, kitchen(jars), parse_condition("(= (litres big) 4)"))
     bounds = {str(bound) for action in problem.actions for bound in action.bounds}
     assert "(<= (+ (litres big) (litres small)) 3)" in bounds
@@ -109,7 +109,7 @@ def test_a_number_that_no_possible_action_changes_is_proven_out_of_reach(jars):
     assert why == "(> (poured) 0) cannot hold: (poured) is 0"
 
 
-def test_what_an_action_lacks_may_be_a_number(jars):
+def test_an_explanation_names_the_number_that_an_action_lacks(jars):
     domain = PlanningDomain.parse("""(define (domain d) (:types lamp) (:predicates (on ?l - lamp) (wired))
       (:functions (charge))
       (:action load :precondition (wired) :effect (increase (charge) 1))

@@ -51,7 +51,7 @@ def test_a_goal_with_too_many_parts_for_the_time_says_so(world_of):
         build_problem(domain, world, goal, patience=WorkLimit(0.01))
 
 
-def test_what_was_broken_off_is_no_part_of_the_next_problem(world_of):
+def test_an_interrupted_construction_does_not_affect_the_next_problem(world_of):
     domain = PlanningDomain.parse(LAMPS)
     small, large = (world_of(domain.schema, {f"l{i}": "lamp" for i in range(n)}) for n in (2, 8))
     goal = parse_condition("(forall (?l - lamp) (on ?l))")
@@ -78,7 +78,7 @@ def test_work_that_does_not_ask_is_left_alone_when_its_time_is_up():
     never.set()
 
 
-def test_what_the_work_raises_comes_to_the_one_who_waits():
+def test_an_exception_of_background_work_reaches_its_caller():
     with pytest.raises(ZeroDivisionError):
         asyncio.run(aside(lambda: 1 / 0))
 

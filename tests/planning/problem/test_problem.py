@@ -97,7 +97,7 @@ def test_a_surface_in_the_goal_stays(clean_up, table):
     assert len(breadth_first(problem)) == 4
 
 
-def test_what_the_goal_does_not_ask_about_is_left_out(clean_up, table):
+def test_a_problem_omits_actions_objects_and_facts_irrelevant_to_the_goal(clean_up, table):
     problem = build_problem(clean_up, table(cups=3), parse_condition("(robot-at shelf)"))
     assert {a.step.action for a in problem.actions} == {"drive"}
     assert set(problem.objects) == {"operator", "shelf"}
@@ -228,7 +228,7 @@ LAMPS = """(define (domain lamps)
 """
 
 
-def test_what_is_computed_from_things_that_stay_is_evaluated_when_the_problem_is_posed():
+def test_a_predicate_computed_from_static_values_is_evaluated_at_construction():
     domain = PlanningDomain.parse(LAMPS.format(more=""), None, [in_reach, lit])
     world = KnowledgeBase(domain.schema)
     nodes = dict.fromkeys(("low", "high", "dark"), "lamp")
@@ -246,7 +246,7 @@ def test_what_is_computed_from_things_that_stay_is_evaluated_when_the_problem_is
 
 
 @pytest.mark.parametrize("effect", ["(broken ?l)", "(not (broken ?l))", "(assign (height ?l) 0)"])
-def test_what_is_computed_from_things_that_actions_change_cannot_be_planned_with(effect):
+def test_a_predicate_computed_from_values_that_actions_change_is_refused(effect):
     more = f"(:action change :parameters (?l - lamp) :effect {effect})"
     domain = PlanningDomain.parse(LAMPS.format(more=more), "lamps.pddl", [in_reach, lit])
     world = KnowledgeBase(domain.schema)

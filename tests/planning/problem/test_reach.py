@@ -42,7 +42,7 @@ FEW = st.sets(st.sampled_from([*FACTS[3:5], *FACTS[-12:-6], *FACTS[5:7]]), max_s
 
 @settings(max_examples=100, derandomize=True, deadline=None)
 @given(ALL, st.lists(FEW, min_size=1, max_size=6), st.sampled_from(GOALS))
-def test_what_is_found_again_is_what_comes_of_working_it_out_anew(start, turns, goal_text):
+def test_incremental_reachability_and_pruning_equal_a_new_computation(start, turns, goal_text):
     world, builder, goal = KnowledgeBase(DOMAIN.schema), ProblemBuilder(DOMAIN), parse_condition(goal_text)
     nodes = {**dict.fromkeys(PLACES, "place"), **dict.fromkeys(BOXES, "box")}
     world.apply(Delta(nodes=nodes, added=tuple(start)), "test")

@@ -84,7 +84,7 @@ def test_timed_parts_inside_quantifiers_and_conditions(matches):
 
 
 @pytest.mark.parametrize(("start", "end", "there"), [("a", "b", {"b"}), ("a", "a", set())])
-def test_what_the_end_deletes_is_gone_also_where_variables_coincide(matches, world_of, start, end, there):
+def test_a_deletion_at_the_end_applies_also_to_coinciding_variables(matches, world_of, start, end, there):
     world = world_of(matches.schema, {"a": "place", "b": "place"}, [fact("at", start)])
     world.apply(matches.effects(PlanStep("walk", (start, end)), world), author="test")
     assert {answer["p"] for answer in world.query("(at ?p)")} == there
@@ -137,7 +137,7 @@ def test_a_mistake_in_a_timed_part_is_named_with_its_line(old, new, line, said):
         ("(at start (handfree))", "(preference p (at start (handfree)))", 17, "preference"),
     ],
 )
-def test_what_goes_beyond_is_refused_by_name(old, new, line, construct):
+def test_an_unsupported_timed_construct_is_refused_with_its_name_and_line(old, new, line, construct):
     assert old in MATCHES
     with pytest.raises(UnsupportedConstructError) as caught:
         PlanningDomain.parse(MATCHES.replace(old, new), "m.pddl")

@@ -73,7 +73,7 @@ def test_each_program_has_components_of_its_own():
     assert programs[0].components[0] is not programs[1].components[0]
 
 
-def test_what_is_needed_comes_first_and_once():
+def test_a_needed_bundle_comes_first_and_only_once():
     one, two = Bundle("one", needs=("two",)), Bundle("two", needs=("one",))
     there = {"handling": HANDLING, "one": one, "two": two}
     assert [bundle.name for bundle in gathered([TASKS, "handling", "one"], there)] == [
@@ -97,7 +97,7 @@ def test_a_bundle_that_is_not_there_is_named_with_who_needs_it(wanted, said):
     assert said in str(error.value)
 
 
-def test_what_is_no_bundle_is_refused():
+def test_a_value_that_is_no_bundle_is_refused():
     with pytest.raises(InputError, match="a bundle is a Bundle or the name of an installed one, not 5"):
         gathered([5], {})  # type: ignore[list-item]
 

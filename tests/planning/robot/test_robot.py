@@ -223,7 +223,7 @@ def test_a_stop_is_obeyed_while_the_problem_is_still_being_posed():
     assert planner.asked == 0
 
 
-def test_what_somebody_else_breaks_is_noticed_while_a_step_runs():
+def test_a_break_by_another_author_is_noticed_while_a_step_runs():
     robot, lamps = executive(Answers(found("a", "b"), found("a", "b", "c")))
 
     def prepare(sequencer):
@@ -303,7 +303,7 @@ def test_a_skill_that_works_for_another_state_is_somebody_else_to_the_monitor():
     ],
     ids=["change", "not_a_number", "no_data"],
 )
-def test_what_is_handed_in_wrongly_is_told_to_whoever_did_and_changes_nothing(hand_in, said):
+def test_an_invalid_change_or_event_raises_in_its_caller_and_has_no_effect(hand_in, said):
     robot, _ = executive(Answers(found("a", "b")))
 
     def prepare(sequencer):

@@ -95,7 +95,7 @@ def test_a_file_with_one_bundle_need_not_name_it(tmp_path):
         ("import sys\nsys.exit(4)\n", r"SystemExit: 4 \(.*other.py:2\)"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_named_with_its_line(tmp_path, text, said):
+def test_an_invalid_bundle_file_is_refused_with_its_cause(tmp_path, text, said):
     (tmp_path / "other.py").write_text(text)
     with pytest.raises(InputError, match=said):
         bundle_at(str(tmp_path / "other.py"))
@@ -112,7 +112,7 @@ def test_what_is_wrong_in_a_file_is_named_with_its_line(tmp_path, text, said):
         ("", "neither an entry point 'dsc.bundles' in its pyproject.toml nor a robot.py"),
     ],
 )
-def test_what_is_wrong_in_a_project_is_named(project, pyproject, said):
+def test_an_invalid_bundle_project_is_refused_with_its_cause(project, pyproject, said):
     (project / "pyproject.toml").write_text(pyproject)
     with pytest.raises(InputError, match=said):
         bundle_at(str(project))

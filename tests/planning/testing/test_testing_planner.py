@@ -38,7 +38,7 @@ def run(faults, *reached):
         (Fault.PLANNER_LIES, "the plan found does not lead to the goal"),
     ],
 )
-def test_whatever_it_does_the_run_ends_and_says_why(fault, why):
+def test_a_planner_fault_ends_the_run_with_its_reason(fault, why):
     faults = Faults(1, 1.0, {fault})
     end, reasons, calls = run(faults)
     assert end.finished
