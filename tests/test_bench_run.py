@@ -30,7 +30,7 @@ def test_every_way_to_run_a_chart_is_timed_and_many_plots_at_once(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_what_a_run_pays_once_does_not_count(tmp_path):
+def test_the_timing_of_a_run_excludes_one_time_costs(tmp_path):
     said = """
 import sys, time
 from pathlib import Path

@@ -157,7 +157,7 @@ def test_bad_input_is_told_to_programs_as_json(dsc, tmp_path):
         (["run", "clean-up-table", "--store", "."], "is a folder, not a regular file", None),
     ],
 )
-def test_what_is_wrong_with_the_words_is_told_to_programs_as_json(dsc, words, message, nearest):
+def test_an_invalid_command_line_is_reported_as_json(dsc, words, message, nearest):
     status, out, err = dsc(*words, "--json")
     said = json.loads(out)
     assert (status, err, said["outcome"], said["nearest"]) == (2, "", "bad_input", nearest)
@@ -190,13 +190,13 @@ PRINTING = [["doctor"], ["doctor", "--json"], ["run", "clean-up-table", "--json"
 
 @pytest.mark.parametrize("words", PRINTING, ids=" ".join)
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
-def test_what_cannot_be_printed_is_one_line_and_a_status(words):
+def test_an_output_error_prints_one_line_and_sets_the_exit_status(words):
     with Path("/dev/full").open("w") as full:
         assert installed(words, full) == (74, "dsc: cannot write: No space left on device\n")
 
 
 @pytest.mark.parametrize("words", PRINTING[1:], ids=" ".join)
-def test_who_reads_no_more_is_not_complained_about(words):
+def test_a_closed_pipe_sets_the_exit_status_without_a_message(words):
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as pipe:
