@@ -108,7 +108,7 @@ class TransportSuite:
         assert sorted(n for _, n in done) == list(range(40))
 
     @in_loop
-    async def test_what_cannot_be_done_is_refused_with_the_reason(self) -> None:
+    async def test_an_impossible_call_is_refused_with_its_reason(self) -> None:
         """Cases: a handler that raises an error, an unknown kind, an answer that is not plain data."""
         transport = self.transport()
         server, client = Endpoint("server", transport), Endpoint("client", transport)
@@ -429,7 +429,7 @@ class TransportSuite:
             await remote.life.become_active(1, active=False)
 
     @in_loop
-    async def test_what_a_component_needs_is_waited_for_and_missed(self) -> None:
+    async def test_a_skill_waits_for_needed_components_and_ends_without_them(self) -> None:
         """Cases: a required component is local or remote, is deployed late, is lost without a message, and returns."""
         transport, robot, clock = self.transport(), SuiteRobot(), LoopClock()
         robot.mode = "scanning"

@@ -34,7 +34,7 @@ class TestLocalInRealTime(TransportSuite):
     test_a_silent_death_frees_what_the_dead_one_needed = None  # type: ignore[assignment]
     test_a_silent_death_is_noticed_and_a_return_too = None  # type: ignore[assignment]
     test_a_call_is_executed_once_and_answered = None  # type: ignore[assignment]
-    test_what_a_component_needs_is_waited_for_and_missed = None  # type: ignore[assignment]
+    test_a_skill_waits_for_needed_components_and_ends_without_them = None  # type: ignore[assignment]
     test_a_stream_of_something_else_is_refused_with_the_reason = None  # type: ignore[assignment]
     test_a_component_that_pushes_is_one_like_any_other = None  # type: ignore[assignment]
 

@@ -33,7 +33,7 @@ LONG = {
     "test_a_timed_push_comes_again_and_its_silence_is_noticed",
     "test_components_are_active_while_an_active_component_needs_them",
     "test_the_newest_value_arrives_and_time_never_runs_backwards",
-    "test_what_a_component_needs_is_waited_for_and_missed",
+    "test_a_skill_waits_for_needed_components_and_ends_without_them",
 }
 BRIEF = {
     "test_a_cancellation_arrives",
