@@ -14,6 +14,7 @@ from dsc.outcomes import Outcome
 from dsc.skills import skill
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Delta, fact
+from knowledge_base.language.checking.inputs import require_methods
 
 
 class Reached(Outcome):
@@ -57,7 +58,7 @@ class Arm(Component):
     def __init__(self, chain: Chain, driver: JointDriver) -> None:
         super().__init__()
         self._chain = chain
-        self._driver = driver
+        self._driver = require_methods(driver, JointDriver)
         declared = {"pace": Parameter("number", default=1.0, least=0.05, most=1.0)}
         for joint in chain.joints:
             declared[f"{joint.name}_least"] = Parameter("number", default=joint.least, changed_by="profile")

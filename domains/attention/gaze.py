@@ -8,6 +8,7 @@ from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.outcomes import Outcome
 from dsc.skills import skill
+from knowledge_base.language.checking.inputs import require_methods
 
 
 class GazeDriver(Protocol):
@@ -43,7 +44,7 @@ class Attention(Component):
 
     def __init__(self, driver: GazeDriver) -> None:
         super().__init__()
-        self._driver = driver
+        self._driver = require_methods(driver, GazeDriver)
 
     @skill(after_crash="repeat")
     async def turn_to(self, call: SkillCall, what: str) -> Turned | NotVisible:

@@ -10,6 +10,7 @@ from dsc.components.component import Component
 from dsc.errors import SkillError
 from dsc.outcomes import Outcome
 from dsc.skills import skill
+from knowledge_base.language.checking.inputs import require_methods
 
 
 class Said(Outcome):
@@ -42,7 +43,7 @@ class Dialogue(Component):
 
     def __init__(self, *channels: Channel) -> None:
         super().__init__()
-        self._channels = channels
+        self._channels = tuple([require_methods(channel, Channel) for channel in channels])
         self.questions = 0
 
     @skill(after_crash="repeat")

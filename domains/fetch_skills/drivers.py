@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, Protocol, TypeVar
+from typing import Literal, Protocol
 
 from dsc.calls import SkillCall
-from knowledge_base.errors import InputError
-from knowledge_base.language.checking.inputs import shown
 
 Point = tuple[float, float]
 """A position in metres."""
 Avoidance = Literal["wide", "narrow"]
-_Driver = TypeVar("_Driver")
 
 
 class PlatformDriver(Protocol):
@@ -68,11 +65,3 @@ class HandDriver(Protocol):
             SkillError: the device has failed.
         """
         ...
-
-
-def require_methods(driver: _Driver, kind: type[object]) -> _Driver:
-    """Return a driver; raise `InputError` if it lacks a method of its kind."""
-    missing = [name for name in vars(kind) if name[0] != "_" and not callable(getattr(driver, name, None))]
-    if missing:
-        raise InputError(f"{shown(driver)} is no {kind.__name__}: it has no method '{missing[0]}'", found=missing[0])
-    return driver

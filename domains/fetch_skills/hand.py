@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from domains.fetch_skills.drivers import HandDriver, require_methods
+from domains.fetch_skills.drivers import HandDriver
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.outcomes import Outcome
 from dsc.skills import skill
 from knowledge_base.facts import Delta, fact
+from knowledge_base.language.checking.inputs import require_methods
 
 
 class Taken(Outcome):

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated
 
-from domains.fetch_skills.drivers import Avoidance, PathFinder, PlatformDriver, Point, require_methods
+from domains.fetch_skills.drivers import Avoidance, PathFinder, PlatformDriver, Point
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.components.parameters import Parameters, parameter
@@ -15,7 +15,7 @@ from dsc.outcomes import Outcome
 from dsc.skills import skill
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.language.checking.inputs import require_methods, shown
 
 Position = Annotated[list[float], "geometry"]
 """Coordinates x and y in metres, from the knowledge base."""

@@ -10,7 +10,6 @@ from domains.fetch_skills import Hand, Mapper, PathPlanner, Platform
 from dsc.calls import SkillCall
 from dsc.errors import SkillError
 from dsc.text.profiles import Profile
-from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
 from planning import Robot
 
@@ -146,12 +145,6 @@ def test_a_path_of_names_is_refused_by_its_form():
     with robot_of(Named()) as robot:
         end = robot.run("move_platform", {"place": "desk"})
     assert "the stops of a path are pairs (x, y) in metres, not 'desk'" in str(end.reason)
-
-
-@pytest.mark.parametrize(("part", "method"), [(Platform, "drive"), (PathPlanner, "path"), (Hand, "grasp")])
-def test_a_driver_without_a_method_is_refused(part, method):
-    with pytest.raises(InputError, match=f"it has no method '{method}'"):
-        part(object())
 
 
 def test_the_profile_limits_the_speed_that_plots_set():

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from typing import TypeVar
 
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError, type_name
 from knowledge_base.facts import VALUE_TYPES, Delta, Fact, Value
 from knowledge_base.language.syntax.expression import Expression, free_variables
 
 _NO_CHANGE = Delta()
+_Part = TypeVar("_Part")
 
 
 def shown(value: object) -> str:
@@ -45,6 +47,16 @@ def require_able(part: object, method: str, what: str) -> None:
         raise InputError(f"{what} is an object, not a class; an instance is made by {part.__name__}()")
     if not callable(getattr(part, method, None)):
         raise InputError(f"{what} needs a method '{method}', which {shown(part)[:60]} lacks")
+
+
+def require_methods(part: _Part, kind: type[object]) -> _Part:
+    """Return a part, e.g. a driver; raise `InputError` if it lacks a method of its protocol `kind`."""
+    if isinstance(part, type):
+        raise InputError(f"a {kind.__name__} is an object, not a class; an instance is made by {part.__name__}()")
+    missing = [name for name in vars(kind) if name[0] != "_" and not callable(getattr(part, name, None))]
+    if missing:
+        raise InputError(f"{shown(part)[:60]} is no {kind.__name__}: it has no method '{missing[0]}'", found=missing[0])
+    return part
 
 
 def require_condition(text: object) -> None:
