@@ -16,7 +16,7 @@ PARTS = [
     (Hand, "grasp"),
     (Attention, "turn_to"),
     (Dialogue, "show"),
-    (lambda driver: Arm(Chain((), 0.0), driver), "angles"),
+    (lambda driver: Arm(Chain(()), driver), "angles"),
 ]
 
 
