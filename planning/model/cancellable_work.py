@@ -15,13 +15,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from knowledge_base.errors import described
+from knowledge_base.language.evaluation.world_protocol import Bounds, Meter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 T = TypeVar("T")
-
-_SPARINGLY = 256  # calls of `spend`; reading the clock takes longer than one piece of work
 
 
 class WorkLimitError(Exception):
@@ -36,8 +35,10 @@ class WorkLimitError(Exception):
         self.doing = doing
 
 
-class WorkLimit:
-    """A limit in real time for blocking work.
+class WorkLimit(Meter):
+    """A limit in real time for blocking work, which calls `spend` for each small piece.
+
+    `spend` raises `WorkLimitError` after the limit, and after `cancel`.
 
     Attributes:
         doing: a description of the work in progress, for error messages.
@@ -49,8 +50,8 @@ class WorkLimit:
     def __init__(self, seconds: float = math.inf) -> None:
         self.doing = "constructing the problem"
         self._deadline = time.monotonic() + seconds
-        self._cancelled = False
-        self._spent = 0
+        self._cancelled = threading.Event()
+        super().__init__(Bounds(seconds=seconds, cancelled=self._cancelled.is_set))
 
     @property
     def left(self) -> float:
@@ -59,17 +60,12 @@ class WorkLimit:
 
     def cancel(self) -> None:
         """Stop the work at its next call of `spend`; any thread may call this method."""
-        self._cancelled = True
+        self._cancelled.set()
+        self.check_soon()
 
-    def spend(self) -> None:
-        """Count one small piece of work; the work must call this method regularly.
-
-        Raises:
-            WorkLimitError: the time limit has passed, or `cancel` was called.
-        """
-        self._spent += 1
-        if self._cancelled or (self._spent % _SPARINGLY == 0 and not self.left):
-            raise WorkLimitError(self.doing)
+    def end(self, reason: str) -> WorkLimitError:  # noqa: ARG002  the caller knows its limit
+        """Return the error that names the work in progress."""
+        return WorkLimitError(self.doing)
 
 
 @contextlib.contextmanager

@@ -114,13 +114,13 @@ class _BoundReachedError(Exception):  # not an `InputError`: the evaluator must 
 
 
 class Meter:
-    """Counter of the work of one query, which ends the query at its bounds.
+    """Counter of work, e.g. of one query, which ends the work at its bounds.
 
     Args:
-        bounds: the bounds of the query.
+        bounds: the bounds of the work.
 
     Attributes:
-        work: number of facts and objects visited so far.
+        work: amount of work so far; of a query, the number of facts and objects visited.
     """
 
     def __init__(self, bounds: Bounds | None) -> None:
@@ -156,14 +156,22 @@ class Meter:
             said = shortened(question if isinstance(question, str) else to_text(question), _LONGEST_SHOWN)
             raise OutOfBoundsError(f"{reached}: {said}", work=self.work, seconds=seconds) from None
 
+    def check_soon(self) -> None:
+        """Check the bounds at the next piece of work."""
+        self._next_check = 0
+
+    def end(self, reason: str) -> Exception:
+        """Return the error that ends the work."""
+        return _BoundReachedError(reason)
+
     def _check(self) -> None:
         bounds, seconds = self._bounds, self._bounds.now() - self._began
         if bounds.cancelled is not None and bounds.cancelled():
-            raise _BoundReachedError("the query was cancelled")
+            raise self.end("the query was cancelled")
         if bounds.work is not None and self.work > bounds.work:
-            raise _BoundReachedError(f"the query visits more than {bounds.work} facts and objects")
+            raise self.end(f"the query visits more than {bounds.work} facts and objects")
         if bounds.seconds is not None and seconds > bounds.seconds:
-            raise _BoundReachedError(f"the query takes longer than {bounds.seconds:g} s")
+            raise self.end(f"the query takes longer than {bounds.seconds:g} s")
         self._next_check = self.work + CHECK_EVERY
         if bounds.work is not None:
             self._next_check = min(self._next_check, bounds.work + 1)
