@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsc.cli.wire import REALM, AsJson, Connect, Realm, ZenohFile, with_transport
+from dsc.cli.wire import REALM, Connect, Realm, ZenohFile, with_transport
+from knowledge_base.cli.console import Json
 
 if TYPE_CHECKING:
     from dsc.monitoring.monitor import Observation
@@ -21,7 +22,7 @@ def monitor_command(
     realm: Realm = REALM,
     connect: Connect = None,
     zenoh: ZenohFile = None,
-    as_json: AsJson = False,
+    as_json: Json = False,
 ) -> None:
     """Print selected information about hosted components, periodically or at each change.
 

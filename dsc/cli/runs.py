@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from knowledge_base.cli.console import print_line
+from knowledge_base.cli.console import Json, print_line
 
 if TYPE_CHECKING:
     from dsc.runs.archive import RunArchive, RunRow, StepRow
@@ -23,7 +23,6 @@ DIVERGED = 1
 
 Store = Annotated[Path, typer.Argument(metavar="FILE", help="The store.")]
 Number = Annotated[int | None, typer.Option("--run", min=1, help="Which run.  [default: the last one]")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
 def kept_relations(store: Path) -> Mapping[str, Rows]:
@@ -46,7 +45,7 @@ def kept_relations(store: Path) -> Mapping[str, Rows]:
 
 
 @app.command("list")
-def list_(file: Store, as_json: AsJson = False) -> None:
+def list_(file: Store, as_json: Json = False) -> None:
     """List the runs: plot, number of steps, time and end."""
     from dsc.runs.archive import archive
 
@@ -64,7 +63,7 @@ def learn(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="The stores.")],
     out: Annotated[Path | None, typer.Option("--out", help="Write the experience to this YAML file.")] = None,
     steps: Annotated[bool, typer.Option("--steps", help="Learn the steps of plans, too, as their costs.")] = False,
-    as_json: AsJson = False,
+    as_json: Json = False,
 ) -> None:
     """Learn from the runs how often candidates of dynamic states are done, and how long they take."""
     from dsc.runs.learning import learn as learned_from
@@ -84,7 +83,7 @@ def learn(
 
 
 @app.command()
-def show(file: Store, run: Number = None, as_json: AsJson = False) -> None:
+def show(file: Store, run: Number = None, as_json: Json = False) -> None:
     """Print the macrosteps of a run, one per line, and the running skills of an unfinished run."""
     from dsc.runs.archive import archive
 
@@ -111,7 +110,7 @@ _TRUTHS = {True: "true", False: "false", None: "unknown"}
 @app.command()
 def conditions(
     file: Annotated[Path, typer.Argument(metavar="TRACE.jsonl|STORE", help="A trace, or a store with runs.")],
-    as_json: AsJson = False,
+    as_json: Json = False,
 ) -> None:
     """Print the conditions that the states of a run watch or have watched, with their truth and their parts."""
     from dsc.cli.view import complain
@@ -137,7 +136,7 @@ def conditions(
 
 
 @app.command()
-def replay(file: Store, run: Number = None, as_json: AsJson = False) -> None:
+def replay(file: Store, run: Number = None, as_json: Json = False) -> None:
     """Replay the messages of a run and compare the results.
 
     Exit status: 0 without a difference, 1 with a difference.
@@ -172,7 +171,7 @@ def end(
 def prune(
     file: Store,
     keep: Annotated[int, typer.Option(min=1, help="The number of runs to keep.")] = 100,
-    as_json: AsJson = False,
+    as_json: Json = False,
 ) -> None:
     """Delete all but the latest runs of a store, and the knowledge before them; its file becomes smaller."""
     from dsc.runs.pruning import prune as pruned

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, report
-from knowledge_base.cli.console import print_json
+from knowledge_base.cli.console import Json, print_json
 from knowledge_base.spelling import number_text
 
 app = typer.Typer(
@@ -47,7 +47,7 @@ def show(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Behaviour trees (XML).")],
     tree: Annotated[str | None, typer.Option("--tree", metavar="NAME", help="Only this tree.")] = None,
     xml: Annotated[bool, typer.Option("--xml", help="Print the file in format 4.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    json: Json = False,
 ) -> None:
     """Show the trees of a file: as text, as JSON, or as XML in format 4."""
     from dsc.trees import load_trees, trees_to_xml

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from knowledge_base.cli.console import print_line
+from knowledge_base.cli.console import Json, print_line
 from knowledge_base.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,14 +27,13 @@ Connect = Annotated[
 ZenohFile = Annotated[
     Path | None, typer.Option("--zenoh", metavar="FILE", help="Zenoh's own settings, e.g. certificates.")
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 REALM = "dsc"
 """The realm of programs that name none."""
 FAILED = 1
 """Exit status of a call that the component could not execute."""
 
 
-def ps_command(realm: Realm = REALM, connect: Connect = None, zenoh: ZenohFile = None, as_json: AsJson = False) -> None:
+def ps_command(realm: Realm = REALM, connect: Connect = None, zenoh: ZenohFile = None, as_json: Json = False) -> None:
     """List the components that programs host, with their state."""
     found = with_transport(_describe, realm, connect, zenoh)
     if as_json:
@@ -59,7 +58,7 @@ def call_command(
     realm: Realm = REALM,
     connect: Connect = None,
     zenoh: ZenohFile = None,
-    as_json: AsJson = False,
+    as_json: Json = False,
 ) -> None:
     """Call a skill of a hosted component, or show and set the component's parameters.
 

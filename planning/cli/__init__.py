@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from knowledge_base.cli.console import Json
+
 if TYPE_CHECKING:
     from planning.robot.bundles import Bundle
 
 
 def bundles_command(
     name: Annotated[str | None, typer.Argument(help="Only this bundle, with its content.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Show the bundles of the installed packages: components, plots and planning actions to build a robot of."""
     from planning.robot.bundles import GROUP, installed

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dsc.cli.findings import JSON, SARIF, SELECT, STRICT, report
-from knowledge_base.cli.console import print_json
+from knowledge_base.cli.console import Json, print_json
 from knowledge_base.errors import InputError
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def simulate(
     file: _File,
     seconds: Annotated[float, typer.Option(min=0.001, max=3600, help="Simulated seconds.")] = 10.0,
     seed: Annotated[int, typer.Option(help="Seed of offsets, jitter and execution times.")] = 0,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    json: Json = False,
 ) -> None:
     """Simulate the real-time tasks of each core, and compare their response times with the worst case.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from knowledge_base.cli.console import print_line
+from knowledge_base.cli.console import Json, print_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def wiring_command(
     target: Annotated[str, typer.Argument(metavar="TARGET", help="The robot, as for dsc run.")],
     profile: Annotated[str | None, typer.Option(help="A profile of the robot, or its file.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """List the required ports of a robot's components, and their providers.
 
