@@ -1,6 +1,7 @@
 /** Components: their wires, modes and waits at a moment, and the values that a monitoring profile observes over time. */
 
-import type { ActionRec, ComponentRec, ObservationRec, Value } from "./records";
+import type { ActionRec, ComponentRec, ObservationRec } from "./records";
+import type { Value } from "./values";
 import { placeAfter } from "./search";
 
 /** What is known of a component after a record. */

@@ -1,6 +1,6 @@
 /** Guards of transitions, as questions about the knowledge. */
 
-import type { Named } from "./records";
+import type { Named } from "./values";
 
 /** The values of the variables in a guard; null if a value is unknown, or is one that the knowledge cannot read. */
 export function paramsOf(text: string, values: Named): Named | null {

@@ -1,6 +1,6 @@
 /** Events as people write them in a line: `low level=0.2 item=cup1`. */
 
-import type { Value } from "./records";
+import type { Value } from "./values";
 
 export interface Handed {
   readonly name: string;

@@ -4,25 +4,8 @@ import { withAction, withComponent, type Components } from "./components";
 import { isWatch, withReport, withWatch, type Conditions } from "./conditions";
 import { newPlan, withEnd, withOrder, withStep, type Plan } from "./plans";
 import { splitPath, stepsOf, stepTexts, type PlotForm } from "./plots";
-import {
-  written,
-  type ActionRec,
-  type ComponentRec,
-  type EventRec,
-  type Fact,
-  type KnowledgeRec,
-  type Micro,
-  type Named,
-  type PlanAskedRec,
-  type PlanFoundRec,
-  type PlanNoneRec,
-  type PlanOrderedRec,
-  type Rec,
-  type StepRec,
-  type Taken,
-  type Value,
-  type WorldRec,
-} from "./records";
+import { written, type ActionRec, type ComponentRec, type EventRec, type KnowledgeRec, type Micro, type PlanAskedRec, type PlanFoundRec, type PlanNoneRec, type PlanOrderedRec, type Rec, type StepRec, type Taken, type WorldRec } from "./records";
+import type { Fact, Named, Value } from "./values";
 
 export const TRAIL = 10;
 /** Skills that search for plans. */

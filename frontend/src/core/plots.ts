@@ -1,6 +1,6 @@
 /** What the form of a plot says: its states, who is inside whom, and the ways between them. */
 
-import type { Value, Words } from "./records";
+import type { Value, Words } from "./values";
 
 export interface WayForm {
   readonly to?: string;

@@ -1,24 +1,13 @@
 /** The records of a trace, as `dsc/viewer/PROTOCOL.md` names them. */
 
 import type { PlotForm } from "./plots";
+import type { Fact, Named, Value, Words } from "./values";
 
 export interface Rec {
   readonly seq: number;
   readonly t: number;
   readonly type: string;
   readonly cause: number | null;
-}
-
-export type Value = string | number | boolean | null | readonly Value[] | { readonly [name: string]: Value };
-export type Named = Readonly<Record<string, Value>>;
-/** Predicate, then arguments. */
-export type Fact = readonly (string | number)[];
-
-/** For each name that rules and handlers added to a plot, the words for people. */
-export interface Words {
-  readonly states?: Readonly<Record<string, string>>;
-  readonly events?: Readonly<Record<string, string>>;
-  readonly variables?: Readonly<Record<string, string>>;
 }
 
 export interface PlotRec extends Rec {

@@ -2,7 +2,8 @@
 
 import type { History } from "./history";
 import { splitPath, statesOf, waysOf, type PlotForm } from "./plots";
-import { written, type Fact, type KnowledgeRec, type PlanBrokenRec } from "./records";
+import { written, type KnowledgeRec, type PlanBrokenRec } from "./records";
+import type { Fact } from "./values";
 
 /** So far back is looked for who changed something. */
 const BACK = 400;

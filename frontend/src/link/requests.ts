@@ -1,7 +1,8 @@
 /** What the page asks the program beyond records. */
 
 import { parsed } from "../core/reading";
-import type { Explanation, Fact, Named, Value } from "../core/records";
+import type { Explanation } from "../core/records";
+import type { Fact, Named, Value } from "../core/values";
 
 export interface Answer {
   readonly variables: readonly string[];

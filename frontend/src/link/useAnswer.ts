@@ -1,7 +1,7 @@
 /** The answer to a question about the knowledge at a moment, asked when neither has changed for a while. */
 
 import { useEffect, useState } from "react";
-import type { Named } from "../core/records";
+import type { Named } from "../core/values";
 import { query, type Answer } from "./requests";
 
 /** Milliseconds without a change before the program is asked. */

@@ -2,7 +2,7 @@
 
 import { deciding } from "../core/explanations";
 import { paramsOf } from "../core/guards";
-import type { Named } from "../core/records";
+import type { Named } from "../core/values";
 import { useAnswer } from "../link/useAnswer";
 import { Tree } from "./parts";
 

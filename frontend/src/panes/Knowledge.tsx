@@ -2,7 +2,8 @@
 
 import { useMemo, useState } from "react";
 import { deciding } from "../core/explanations";
-import { written, type Fact, type KnowledgeRec, type Value } from "../core/records";
+import { written, type KnowledgeRec } from "../core/records";
+import type { Fact, Value } from "../core/values";
 import { useAnswer } from "../link/useAnswer";
 import { session, useKind, useSelection } from "../session";
 import { useMoment } from "../turn";

@@ -1,6 +1,7 @@
 /** What is said of a thing, drawn: the thing in the middle, what it is related to around it. */
 
-import { written, type Fact } from "../core/records";
+import { written } from "../core/records";
+import type { Fact } from "../core/values";
 import { session } from "../session";
 import { useMoment } from "../turn";
 

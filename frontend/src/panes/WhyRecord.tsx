@@ -3,7 +3,8 @@
 import { useMemo } from "react";
 import { deciding } from "../core/explanations";
 import { splitPath } from "../core/plots";
-import type { Candidate, DecisionRec, KnowledgeRec, PlanBrokenRec, PlanFoundRec, Rec, RuleRec, StepRec, Value } from "../core/records";
+import type { Candidate, DecisionRec, KnowledgeRec, PlanBrokenRec, PlanFoundRec, Rec, RuleRec, StepRec } from "../core/records";
+import type { Value } from "../core/values";
 import type { Damaged } from "../core/sound";
 import { referencesIn } from "../core/references";
 import { breaker } from "../core/why";

@@ -1,7 +1,7 @@
 /** A state: since when, with which parameters and variables, and why its content was chosen. */
 
 import { splitPath, statesOf, type PlotForm, type StateForm } from "../core/plots";
-import type { Named } from "../core/records";
+import type { Named } from "../core/values";
 import { eventWords, stateWords } from "../core/words";
 import { session } from "../session";
 import { useMoment } from "../turn";

@@ -2,8 +2,8 @@
 
 import { Fragment } from "react";
 import { endWords } from "../core/ends";
-import { written, type ActionRec, type ComponentRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type Named, type ObservationRec, type PlotsRec,
-  type PlanBrokenRec, type PlanAskedRec, type PlanFoundRec, type PlanNoneRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
+import { written, type ActionRec, type ComponentRec, type DecisionRec, type EndRec, type EventRec, type Explanation, type KnowledgeRec, type ObservationRec, type PlotsRec, type PlanBrokenRec, type PlanAskedRec, type PlanFoundRec, type PlanNoneRec, type Rec, type RuleRec, type SceneRec, type StepRec } from "../core/records";
+import type { Named } from "../core/values";
 import type { Damaged } from "../core/sound";
 import { isReference } from "../core/references";
 import { wordsIn } from "../core/words";
