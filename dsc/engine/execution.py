@@ -34,11 +34,12 @@ class Execution:
         outputs: values that the outermost plot returns at its end, by name; empty before the end.
     """
 
-    __slots__ = ("_continuing", "chart", "finished", "outputs", "performer")
+    __slots__ = ("_continuing", "_results", "chart", "finished", "outputs", "performer")
 
     def __init__(self, chart: Chart, performer: Performer) -> None:
         self.chart = chart
         self.performer = performer
+        self._results = performer.results
         self.finished = False
         self.outputs: Mapping[str, Any] = NOTHING
         self._continuing: dict[tuple[Frame, str], Frame] = {}  # plots that are being replaced, by frame and host
@@ -63,8 +64,8 @@ class Execution:
         if parent is not None and parent.depth >= MAX_NESTING:
             raise RunawayError(f"plots nested deeper than {MAX_NESTING}", [path])
         variables = fill_parameters(compiled, arguments, performer.situation)
-        performer.results.bind(path, compiled.plot)
-        state = FrameState(performer.results.number(), compiled, initial.following, variables)
+        self._results.bind(path, compiled.plot)
+        state = FrameState(self._results.number(), compiled, initial.following, variables)
         frame = Frame(state, parent, host)
         for entrance in initial.parts[0].entrances:
             self._enter(frame, entrance, NOTHING)
@@ -153,7 +154,7 @@ class Execution:
             if node.holds_plot:
                 self._empty(frame, name)
             if node.state is not None:
-                self.performer.results.exit(frame.prefix + name)
+                self._results.exit(frame.prefix + name)
             if node.addressed:
                 self._exit_addressed(frame, one)
             elif one.actions:
@@ -166,7 +167,7 @@ class Execution:
             reaction = leaving_reaction(resting.configuration)
             if reaction.silent:
                 for name in reaction.exited:
-                    self.performer.results.exit(f"{frame.prefix}{host}/{name}")
+                    self._results.exit(f"{frame.prefix}{host}/{name}")
                 frame.forget(host)
                 return
         inner = frame.child(host)
@@ -179,7 +180,7 @@ class Execution:
         name = one.node.name
         activation = frame.activations[name]
         if one.cancels:
-            self.performer.results.put(Cancel(activation))
+            self._results.put(Cancel(activation))
         if one.actions:
             self.performer.act(frame, name, one.actions, activation, first=len(one.node.entry))
         activations = {**frame.activations}
@@ -194,10 +195,10 @@ class Execution:
         performer, node, state = self.performer, entrance.node, entrance.node.state
         activation = 0
         if node.addressed:
-            activation = performer.results.number()
+            activation = self._results.number()
             frame.activations = {**frame.activations, node.name: activation}
         if state is not None:
-            performer.results.enter(frame.prefix + node.name)
+            self._results.enter(frame.prefix + node.name)
         if entrance.actions:
             performer.act(frame, node.name, entrance.actions, activation)
         if entrance.after:
@@ -276,9 +277,9 @@ class Execution:
         before.gone = True
         self._exit(before, [one for one in exits if one.node.name not in staying])
         now = before.frozen()
-        performer.results.bind("" if parent is None else parent.prefix + before.host, compiled.plot)
+        self._results.bind("" if parent is None else parent.prefix + before.host, compiled.plot)
         if serial is None:
-            serial = performer.results.number()
+            serial = self._results.number()
         activations = {name: own for name, own in now.activations.items() if name in staying}
         children = {host: inner for host, inner in now.children.items() if host in staying}
         events = tuple([one for one in now.kept if one[0] in staying])
@@ -303,14 +304,14 @@ class Execution:
         decision = self.performer.situation.choose(
             state, frame.compiled.plot.name, bindings, failed, frame.activations.get(name, 0)
         )
-        self.performer.results.decide(frame.prefix + name, decision)
+        self._results.decide(frame.prefix + name, decision)
         return decision
 
     def _bind_decision(self, frame: Frame, name: str, decision: Decision) -> None:
         if decision.satisfied:
             self._done(frame, frame.compiled.index[name], {})
         elif decision.chosen is None:
-            self.performer.results.fire(Event(NO_CANDIDATE, to=frame.activations[name]))
+            self._results.fire(Event(NO_CANDIDATE, to=frame.activations[name]))
         else:
             self.enter_plot(self.chart.compiled(decision.chosen), decision.arguments, frame, name)
 
@@ -331,9 +332,9 @@ class Execution:
     def _done(self, frame: Frame, index: int, outputs: Mapping[str, Any]) -> None:
         node = frame.compiled.nodes[index]
         if frame.compiled.scxml:
-            self.performer.results.fire(Event(DONE_STATE + node.name, outputs, frame=frame.serial))
+            self._results.fire(Event(DONE_STATE + node.name, outputs, frame=frame.serial))
         elif DONE in node.edges:
-            self.performer.results.fire(Event(DONE, outputs, to=frame.activations[node.name], exact=True))
+            self._results.fire(Event(DONE, outputs, to=frame.activations[node.name], exact=True))
 
 
 def _kept_values(before: Frame, compiled: CompiledPlot) -> dict[str, Any]:

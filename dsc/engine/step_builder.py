@@ -41,11 +41,11 @@ class StepBuilder:
         self.serials = serials
         self.microsteps: list[Microstep] = []
         self.internal: deque[Event] = deque()
-        self._decisions: list[DecisionMade] = []
+        self._decisions: tuple[DecisionMade, ...] = ()
         self._output: list[Output] = []
-        self._emitted: list[Event] = []
-        self._errors: list[str] = []
-        self._bugs: list[str] = []
+        self._emitted: tuple[Event, ...] = ()
+        self._errors: tuple[str, ...] = ()
+        self._bugs: tuple[str, ...] = ()
         self._knowledge = NO_CHANGE
         self._exited: list[str] = []
         self._entered: list[str] = []
@@ -87,19 +87,19 @@ class StepBuilder:
 
     def emit(self, event: Event) -> None:
         """Add an outcome event of the outermost plot."""
-        self._emitted.append(event)
+        self._emitted += (event,)
 
     def decide(self, path: str, decision: Decision) -> None:
         """Add the decision on the content of a dynamic state."""
-        self._decisions.append(DecisionMade(path, decision))
+        self._decisions += (DecisionMade(path, decision),)
 
     def add_error(self, message: str) -> None:
         """Add the message of a failed action or guard for which no transition exists."""
-        self._errors.append(message)
+        self._errors += (message,)
 
     def add_bug(self, message: str) -> None:
         """Add the message of failed user code for which no transition exists."""
-        self._bugs.append(message)
+        self._bugs += (message,)
 
     # -- the step ----------------------------------------------------------------------------------------
 
@@ -108,6 +108,6 @@ class StepBuilder:
     ) -> Step:
         """Return the step that leads to `state`; for the other arguments see `Step`."""
         return Step(
-            state, event, handled, tuple(self.microsteps), tuple(self._decisions), self._knowledge,
-            tuple(self._output), tuple(self._emitted), tuple(self._errors), outputs, tuple(self._bugs),
+            state, event, handled, tuple(self.microsteps), self._decisions, self._knowledge, tuple(self._output),
+            self._emitted, self._errors, outputs, self._bugs,
         )  # fmt: skip
