@@ -45,14 +45,14 @@ def told(statements: Iterable[str | Node], world: World, source: str | None = No
         SchemaError: a wrong number of arguments or a wrong type, or a known object has another type.
         InputError: a statement and its negation.
     """
-    effects = [_effect(text, _find_name(source, number)) for number, text in enumerate(statements, 1)]
+    effects = [_effect(text, _source_name(source, number)) for number, text in enumerate(statements, 1)]
     _require_consistent(effects)
     view, meter = Overlay(world), Meter(bounds)
     seen = BoundedWorld(view, meter)
     for effect in effects:
         if (thing := _thing(effect, world)) is not None:
             view.apply(Delta(nodes=thing))
-    known = _find_known(view)
+    known = _types_by_name(view)
     for effect in effects:
         if _thing(effect, world) is None:
             check_effect(effect, world.schema, objects=known)
@@ -71,9 +71,9 @@ def retracted(statements: Iterable[str], world: World, source: str | None = None
         InputError: as for `told`; also for a fact that is false already.
     """
     view = Overlay(world)
-    known = _find_known(view)
+    known = _types_by_name(view)
     for number, text in enumerate(statements, 1):
-        atom = _atom(parse_condition(text, _find_name(source, number)))
+        atom = _atom(parse_condition(text, _source_name(source, number)))
         check(atom, world.schema, objects=known)
         view.apply(_taken_back(atom, view))
     return view.delta
@@ -102,7 +102,7 @@ def _literals(effects: Iterable[Effect]) -> Iterator[Add | Delete]:
                 pass
 
 
-def _find_name(source: str | None, number: int) -> str | None:
+def _source_name(source: str | None, number: int) -> str | None:
     return None if source is None else f"{source} {number}"
 
 
@@ -127,7 +127,7 @@ def _thing(effect: Effect, world: World) -> Mapping[str, str] | None:
     return {arg.value: effect.atom.predicate}
 
 
-def _find_known(world: World) -> dict[str, str]:
+def _types_by_name(world: World) -> dict[str, str]:
     return {name: world.type_of(name) or ROOT_TYPE for name in world.objects(ROOT_TYPE)}
 
 

@@ -156,7 +156,7 @@ def _caption(group: list[Labelled], *, terse: bool) -> Caption:
         triggers = list(dict.fromkeys(one.trigger for one in group if one.trigger))
         actions = _brief(first.transition, terse=terse)
         kind = _kind(first.transition)
-        words = [*_enumerate(triggers), _guard(first, terse=terse), kind, *_enumerate(actions, ";", "/ ")]
+        words = [*_list_lines(triggers), _guard(first, terse=terse), kind, *_list_lines(actions, ";", "/ ")]
     lines = pack([word for word in words if word], TextStyle.LABEL, WIDTH)
     return Caption(tuple(lines), "\n".join(filter(None, map(full_text, group))), rule is not None)
 
@@ -180,7 +180,7 @@ def _kind(transition: Transition) -> str:
     return "{internal}" if transition.internal and transition.target is not None else ""
 
 
-def _enumerate(words: Sequence[str], separator: str = ",", before: str = "") -> list[str]:
+def _list_lines(words: Sequence[str], separator: str = ",", before: str = "") -> list[str]:
     if not words:
         return []
     return (before + f"{separator}\n".join(words)).split("\n")
@@ -207,13 +207,13 @@ def block_texts(state: State, emits: Container[str] = ()) -> list[str]:
     """
     words = {"entry": "entry", "exit": "exit", "on_break": "break"}
     return [
-        f"{words[key]} / {action_text(action)}{_rename(action, emits)}"
+        f"{words[key]} / {action_text(action)}{_alias_text(action, emits)}"
         for key, actions in state.blocks()
         for action in actions
     ]
 
 
-def _rename(action: Internal | ExternalAction, emits: Container[str]) -> str:
+def _alias_text(action: Internal | ExternalAction, emits: Container[str]) -> str:
     if not isinstance(action, Trigger) or not action.names:
         return ""
     return " as " + ", ".join(f"^{name}" if name in emits else name for name in action.names.values())
@@ -284,7 +284,7 @@ def content_text(use: str, arguments: Mapping[str, Term]) -> str:
 
 def signature(plot: ActionPlot) -> str:
     """Return the plot's name and parameters as text."""
-    return f"{plot.name}({_declare(plot.parameters)})" if plot.parameters else plot.name
+    return f"{plot.name}({_declaration_text(plot.parameters)})" if plot.parameters else plot.name
 
 
 def facts(plot: ActionPlot) -> list[str]:
@@ -297,22 +297,22 @@ def facts(plot: ActionPlot) -> list[str]:
             *((name, to_text(term)) for name, term in plot.scores().items()),
             ("listens to", _events(plot.receives)),
             ("outcomes", _events(plot.emits)),
-            ("outputs", _declare(plot.outputs)),
-            ("variables", _declare(plot.variables)),
+            ("outputs", _declaration_text(plot.outputs)),
+            ("variables", _declaration_text(plot.variables)),
             *(_robot(plot.robot) if plot.robot is not None else ()),
         )
         if text
     ]
 
 
-def _declare(names: Mapping[str, PlotParameter | PlotVariable]) -> str:
+def _declaration_text(names: Mapping[str, PlotParameter | PlotVariable]) -> str:
     return ", ".join(f"{name}: {one.type}" for name, one in names.items())
 
 
 def _robot(robot: RobotSection) -> Iterator[tuple[str, str]]:
     """Yield the interface of a robot section: the kinds of its parts and their texts."""
-    yield "sensors", _declare(robot.sensors)
-    yield "motors", _declare(robot.motors)
+    yield "sensors", _declaration_text(robot.sensors)
+    yield "motors", _declaration_text(robot.motors)
     yield "constants", ", ".join(f"{name} = {value_text(value)}" for name, value in robot.constants.items())
     for (group, *words), values in robot.assignments.items():
         yield (

@@ -90,7 +90,7 @@ class _Handling:
                     more[waiting] = State(about=handler.label)
                     leading[then] = Transition(target=waiting, do=(Emit(emit=self._leaving(then)),))
             more[handled] = self._handled(handler, entrances.get(name, name), leading)
-            heard = self._receive(handler.on)
+            heard = self._map_event(handler.on)
             on[heard] = (*on.get(heard, ()), _way(handler, handled))
         return {name: state.model_copy(update={"on": on}), **more}
 
@@ -147,9 +147,9 @@ class _Handling:
                 }
                 more[handled] = self._handled(handler, awaited, leading)
             ways.append(_way(handler, handled))
-        return {awaited: State(on={self._receive(event): tuple(ways)}), **more}
+        return {awaited: State(on={self._map_event(event): tuple(ways)}), **more}
 
-    def _receive(self, event: str) -> str:
+    def _map_event(self, event: str) -> str:
         return self._listening.get(event, event)
 
     def _handled(self, handler: Handler, back: str, leading: Mapping[str, Transition]) -> AnyState:

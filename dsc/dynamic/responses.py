@@ -108,9 +108,9 @@ class Responses:
         if then == CONTINUE and rule.before and skipped(name) in self._sidecar[name]:
             return [Transition(target=skipped(name))]
         if then == CONTINUE:
-            return self._wire(rule, number, name, state, DONE)
+            return self._require_transitions(rule, number, name, state, DONE)
         if then == GIVE_UP:
-            return [because(about, one) for one in self._wire(rule, number, name, state, GAVE_UP)]
+            return [because(about, one) for one in self._require_transitions(rule, number, name, state, GAVE_UP)]
         if then in {RETRY, REPLAN, ENTER}:
             tested = again(name) in self._sidecar[name] and not rule.do.passed
             return [Transition(target=again(name) if tested else name, passed=rule.do.passed)]
@@ -184,7 +184,7 @@ class Responses:
         guard = below if rule.when is None else lang.And((below, rule.when))
         return guard, {counter: lang.Arithmetic("+", (tries, lang.Constant(1)))}
 
-    def _wire(self, rule: Rule, number: int, name: str, state: State, event: str) -> list[Transition]:
+    def _require_transitions(self, rule: Rule, number: int, name: str, state: State, event: str) -> list[Transition]:
         if event not in state.on:
             raise SchemaError(
                 f"a rule cannot '{rule.then}' at state '{name}', which does not wire '{event}'",

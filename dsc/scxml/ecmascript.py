@@ -116,7 +116,7 @@ class _Parser:
             if sign == "+" and joins:
                 parts.append(following)
             elif len(parts) > 1:
-                raise self._refuse("text cannot be computed with")
+                raise self._refusal("text cannot be computed with")
             else:
                 parts = [self._arithmetic(sign, parts[0], following)]
         self._end()
@@ -138,20 +138,20 @@ class _Parser:
 
     def _end(self) -> None:
         if self._tokens[self._at].kind != "end":
-            raise self._refuse(f"'{self._tokens[self._at].text}' does not belong there")
+            raise self._refusal(f"'{self._tokens[self._at].text}' does not belong there")
 
-    def _refuse(self, why: str) -> NotExpressibleError:
+    def _refusal(self, why: str) -> NotExpressibleError:
         return NotExpressibleError("expression", f"{why} in '{self._text}'", place=self._place)
 
     # -- grammar, loosest first ------------------------------------------------------------------------------
 
     def _or(self) -> Expression | Term:
-        return self._connect("||", Or, self._and)
+        return self._parse_chain("||", Or, self._and)
 
     def _and(self) -> Expression | Term:
-        return self._connect("&&", And, self._comparison)
+        return self._parse_chain("&&", And, self._comparison)
 
-    def _connect(self, sign: str, kind: type[And | Or], part: Callable[[], Expression | Term]) -> Expression | Term:
+    def _parse_chain(self, sign: str, kind: type[And | Or], part: Callable[[], Expression | Term]) -> Expression | Term:
         parts = [part()]
         while self._take(sign):
             parts.append(part())
@@ -167,12 +167,12 @@ class _Parser:
         return Comparison(_COMPARE[sign], first, second)
 
     def _sum(self) -> Expression | Term:
-        return self._compute("+-", self._product)
+        return self._parse_arithmetic("+-", self._product)
 
     def _product(self) -> Expression | Term:
-        return self._compute("*/", self._unary)
+        return self._parse_arithmetic("*/", self._unary)
 
-    def _compute(self, signs: str, part: Callable[[], Expression | Term]) -> Expression | Term:
+    def _parse_arithmetic(self, signs: str, part: Callable[[], Expression | Term]) -> Expression | Term:
         left = part()
         while sign := self._take(*signs):
             left = self._arithmetic(sign, left, part())
@@ -181,7 +181,7 @@ class _Parser:
     def _unary(self) -> Expression | Term:
         self._depth += 1
         if self._depth > MAX_NESTING:
-            raise self._refuse("nested too deeply")
+            raise self._refusal("nested too deeply")
         found = self._read_prefix()
         self._depth -= 1
         return found
@@ -202,16 +202,16 @@ class _Parser:
         if token.kind == "number":
             number = float(token.text)
             if not math.isfinite(number):
-                raise self._refuse("a number is too large")
+                raise self._refusal("a number is too large")
             if token.text[:1] == "0" and token.text[1:2].isdigit():
-                raise self._refuse(f"'{token.text}' is octal, or an error,")
+                raise self._refusal(f"'{token.text}' is octal, or an error,")
             return Constant(int(number) if number.is_integer() and number <= MAX_WHOLE else number)
         if token.kind == "text":
             if token.text == NO_VALUE.value:
-                raise self._refuse("the text 'undefined' stands for no value")
+                raise self._refusal("the text 'undefined' stands for no value")
             return Constant(token.text, quoted=True)
         if token.kind != "name":
-            raise self._refuse(f"'{token.text or 'the end'}' does not belong there")
+            raise self._refusal(f"'{token.text or 'the end'}' does not belong there")
         if token.text in {"true", "false"}:
             return Constant(token.text == "true")
         if token.text == NO_VALUE.value and token.text not in self._scope.names:
@@ -225,19 +225,19 @@ class _Parser:
             state = self._next()
             self._close()
             if state.kind != "text":
-                raise self._refuse("In() takes the name of a state in quotes,")
+                raise self._refusal("In() takes the name of a state in quotes,")
             return Atom(IN_STATE, (Constant(state.text, quoted=True),))
         if function == "Math.pow":
             base = self._number(self._sum())
             exponent = self.as_term(self._sum()) if self._take(",") else None
             self._close()
             if isinstance(exponent, Constant) and _is_number(exponent) and exponent.value in range(2, MAX_EXPONENT + 1):
-                return self._bound(Arithmetic("*", (base,) * int(exponent.value)))
-        raise self._refuse(f"the function {function}() cannot be called")
+                return self._require_short(Arithmetic("*", (base,) * int(exponent.value)))
+        raise self._refusal(f"the function {function}() cannot be called")
 
     def _close(self) -> None:
         if not self._take(")"):
-            raise self._refuse("a bracket is not closed")
+            raise self._refusal("a bracket is not closed")
 
     def _variable(self, name: str) -> str:
         if name in self._scope.names:
@@ -248,7 +248,7 @@ class _Parser:
                 self._scope.check_read(attribute or WHOLE, self._place)
                 return f"event.{attribute.lower() or 'data'}"
         if name.startswith("_") or "." in name or name in {"null", "typeof", "function", "new"}:
-            raise self._refuse(f"'{name}' has no counterpart")
+            raise self._refusal(f"'{name}' has no counterpart")
         raise UnknownNameError(f"there is no data '{name}'", place=self._place, found=name, valid=self._scope.names)
 
     # -- kinds -------------------------------------------------------------------------------------------
@@ -256,19 +256,19 @@ class _Parser:
     def _arithmetic(self, sign: str, left: Expression | Term, right: Expression | Term) -> Term:
         sides = (self._number(left), self._number(right))
         if sign == "/" and not (isinstance(sides[1], Constant) and sides[1].value):
-            raise self._refuse("only a number other than 0 divides: 1 / 0 is Infinity")
-        return self._bound(Arithmetic(sign, sides))
+            raise self._refusal("only a number other than 0 divides: 1 / 0 is Infinity")
+        return self._require_short(Arithmetic(sign, sides))
 
     def _number(self, part: Expression | Term) -> Term:
         """Return an operand of arithmetic or of an order comparison as a term; refuse an operand of another kind."""
         found = self.as_term(part)
         if isinstance(found, Constant) and not _is_number(found):
-            raise self._refuse("text cannot be computed with")
+            raise self._refusal("text cannot be computed with")
         if not self._scope.want(found, NUMBER):
-            raise self._refuse(f"{self._write(found)} need not be a number, and would be converted,")
+            raise self._refusal(f"{self._describe(found)} need not be a number, and would be converted,")
         return found
 
-    def _write(self, found: Term) -> str:
+    def _describe(self, found: Term) -> str:
         kinds = " or ".join(sorted(self._scope.kinds_of(found)))
         return f"'{found.name}' ({kinds})" if isinstance(found, Variable) else f"a value ({kinds})"
 
@@ -283,12 +283,12 @@ class _Parser:
                 return
         pairs = {(a, b) for a in kinds[0] for b in kinds[1] if a != b or a == ANY}
         if sign in {"==", "!="} and any(UNDEFINED not in pair for pair in pairs) and self._scope.data.kinds is not None:
-            found = f"{self._write(left)} and {self._write(right)}"
-            raise self._refuse(f"'{sign}' may convert {found}; '{sign}=' does not,")
+            found = f"{self._describe(left)} and {self._describe(right)}"
+            raise self._refusal(f"'{sign}' may convert {found}; '{sign}=' does not,")
 
-    def _bound(self, term: Arithmetic) -> Term:
+    def _require_short(self, term: Arithmetic) -> Term:
         if _operations(term) > MAX_OPERATIONS:
-            raise self._refuse(f"more than {MAX_OPERATIONS} operations")
+            raise self._refusal(f"more than {MAX_OPERATIONS} operations")
         return term
 
     def as_condition(self, part: Expression | Term) -> Expression:
@@ -302,13 +302,13 @@ class _Parser:
         if kinds <= {BOOLEAN, UNDEFINED} or self._scope.want(value, BOOLEAN):
             return Comparison("=", value, Constant(True))  # noqa: FBT003  # `True` is an operand
         if ANY in kinds:
-            raise self._refuse(f"{self._write(value)} would be converted to a truth value")
+            raise self._refusal(f"{self._describe(value)} would be converted to a truth value")
         parts = [Comparison("!=", value, _FALSE[kind]) for kind in sorted(kinds)]
         return parts[0] if len(parts) == 1 else And(tuple(parts))
 
     def as_term(self, part: Expression | Term) -> Term:
         if not isinstance(part, Term):
-            raise self._refuse("a condition is not a value")
+            raise self._refusal("a condition is not a value")
         return part
 
 

@@ -100,17 +100,17 @@ class Scope:
             return
         what = f"_event.data.{attribute}" if attribute else "_event.data"
         if not attribute and (self._outside() or self._has_platforms()):
-            raise _refuse(f"'{what}' of an event that is not sent with <content> has no counterpart", place)
+            raise _refusal(f"'{what}' of an event that is not sent with <content> has no counterpart", place)
         for sent in self._candidates():
             if sent.carries is None:
                 if not attribute:
-                    raise _refuse(f"'{what}' is undefined for the event '{sent.event}'", place)
+                    raise _refusal(f"'{what}' is undefined for the event '{sent.event}'", place)
             elif attribute not in sent.carries:
-                raise _refuse(f"'{what}' is undefined for the event '{sent.event}', which has other data", place)
+                raise _refusal(f"'{what}' is undefined for the event '{sent.event}', which has other data", place)
         for event in self._outside():
             known = self.data.spelt.setdefault(attribute.lower(), attribute)
             if known != attribute:
-                raise _refuse(f"'{what}' is spelt '{known}' elsewhere, and names are folded to lower case", place)
+                raise _refusal(f"'{what}' is spelt '{known}' elsewhere, and names are folded to lower case", place)
             self.data.received[event].setdefault(attribute.lower(), "")
 
     def want(self, term: Term, kind: str) -> bool:
@@ -138,7 +138,7 @@ class Scope:
         return bool(events)
 
     def _kinds_of_attribute(self, attribute: str) -> Kinds:
-        found = {kind for sent in self._candidates() for kind in _attributes_of(sent, attribute)}
+        found = {kind for sent in self._candidates() for kind in _carried_kinds(sent, attribute)}
         return frozenset(found | ({ANY} if self._outside() else set()))
 
     def _candidates(self) -> list[Sent]:
@@ -155,7 +155,7 @@ class Scope:
         return self.events is None or any(d.startswith(("done.", "error.", "*")) for d in self.events)
 
 
-def _attributes_of(sent: Sent, attribute: str) -> Iterable[str]:
+def _carried_kinds(sent: Sent, attribute: str) -> Iterable[str]:
     for name, term in (sent.carries or {}).items():
         if (name.lower() or "data") == attribute:
             yield from sent.scope.kinds_of(term)
@@ -169,7 +169,7 @@ def _kind(value: object) -> str:
     return NUMBER if isinstance(value, int | float) else TEXT
 
 
-def _refuse(why: str, place: Place | None) -> NotExpressibleError:
+def _refusal(why: str, place: Place | None) -> NotExpressibleError:
     return NotExpressibleError("expression", why, place=place)
 
 

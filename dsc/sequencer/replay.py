@@ -117,7 +117,7 @@ class _ReplayedRun:
         self._note(self._output(step))
         now = self._reactor.machine.state.configuration()
         if now != step.configuration:
-            return Divergence(step.number, "the configuration", _list(step.configuration), _list(now))
+            return Divergence(step.number, "the configuration", _names_text(step.configuration), _names_text(now))
         recorded = [change.delta for change in self._past.changes(step.before, step.version)]
         replayed = [change.delta for change in self._knowledge.changes(step.before)]
         if recorded != replayed:
@@ -146,7 +146,7 @@ class _ReplayedRun:
         self._started.update({one.action_id: one for one in output if isinstance(one, Start)})
 
 
-def _list(configuration: Iterable[str]) -> str:
+def _names_text(configuration: Iterable[str]) -> str:
     return ", ".join(configuration) or "empty"
 
 

@@ -207,7 +207,7 @@ class RunningSkill:
 
     def _outcome_of(self, error: BaseException) -> Outcome:
         if type(error) is PreemptedError:
-            return self._preempt(error.by)
+            return self._preemption(error.by)
         bug = programming_error(error, f"{self.start.component}.{self.start.skill}", self._raises)
         return failed(self.start, described(error)) if bug is None else faulty(self.start, str(bug))
 
@@ -254,9 +254,9 @@ class RunningSkill:
 
     def lose(self, taker: str) -> None:
         """Post `preempted`, since a skill with a higher priority takes the component; the task is then cancelled."""
-        self.answer(self._preempt(taker), continues=True)
+        self.answer(self._preemption(taker), continues=True)
 
-    def _preempt(self, taker: str) -> Outcome:
+    def _preemption(self, taker: str) -> Outcome:
         return Outcome(PREEMPTED, {"skill": f"{self.start.component}.{self.start.skill}", "by": taker})
 
     async def turn(self) -> None:

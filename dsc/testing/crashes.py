@@ -187,18 +187,18 @@ class _Heir(Generic[_Result]):
         thread = threading.Thread(target=lambda: self._results.append(live(folder)), daemon=True)
         thread.start()
         thread.join()
-        self._left = _list_changes(store)
+        self._left = _count_steps(store)
 
     def result(self, problems: list[str]) -> _Result:
         """Return the second program's result; add a problem if the first program has written since."""
-        if _list_changes(self._store) != self._left:
+        if _count_steps(self._store) != self._left:
             problems.append("an old sequencer has written to a run that another had taken over")
         if not self._results:
             raise StoreError("the run that was taken over has not come to its end")
         return self._results[0]
 
 
-def _list_changes(store: Path) -> list[tuple[int, int]]:
+def _count_steps(store: Path) -> list[tuple[int, int]]:
     with archive(store) as runs:
         return [(run.number, sum(1 for _ in runs.steps(run.number))) for run in runs.runs()]
 

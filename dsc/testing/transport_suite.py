@@ -464,7 +464,7 @@ class TransportSuite:
         async with self._robot() as (robot, remote, _):
             heard: list[Any] = []
             call = SkillCall("a6.0", LoopClock(), lambda outcome: heard.append(outcome.attributes["level"]))
-            async with running(_check_watch(remote, call)):
+            async with running(_watch_low(remote, call)):
                 await until(lambda: robot.activations.active("low"))
                 for level in (30, 19, 18, 25, 15, 10, 40, 5):
                     robot.update("low", level)
@@ -552,5 +552,5 @@ class TransportSuite:
             task.cancel()
 
 
-async def _check_watch(remote: RemoteComponent, call: SkillCall) -> None:
+async def _watch_low(remote: RemoteComponent, call: SkillCall) -> None:
     await remote.execute("low", call, {"below": 20})

@@ -95,7 +95,7 @@ def _fields(record: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-def _list_permitted(parameter: PlotParameter) -> str:
+def _value_annotation(parameter: PlotParameter) -> str:
     if parameter.among and parameter.type in {"text", "symbol"}:
         return f"Literal[{', '.join(map(repr, parameter.among))}]".replace("'", '"')
     return _annotation(parameter.type)
@@ -129,7 +129,7 @@ def _function(plot: ActionPlot) -> str:
 
 
 def _parameter_text(name: str, parameter: PlotParameter) -> str:
-    annotation = _list_permitted(parameter)
+    annotation = _value_annotation(parameter)
     if parameter.required:
         return f"{name}: {annotation}"
     return f"{name}: {annotation.removesuffix(' | None')} | None = None"

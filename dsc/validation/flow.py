@@ -32,8 +32,8 @@ def check_wiring(subject: Subject) -> Iterator[Finding]:
     wired = {name: state for name, state, _ in expanded.walk()}
     traffic = _traffic(subject)
     emits, receives = subject.plot.emits, subject.plot.receives
-    yield from (_reserved_name(subject, event, ("emits", event)) for event in emits if event in EXECUTIVES)
-    yield from (_reserved_name(subject, event, ("receives", event)) for event in receives if event in RESERVED)
+    yield from (_report_reserved(subject, event, ("emits", event)) for event in emits if event in EXECUTIVES)
+    yield from (_report_reserved(subject, event, ("receives", event)) for event in receives if event in RESERVED)
     yield from _rule_targets(subject)
     yield from _cyclic_omissions(subject, expanded)
     yield from _outcomes_of_reactions(subject)
@@ -55,7 +55,7 @@ def check_wiring(subject: Subject) -> Iterator[Finding]:
         yield from check_completion(subject, wired)
 
 
-def _reserved_name(subject: Subject, event: str, path: Path) -> Finding:
+def _report_reserved(subject: Subject, event: str, path: Path) -> Finding:
     message = f"the event '{event}' is fired by the executive itself"
     return subject.finding(path, "reserved-event", message, "give yours another name", found=event)
 
@@ -173,7 +173,7 @@ def _skills(
                 message = f"skill '{action.trigger}' has no outcome '{renamed}'"
                 yield subject.finding((*here, "as", renamed), "known-outcome", message, found=renamed, valid=outcomes)
         events = [action.names.get(event, event) for event in outcomes]
-        yield from (_reserved_name(subject, event, (*here, "trigger")) for event in events if event in EXECUTIVES)
+        yield from (_report_reserved(subject, event, (*here, "trigger")) for event in events if event in EXECUTIVES)
         is_event = (subject.skills or {})[action.trigger].pattern == "event"
         if is_event:
             yield from _visible_outside(subject, action, here)
@@ -270,7 +270,7 @@ def _emissions(subject: Subject, path: Path, traffic: _Traffic) -> Iterator[Find
         for fired in transition.emitted:
             here = (*way, "emit")
             if fired in RESERVED and fired not in emits:
-                yield _reserved_name(subject, fired, here)
+                yield _report_reserved(subject, fired, here)
             elif fired not in emits and fired not in traffic.heard:
                 message = f"the plot does not declare the outcome '{fired}', and no state listens to it"
                 valid = set(emits) | traffic.heard - {DONE, NO_CANDIDATE}

@@ -39,7 +39,7 @@ def validate_library(
 ) -> list[Finding]:
     """Return the findings about all plots of a library; see `validate_plot`."""
     _require_parts(library, schema)
-    known = None if skills is None else _list_known(skills)
+    known = None if skills is None else _require_signatures(skills)
     return [finding for plot in library for finding in validate_plot(plot, library, schema, known, components)]
 
 
@@ -70,7 +70,7 @@ def validate_plot(
     """
     require(plot, ActionPlot, "a plot is an ActionPlot, as load_plot and parse_plot give it")
     _require_parts(library, schema)
-    signatures = None if skills is None else by_trigger(_list_known(skills))
+    signatures = None if skills is None else by_trigger(_require_signatures(skills))
     subject = Subject(plot, library, schema, signatures, components, objects)
     for check in (check_structure, check_size):
         findings = list(islice(check(subject), MAX_FINDINGS))
@@ -111,7 +111,7 @@ def _require_parts(library: object, schema: object) -> None:
         require(schema, Schema, "a schema is a Schema; Schema.parse reads its text")
 
 
-def _list_known(skills: Iterable[SkillSignature]) -> list[SkillSignature]:
+def _require_signatures(skills: Iterable[SkillSignature]) -> list[SkillSignature]:
     require_several(skills, "the signatures of skills")
     skills = list(skills)
     for one in skills:

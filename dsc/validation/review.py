@@ -65,7 +65,7 @@ def _rules(subject: Subject) -> Iterator[Finding]:
         if why is None and rule.on is not None and not subject.planned and _is_settled(subject, rule, rule.on):
             why = f"every state that can end with '{rule.on}' answers it itself"
         if why is not None:
-            message = f"the rule '{rule.label}' can never answer: {why}{_list(earlier)}"
+            message = f"the rule '{rule.label}' can never answer: {why}{_earlier_text(earlier)}"
             yield subject.finding(("rules", number), "rules", message, _REMEDY, level="warning")
 
 
@@ -78,7 +78,7 @@ def _handlers(subject: Subject) -> Iterator[Finding]:
         if why is None and handler.interrupt and handler.listen is None and _all_answer(handler.on, subject):
             why = f"every state answers '{handler.on}' itself"
         if why is not None:
-            message = f"the '{handler.label}' can never answer: {why}{_list(earlier)}"
+            message = f"the '{handler.label}' can never answer: {why}{_earlier_text(earlier)}"
             yield subject.finding(("handlers", number), "handlers", message, _REMEDY, level="warning")
         if handler.do.use is not None:
             for event, used in _events_without_rule(subject, handler.do.use):
@@ -128,7 +128,7 @@ def _all_answer(event: str, subject: Subject) -> bool:
     return all(any(not way.has_guard for way in state.on.get(event, ())) for state in own)
 
 
-def _list(earlier: Sequence[Rule] | Sequence[Handler]) -> str:
+def _earlier_text(earlier: Sequence[Rule] | Sequence[Handler]) -> str:
     return "; before it: " + ", ".join(f"'{one.label}'" for one in earlier) if earlier else ""
 
 

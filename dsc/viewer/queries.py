@@ -108,11 +108,11 @@ def knowledge(log: RecordLog) -> RecordReplay[Known]:
     """Return the replay of the knowledge."""
     begin = Known(WorldState(Schema()), 0, RecordedRun())
     return RecordReplay(
-        log, TYPES | {"knowledge"}, begin, lambda k: Known(k.state.copy(), k.version, k.run.copy()), _find_known
+        log, TYPES | {"knowledge"}, begin, lambda k: Known(k.state.copy(), k.version, k.run.copy()), _apply_record
     )
 
 
-def _find_known(before: Known, record: Mapping[str, Any]) -> Known:
+def _apply_record(before: Known, record: Mapping[str, Any]) -> Known:
     data = dict(record)
     if record["type"] in TYPES:
         before.run.take(record)

@@ -119,14 +119,14 @@ class Viewer:
             self._thread.join(timeout=5)
         self._socket.close()
 
-    def _answer_failure(self, _: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
+    def _report_failure(self, _: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
         self._calm.complain(context.get("exception"))
 
     def _serve(self) -> None:
         asyncio.run(self._serve_quietly())
 
     async def _serve_quietly(self) -> None:
-        asyncio.get_running_loop().set_exception_handler(self._answer_failure)
+        asyncio.get_running_loop().set_exception_handler(self._report_failure)
         await self._server.serve(sockets=[self._socket])
 
     async def _page(self, _: Request) -> Response:

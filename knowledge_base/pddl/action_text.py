@@ -238,13 +238,13 @@ def united(actions: Iterable[ActionText]) -> tuple[ActionText, ...]:
 
 def _difference(first: ActionText, second: ActionText) -> str:
     """Return the first part in which two actions differ, in both versions."""
-    for part, before, here in zip(("parameters", *_COMPARED), _write(first), _write(second), strict=True):
+    for part, before, here in zip(("parameters", *_COMPARED), _part_texts(first), _part_texts(second), strict=True):
         if before != here:
             return f"the {part} {before} instead of {here}"
     return "other words"
 
 
-def _write(action: ActionText) -> Iterator[str]:
+def _part_texts(action: ActionText) -> Iterator[str]:
     yield variables_text(action.parameters)
     duration, timed = action.duration, action.timed
     yield "none" if duration is None else f"from {to_text(duration.least)} to {to_text(duration.most)}"

@@ -107,7 +107,7 @@ def problem_to_text(state: WrittenWorld, name: str, domain: str, goal: Expressio
             raise _unspellable(word)
     facts = [_fact(fact, schema.predicate(fact.predicate)) for fact in state.facts]
     values = [
-        f"(= {_fact(fluent, schema.function(fluent.predicate))} {_write(content, quoted=True)})"
+        f"(= {_fact(fluent, schema.function(fluent.predicate))} {_content_text(content, quoted=True)})"
         for fluent, content in state.values.items()
     ]
     objects = [f"{thing} - {type_name}" for thing, type_name in state.nodes.items() if thing not in schema.constants]
@@ -165,10 +165,10 @@ def _by_time(parts: Mapping[str, Expression | Effect]) -> str:
 def _fact(fact: Fact, signature: Signature) -> str:
     typed = zip(fact.args, signature.parameters, strict=True)
     # Text without quotes would be read as the name of an object; a name in quotes denotes the same object.
-    return "(" + " ".join([fact.predicate, *(_write(arg, quoted="text" in p.types) for arg, p in typed)]) + ")"
+    return "(" + " ".join([fact.predicate, *(_content_text(arg, quoted="text" in p.types) for arg, p in typed)]) + ")"
 
 
-def _write(content: Content, *, quoted: bool) -> str:
+def _content_text(content: Content, *, quoted: bool) -> str:
     for number in content if isinstance(content, tuple) else (content,):
         if not isinstance(number, str) and len(repr(number)) > LONGEST_NUMBER:
             raise InputError(f"a number in PDDL has at most {LONGEST_NUMBER} characters, not {number}")

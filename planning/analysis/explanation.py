@@ -208,7 +208,7 @@ class _Causes:
                 continue
             missing = (*nearest.facts, *nearest.inner)
             rooted |= not missing or bool(nearest.conditions and not nearest.inner)
-            said.append(f"{here} needs {nearest.step}, which needs {_list(nearest)}")
+            said.append(f"{here} needs {nearest.step}, which needs {_nearest_text(nearest)}")
             fresh = [one for one in dict.fromkeys(missing) if one not in seen]
             seen.update(fresh)
             agenda.extend(fresh)
@@ -316,7 +316,7 @@ def _distance(near: _Nearest) -> tuple[int, int]:
     return len(near.facts) + len(near.conditions), near.fixed
 
 
-def _list(nearest: _Nearest) -> str:
+def _nearest_text(nearest: _Nearest) -> str:
     return " and ".join([*map(str, nearest.facts), *nearest.conditions]) or "more than can hold together"
 
 

@@ -86,7 +86,7 @@ def findings() -> dict[str, Any]:
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}",
         "java": _java(),
-        "packages": {name: package_version(name) for name in (DISTRIBUTION, *map(_name_with_version, _requirements()))},
+        "packages": {name: package_version(name) for name in (DISTRIBUTION, *map(_package_name, _requirements()))},
         "engines": [_engine(one) for one in ENGINES],
         "extras": {name: {"about": about, **_extra(name)} for name, about in EXTRAS.items()},
     }
@@ -111,7 +111,7 @@ def _engine(one: Engine) -> dict[str, Any]:
 def _extra(name: str) -> dict[str, Any]:
     from planning.engines.registry import package_version
 
-    missing = [one for one in _requirements(name) if package_version(_name_with_version(one)) is None]
+    missing = [one for one in _requirements(name) if package_version(_package_name(one)) is None]
     return {
         "ready": not missing,
         "to_do": " ".join(["pip install", *(f"'{one}'" for one in missing)] if missing else []),
@@ -129,7 +129,7 @@ def _requirements(extra: str = "") -> list[str]:
     return [name.strip() for name, _, marker in marked if (wanted.search(marker) if extra else "extra" not in marker)]
 
 
-def _name_with_version(requirement: str) -> str:
+def _package_name(requirement: str) -> str:
     return re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
 
 

@@ -35,7 +35,29 @@ _Row = tuple[str, tuple[Fact, ...]]
 @cache_on_owner
 def write_problem(problem: Problem) -> bytes:
     """Return the problem as a line of JSON; kept on it, since all engines of a race receive an equal request."""
-    return _line(problem)
+    rows = [_rows.find(action, None) or _rows.keep(action, None, _row(action)) for action in problem.actions]
+    before = len(problem.init) + len(problem.goal)
+    mentioned = [*problem.init, *problem.goal, *chain.from_iterable([facts for _, facts in rows])]
+    places = list(map(id, mentioned))  # ids compare faster than facts; `mentioned` keeps the ids unique
+    number: dict[Fact, int] = {}
+    first = dict(zip(places, mentioned, strict=True))
+    known = {place: number.setdefault(fact, len(number)) for place, fact in first.items()}
+    numbers = [known[place] for place in places]
+    rest = {
+        "facts": [[fact.predicate, *fact.args] for fact in number],
+        "domain": problem.domain,
+        "objects": dict(problem.objects),
+        "init": numbers[: len(problem.init)],
+        "goal": numbers[len(problem.init) : before],
+        "unreachable": problem.unreachable,
+        "numbers": [[to_json(fluent), value] for fluent, value in problem.numbers.items()],
+        "bounds": list(map(_bound_to_json, problem.bounds)),
+        "notes": problem.notes,
+        "one_at_a_time": problem.one_at_a_time,
+        "whole": problem.unsliced is not None,
+    }
+    actions = ",".join([text for text, _ in rows]) % tuple(numbers[before:])
+    return f'{json.dumps(rest)[:-1]}, "actions": [{actions}]}}\n'.encode()
 
 
 def read(request: Mapping[str, Any]) -> Problem:
@@ -69,32 +91,6 @@ def read(request: Mapping[str, Any]) -> Problem:
         notes=tuple(request["notes"]),
         one_at_a_time=request["one_at_a_time"],
     )
-
-
-def _line(problem: Problem) -> bytes:
-    rows = [_rows.find(action, None) or _rows.keep(action, None, _row(action)) for action in problem.actions]
-    before = len(problem.init) + len(problem.goal)
-    mentioned = [*problem.init, *problem.goal, *chain.from_iterable([facts for _, facts in rows])]
-    places = list(map(id, mentioned))  # ids compare faster than facts; `mentioned` keeps the ids unique
-    number: dict[Fact, int] = {}
-    first = dict(zip(places, mentioned, strict=True))
-    known = {place: number.setdefault(fact, len(number)) for place, fact in first.items()}
-    numbers = [known[place] for place in places]
-    rest = {
-        "facts": [[fact.predicate, *fact.args] for fact in number],
-        "domain": problem.domain,
-        "objects": dict(problem.objects),
-        "init": numbers[: len(problem.init)],
-        "goal": numbers[len(problem.init) : before],
-        "unreachable": problem.unreachable,
-        "numbers": [[to_json(fluent), value] for fluent, value in problem.numbers.items()],
-        "bounds": list(map(_bound_to_json, problem.bounds)),
-        "notes": problem.notes,
-        "one_at_a_time": problem.one_at_a_time,
-        "whole": problem.unsliced is not None,
-    }
-    actions = ",".join([text for text, _ in rows]) % tuple(numbers[before:])
-    return f'{json.dumps(rest)[:-1]}, "actions": [{actions}]}}\n'.encode()
 
 
 def _row(action: GroundAction) -> _Row:

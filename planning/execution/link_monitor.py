@@ -176,7 +176,7 @@ class LinkMonitor:
     def _brings(self, step: PlanStep) -> list[Expression]:
         """Return the facts that a step adds in every world; equal objects each time, whose tests are compiled once."""
         if step not in self._brought:
-            parts = conjuncts(_expect(step, self._domain))
+            parts = conjuncts(_expectation_of(step, self._domain))
             self._brought[step] = [part for part in parts if isinstance(part, Atom)]
         return self._brought[step]
 
@@ -262,9 +262,9 @@ class LinkMonitor:
     def _not_done(self, world: World) -> tuple[int, ...]:
         """Return the numbers of the remaining steps, without running steps whose expected effects already hold."""
         progress = self._progress
-        done = [n for n in progress.running if is_true(_expect(progress.steps[n - 1], self._domain), world)]
+        done = [n for n in progress.running if is_true(_expectation_of(progress.steps[n - 1], self._domain), world)]
         return tuple([number for number in progress.remaining if number not in done])
 
 
-def _expect(step: PlanStep, domain: PlanningDomain) -> Expression:
+def _expectation_of(step: PlanStep, domain: PlanningDomain) -> Expression:
     return expectation(domain.action(step).effect, domain.bindings(step))

@@ -170,7 +170,7 @@ def _comparison(e: Comparison, changes: Sequence[Leaf]) -> Expression:
     if isinstance(e.left, Constant | Variable) and isinstance(e.right, Constant | Variable):
         return _decide(e.operator, e.left, e.right) or e  # a shortcut with the result of the general case
     return disjunction(
-        conjunction((before_left, before_right, _regress_comparison(e.operator, new_left, new_right)))
+        conjunction((before_left, before_right, _make_comparison(e.operator, new_left, new_right)))
         for before_left, new_left in _values(e.left, changes)
         for before_right, new_right in _values(e.right, changes)
     )
@@ -181,12 +181,12 @@ def _hit(leaf: Leaf, own: tuple[Term, ...], asked: tuple[Term, ...]) -> Expressi
     taken = frozenset[str]().union(*map(free_variables, asked))
     names = {v.name: Variable(fresh(v.name, taken)) for v in leaf.variables if v.name in taken}
     variables = tuple(replace(v, name=names.get(v.name, v).name) for v in leaf.variables)
-    same = (_regress_comparison("=", substitute(mine, names), other) for mine, other in zip(own, asked, strict=True))
+    same = (_make_comparison("=", substitute(mine, names), other) for mine, other in zip(own, asked, strict=True))
     matching = conjunction((*same, substitute(leaf.condition, names)))
     return Exists(variables, matching) if variables and matching != FALSE else matching
 
 
-def _regress_comparison(operator: str, left: Term, right: Term) -> Expression:
+def _make_comparison(operator: str, left: Term, right: Term) -> Expression:
     return _decide(operator, left, right) or Comparison(operator, left, right)
 
 

@@ -162,7 +162,6 @@ class Carrier:
     def __init__(self, domain: PlanningDomain, library: Library, rules: Iterable[Rule]) -> None:
         self._domain = domain
         self._library = library.copy()
-        self._plots = library.plots
         self.rules = tuple(rules)
         self._usage: dict[tuple[str, ...], Usage] = {}  # most steps share their candidates
         self._carried: dict[tuple[PlanStep, tuple[str, ...]], CarriedStep] = {}
@@ -171,7 +170,7 @@ class Carrier:
     def of(domain: PlanningDomain, library: Library, rules: Sequence[Rule]) -> Carrier:
         """Return the carrier of an earlier plan if rules and experience are equal, since plans share most steps."""
         carriers = _carriers(domain)
-        known = carriers.get(id(library.plots))  # the carrier keeps these plots, so that their id is not used again
+        known = carriers.get(id(library.plots))  # its copy of the library keeps them, so that their id stays in use
         if known is None or not known.suits(library, rules):
             if len(carriers) >= _MOST_CARRIERS:
                 carriers.clear()
@@ -179,9 +178,8 @@ class Carrier:
         return known
 
     def suits(self, library: Library, rules: Sequence[Rule]) -> bool:
-        """Return whether this carrier has these plots, rules and experience."""
-        same = self._plots is library.plots and self._library.experience.tries is library.experience.tries
-        return same and self.rules == tuple(rules)
+        """Return whether rules and experience equal those of this carrier."""
+        return self.rules == tuple(rules) and self._library.experience.tries is library.experience.tries
 
     def carried(self, step: PlanStep) -> CarriedStep:
         """Return the step as a dynamic state whose candidates implement its action and fit its arguments.

@@ -10,7 +10,6 @@ import asyncio
 import contextlib
 import math
 import threading
-import time
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -49,21 +48,21 @@ class WorkLimit(Meter):
 
     def __init__(self, seconds: float = math.inf) -> None:
         self.doing = "constructing the problem"
-        self._deadline = time.monotonic() + seconds
+        self._seconds = seconds
         self._cancelled = threading.Event()
         super().__init__(Bounds(seconds=seconds, cancelled=self._cancelled.is_set))
 
     @property
     def left(self) -> float:
         """The remaining seconds; infinite without a limit."""
-        return max(0.0, self._deadline - time.monotonic())
+        return max(0.0, self._seconds - self.seconds)
 
     def cancel(self) -> None:
         """Stop the work at its next call of `spend`; any thread may call this method."""
         self._cancelled.set()
         self.check_soon()
 
-    def end(self, reason: str) -> WorkLimitError:  # noqa: ARG002  the caller knows its limit
+    def error(self, reason: str) -> WorkLimitError:  # noqa: ARG002  the caller knows its limit
         """Return the error that names the work in progress."""
         return WorkLimitError(self.doing)
 

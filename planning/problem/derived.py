@@ -157,9 +157,9 @@ class Settled:
         return self._replaced(expanded) if self.predicates else expanded
 
     def _replaced(self, e: Expression) -> Expression:
-        return with_atoms(e, self._list)
+        return with_atoms(e, self._list_facts)
 
-    def _list(self, atom: Atom) -> Expression:
+    def _list_facts(self, atom: Atom) -> Expression:
         if atom.predicate not in self.predicates:
             return atom
         known = sorted((one.args for one in self.facts if one.predicate == atom.predicate), key=str)

@@ -43,16 +43,19 @@ def require_able(part: object, method: str, what: str) -> None:
     """Raise `InputError` unless `part` is `None` or an object with that method; `what` is its word in the message."""
     if part is None:
         return
-    if isinstance(part, type):
-        raise InputError(f"{what} is an object, not a class; an instance is made by {part.__name__}()")
+    _require_object(part, what)
     if not callable(getattr(part, method, None)):
         raise InputError(f"{what} needs a method '{method}', which {shown(part)[:60]} lacks")
 
 
+def _require_object(part: object, what: str) -> None:
+    if isinstance(part, type):
+        raise InputError(f"{what} is an object, not a class; an instance is made by {part.__name__}()")
+
+
 def require_methods(part: _Part, kind: type[object]) -> _Part:
     """Return a part, e.g. a driver; raise `InputError` if it lacks a method of its protocol `kind`."""
-    if isinstance(part, type):
-        raise InputError(f"a {kind.__name__} is an object, not a class; an instance is made by {part.__name__}()")
+    _require_object(part, f"a {kind.__name__}")
     missing = [name for name in vars(kind) if name[0] != "_" and not callable(getattr(part, name, None))]
     if missing:
         raise InputError(f"{shown(part)[:60]} is no {kind.__name__}: it has no method '{missing[0]}'", found=missing[0])

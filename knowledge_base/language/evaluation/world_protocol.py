@@ -152,26 +152,30 @@ class Meter:
         try:
             yield
         except _BoundReachedError as reached:
-            seconds = self._bounds.now() - self._began
             said = shortened(question if isinstance(question, str) else to_text(question), _LONGEST_SHOWN)
-            raise OutOfBoundsError(f"{reached}: {said}", work=self.work, seconds=seconds) from None
+            raise OutOfBoundsError(f"{reached}: {said}", work=self.work, seconds=self.seconds) from None
 
     def check_soon(self) -> None:
         """Check the bounds at the next piece of work."""
         self._next_check = 0
 
-    def end(self, reason: str) -> Exception:
+    @property
+    def seconds(self) -> float:
+        """The seconds since the construction of this object."""
+        return self._bounds.now() - self._began
+
+    def error(self, reason: str) -> Exception:
         """Return the error that ends the work."""
         return _BoundReachedError(reason)
 
     def _check(self) -> None:
-        bounds, seconds = self._bounds, self._bounds.now() - self._began
+        bounds, seconds = self._bounds, self.seconds
         if bounds.cancelled is not None and bounds.cancelled():
-            raise self.end("the query was cancelled")
+            raise self.error("the query was cancelled")
         if bounds.work is not None and self.work > bounds.work:
-            raise self.end(f"the query visits more than {bounds.work} facts and objects")
+            raise self.error(f"the query visits more than {bounds.work} facts and objects")
         if bounds.seconds is not None and seconds > bounds.seconds:
-            raise self.end(f"the query takes longer than {bounds.seconds:g} s")
+            raise self.error(f"the query takes longer than {bounds.seconds:g} s")
         self._next_check = self.work + CHECK_EVERY
         if bounds.work is not None:
             self._next_check = min(self._next_check, bounds.work + 1)

@@ -230,10 +230,10 @@ def typed_variables(nodes: Sequence[Node], *, distinct: bool = True) -> tuple[Ty
 
 def _unglue(nodes: Sequence[Node]) -> list[Node]:
     """Return the list with a word such as `-cup`, which some files contain, split into `-` and `cup`."""
-    return [part for node in nodes for part in _part(node)]
+    return [part for node in nodes for part in _split_dash(node)]
 
 
-def _part(node: Node) -> tuple[Node, ...]:
+def _split_dash(node: Node) -> tuple[Node, ...]:
     if isinstance(node, Group) or node.quoted or not node.text.startswith("-") or is_number(node.text):
         return (node,)
     after = Place(node.place.source, node.place.line, (node.place.column or 0) + 1)
