@@ -24,6 +24,7 @@ from pydantic import BaseModel
 from dsc.data_types import ANY, DataType, data_type
 from knowledge_base.errors import InputError, Place, SchemaError, nearest, tolerated
 from knowledge_base.spelling import is_plain_name
+from knowledge_base.user_objects import described
 
 _PLAIN: Mapping[object, str] = {bool: "boolean", int: "integer", float: "number", str: "text"}
 _WORDS = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
@@ -222,7 +223,7 @@ def evaluated(annotation: object, names: Namespace, what: str) -> object:
         hint = f"; did you mean '{found}'?" if found else "; define or import it before, also outside TYPE_CHECKING"
         raise SchemaError(message + hint, found=name) from None
     except Exception as error:  # annotations may contain any expression
-        raise SchemaError(f"the annotation of {what} cannot be evaluated: {error}") from error
+        raise SchemaError(f"the annotation of {what} cannot be evaluated: {described(error)}") from error
 
 
 def parameter_annotations(body: Callable[..., Any], own: int, names: Namespace) -> dict[str, object]:

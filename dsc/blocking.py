@@ -29,9 +29,9 @@ from dsc.calls import OBSERVED, Reported_contra, SkillCall
 from dsc.errors import ProgrammingError, SkillError
 from dsc.outcomes import Outcome
 from dsc.run_log import run_logger
-from knowledge_base.errors import described
 from knowledge_base.facts import Delta
 from knowledge_base.tracebacks import raised_at, whole_traceback
+from knowledge_base.user_objects import as_exception, described, has_type
 
 _LOG = run_logger("dsc.skills")
 
@@ -147,8 +147,8 @@ async def _run_supervised(
         try:
             outcome = work()
         except BaseException as error:  # noqa: BLE001  # e.g. SystemExit, which would otherwise end the thread without a report
-            stopped = issubclass(type(error), StoppedError) and blocking.stopping.is_set()
-            post(ended.set_exception, DeadlineError() if stopped else _carried_over(error))
+            stopped = has_type(error, StoppedError) and blocking.stopping.is_set()
+            post(ended.set_exception, DeadlineError() if stopped else as_exception(error))
         else:
             post(ended.set_result, outcome)
 
@@ -170,20 +170,6 @@ async def _run_supervised(
     finally:
         for watcher in tuple(watchers):
             watcher.cancel()
-
-
-def _carried_over(error: BaseException) -> Exception:
-    """Return a thread's error in a form that a future accepts.
-
-    A future rejects `StopIteration`. An error that is not an `Exception`, e.g. `SystemExit`, would end the program. The
-    function replaces both kinds of error by a `RuntimeError`.
-    """
-    with suppress(BaseException):  # an exception may fail while its class is inspected
-        if isinstance(error, Exception) and not isinstance(error, StopIteration | type):
-            return error
-    carried = RuntimeError(described(error))
-    carried.__cause__ = error
-    return carried
 
 
 async def _until_stopped(ended: asyncio.Future[Outcome], stop: Callable[[], None]) -> Outcome:
@@ -272,7 +258,7 @@ def _child(
 def _news_of(error: BaseException, body: Callable[..., Outcome], name: str) -> tuple[str, Any]:
     """Return the message about an error of the body, as text: the parent process may be unable to read the error."""
     declared = (SkillError, *getattr(getattr(body, "__self__", None), "device_errors", ()))
-    if issubclass(type(error), declared):
+    if has_type(error, declared):
         return "error", described(error)
     return "bug", (f"{name}.{body.__name__}: {described(error)}{raised_at(error)}", whole_traceback(error))
 

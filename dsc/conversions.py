@@ -23,8 +23,9 @@ from dsc.annotations import FoundRecords, evaluated, names_around, type_of
 from dsc.data_types import Records, data_type
 from dsc.python_values import Builder, plain_value, typed_parameters
 from dsc.run_log import run_logger
-from knowledge_base.errors import InputError, Place, SchemaError, described, tolerated
+from knowledge_base.errors import InputError, Place, SchemaError, tolerated
 from knowledge_base.spelling import is_plain_name
+from knowledge_base.user_objects import described
 
 LONGEST = 0.05
 """Seconds after which a conversion is reported in the log, as no event is processed meanwhile."""

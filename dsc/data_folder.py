@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from dsc.errors import LostDataError
 from knowledge_base.errors import InputError, StoreError
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 SCHEME = "data:"
 """Beginning of each reference."""

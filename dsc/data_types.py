@@ -16,8 +16,8 @@ from typing import Any, Literal
 from dsc.type_words import bound_text, brief, choice_text, choice_values, collapse_blanks, in_words, not_a_type
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import GEOMETRY, MOST_NUMBERS
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.spelling import is_plain_name
+from knowledge_base.user_objects import shown
 
 Kind = Literal["number", "integer", "boolean", "name", "geometry", "choice", "list", "map", "optional"]
 Records = Mapping[str, Mapping[str, str | None]]

@@ -11,7 +11,8 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from dsc.annotations import FoundRecords, Namespace, is_record, parameter_annotations, record_fields, type_of
-from knowledge_base.errors import InputError, described
+from knowledge_base.errors import InputError
+from knowledge_base.user_objects import described
 
 Builder = Callable[[Any], Any]
 """Function that makes the value of Python for plain data."""

@@ -41,7 +41,7 @@ from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome, declared_outcomes
 from dsc.python_values import Builder, plain_value, typed_parameters
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 AfterCrash = Literal["repeat", "same_id", "sense"]
 """The reaction to an action whose effect is unknown after a crash.

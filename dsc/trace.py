@@ -16,6 +16,7 @@ from typing import IO, Any, NamedTuple
 from pydantic_core import PydanticSerializationError, to_json
 
 from knowledge_base.errors import InputError
+from knowledge_base.user_objects import as_exception
 
 FORMAT = "dsc-trace"
 VERSION = 2
@@ -111,7 +112,7 @@ class Trace:
                 if self.blame is None:
                     raise
                 self._listeners.remove(listener)
-                self.blame(error if isinstance(error, Exception) else RuntimeError(repr(error)))
+                self.blame(as_exception(error))
         return self._seq
 
 

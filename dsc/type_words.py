@@ -6,8 +6,8 @@ import re
 
 from knowledge_base.errors import InputError
 from knowledge_base.facts import GEOMETRY, MOST_NUMBERS
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.spelling import TRUTH_VALUES, is_plain_name, text_inside, value_text
+from knowledge_base.user_objects import shown
 
 _LIKE_PYTHON = re.compile(r"(list|map|dict|optional)[\[(<](.*)[\])>]", re.IGNORECASE)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import heapq
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -69,53 +69,6 @@ def shortened(text: str, longest: int = MAX_MESSAGE) -> str:
     """Return the text, without its middle if it has more than `longest` characters."""
     half = longest // 2
     return text if len(text) <= longest else f"{text[:half]} … {text[-half:]}"
-
-
-MAX_MEMBERS = 3
-"""Maximum number of exceptions in the description of a group; also the maximum depth of nested groups."""
-_name_of = type.__dict__["__name__"].__get__  # a metaclass may return another name, or fail
-_members_of = BaseExceptionGroup.__dict__["exceptions"].__get__
-
-
-def type_name(value: object) -> str:
-    """Return the name of the value's type on one line, without calling code of the value or its metaclass."""
-    return printable(shortened(str.__str__(_name_of(type(value))), MAX_NAME))
-
-
-def described(error: BaseException, *, named: bool = True) -> str:
-    """Return the exception on one line of at most `MAX_MESSAGE` characters.
-
-    A group includes its first exceptions.
-
-    User code defines the type, metaclass and text of an exception, and each of these may fail. This function never
-    raises.
-
-    Args:
-        error: the exception.
-        named: whether the name of the exception's type precedes its text.
-    """
-    try:
-        return shortened(_describe(error, MAX_MEMBERS, named=named))
-    except BaseException:  # noqa: BLE001  # e.g. RecursionError: the stack ends here
-        return "an exception that cannot be described"
-
-
-def _describe(error: BaseException, depth: int, *, named: bool) -> str:
-    text = text_of(error, str)
-    if issubclass(type(error), BaseExceptionGroup) and depth:  # `isinstance` would call `__class__` of the error
-        members = [_describe(one, depth - 1, named=True) for one in _members_of(error)[:MAX_MEMBERS]]
-        text = f"{text}: {'; '.join(members)}"
-    said = [type_name(error)] if named or not text else []
-    return shortened(": ".join([*said, text] if text else said))
-
-
-def text_of(value: object, write: Callable[[object], str]) -> str:
-    """Return the value by `str` or `repr` on one line of bounded length, or a replacement text if `write` raises."""
-    try:
-        text = shortened(str.__str__(write(value)))
-        return shortened(printable(" ".join(text.split()) if write is str else text))
-    except BaseException as problem:  # noqa: BLE001  # user code may raise anything, `SystemExit` too
-        return f"(a text that cannot be made: {type_name(problem)})"
 
 
 @lru_cache(maxsize=4096)  # the errors of one text share the same valid names

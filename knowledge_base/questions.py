@@ -9,12 +9,13 @@ from typing import TypeVar
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
 from knowledge_base.language.checking.check import Free, check
-from knowledge_base.language.checking.inputs import fitted_names, require_condition, require_params, shown
+from knowledge_base.language.checking.inputs import fitted_names, require_condition, require_params
 from knowledge_base.language.evaluation.evaluator import Asked, Queried, asked, queried, rows
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.language.syntax.expression import Expression, free_variables
 from knowledge_base.language.syntax.identity_cache import IdentityCache
 from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.user_objects import shown
 from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.state import WorldState
 

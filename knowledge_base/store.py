@@ -24,7 +24,7 @@ from knowledge_base.journal.archive import Archive
 from knowledge_base.journal.file import Durability, located
 from knowledge_base.journal.history import History, MemoryHistory, Version, Writer, gone
 from knowledge_base.journal.journal import Journal
-from knowledge_base.language.checking.inputs import require_delta, require_text, require_time, require_version, shown
+from knowledge_base.language.checking.inputs import require_delta, require_text, require_time, require_version
 from knowledge_base.language.syntax.expression import Expression
 from knowledge_base.language.syntax.sexpr import read
 from knowledge_base.live_relations import LiveRelations
@@ -32,6 +32,7 @@ from knowledge_base.live_transforms import LiveTransforms
 from knowledge_base.sources import DataSource, SourceListener, Sources
 from knowledge_base.statements import told
 from knowledge_base.transaction import GroupCommit, Transaction
+from knowledge_base.user_objects import shown
 from knowledge_base.view import View
 from knowledge_base.world.live_rows import LiveRows, Rows
 from knowledge_base.world.overlay import Overlay
@@ -110,9 +111,8 @@ class KnowledgeBase(View):
         """
         if not (schema is None or isinstance(schema, Schema)):
             raise InputError(f"a schema is a Schema, not {shown(schema)}; Schema.parse reads its text")
-        if durability not in (None, *get_args(Durability)):
-            valid = get_args(Durability)
-            raise InputError(f"there is no durability {shown(durability)}", found=str(durability), valid=valid)
+        if durability not in (None, *(valid := get_args(Durability))):
+            raise InputError(f"there is no durability {shown(durability)}", found=durability, valid=valid)
         if path is None:
             if schema is None or durability not in (None, "memory") or read_only or new:
                 raise InputError("a knowledge base without a file has a schema and durability 'memory'")

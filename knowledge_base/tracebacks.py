@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from knowledge_base.errors import Place, described, printable, shortened
+from knowledge_base.errors import Place, printable, shortened
+from knowledge_base.user_objects import described, has_type
 
 
 def raised_at(error: BaseException, *, only_users: bool = False) -> str:
@@ -20,9 +21,8 @@ def raised_at(error: BaseException, *, only_users: bool = False) -> str:
     Code of this project, of the standard library and of installed packages counts only if no other code was involved,
     and never with `only_users`. A syntax error has the line that cannot be read.
     """
-    # `isinstance` would read the `__class__` of a user's exception, which may fail.
-    if issubclass(type(error), SyntaxError) and getattr(error, "filename", None) is not None:
-        return f" ({error.filename}:{error.lineno})"  # type: ignore[attr-defined]
+    if has_type(error, SyntaxError) and error.filename is not None:
+        return f" ({error.filename}:{error.lineno})"
     frames = list(_frames(error))
     users = [frame for frame in frames if is_users_code(frame[0])]
     found = users if users or only_users else [frame for frame in frames if not frame[0].startswith(_FROZEN)]
@@ -35,8 +35,7 @@ def _frames(error: BaseException) -> Iterator[tuple[str, int]]:
     while cause is not None:
         for frame, line in traceback.walk_tb(cause.__traceback__):
             yield frame.f_code.co_filename, line
-        group = issubclass(type(cause), BaseExceptionGroup)
-        cause = cause.exceptions[0] if group else cause.__cause__  # type: ignore[attr-defined]
+        cause = cause.exceptions[0] if has_type(cause, BaseExceptionGroup) else cause.__cause__
 
 
 def waits_at(coroutine: Any) -> str:

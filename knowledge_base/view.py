@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from knowledge_base.errors import ConflictError, InputError, SchemaError
 from knowledge_base.exchange import to_json
 from knowledge_base.facts import Content, Delta, Fact, Value
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.checking.vocabulary import Signature
 from knowledge_base.language.evaluation.explanation import Explanation, explain
 from knowledge_base.language.evaluation.query_plan import QueryPlan, plan_query
@@ -20,6 +19,7 @@ from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.pddl.writer import problem_to_text
 from knowledge_base.questions import Binding, Prepared, Questions
 from knowledge_base.spelling import number_text
+from knowledge_base.user_objects import shown
 from knowledge_base.world.overlay import Overlay
 from knowledge_base.world.read_write_lock import ReadWriteLock
 from knowledge_base.world.schema import Schema

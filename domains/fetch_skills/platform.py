@@ -15,7 +15,8 @@ from dsc.outcomes import Outcome
 from dsc.skills import skill
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta, fact
-from knowledge_base.language.checking.inputs import require_methods, shown
+from knowledge_base.language.checking.inputs import require_methods
+from knowledge_base.user_objects import shown
 
 Position = Annotated[list[float], "geometry"]
 """Coordinates x and y in metres, from the knowledge base."""

@@ -16,9 +16,10 @@ from dsc.components.life_cycle import NEUTRAL, LifeCycle
 from dsc.components.parameters import Parameters, ParameterValues
 from dsc.components.ports import EventActivations
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError, described
-from knowledge_base.language.checking.inputs import require_several, shown
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.language.checking.inputs import require_several
 from knowledge_base.tracebacks import place_of, raised_at
+from knowledge_base.user_objects import described, shown
 
 
 def component_of(name: str, *functions: SkillBody) -> Component:

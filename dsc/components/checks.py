@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from knowledge_base.errors import InputError
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 _POSE = 7
 """Number of the numbers of a pose: x y z in metres, and a quaternion."""

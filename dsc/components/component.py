@@ -28,7 +28,7 @@ from dsc.model.plot import ActionPlot
 from dsc.outcomes import Outcome
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, check_arguments, signatures
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError, tolerated
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 ALWAYS = ""
 """Key of `ComponentHooks.needs` that applies in every mode."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from knowledge_base.errors import InputError, described
+from knowledge_base.errors import InputError
+from knowledge_base.user_objects import described
 
 
 def encoded(value: Any) -> bytes:

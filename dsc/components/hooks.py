@@ -23,8 +23,9 @@ from weakref import WeakSet
 
 from dsc.errors import ProgrammingError, SkillError
 from dsc.run_log import run_logger
-from knowledge_base.errors import InputError, described
+from knowledge_base.errors import InputError
 from knowledge_base.tracebacks import is_users_code, raised_at, waits_at, whole_traceback
+from knowledge_base.user_objects import described, has_type
 
 _LOG = run_logger(__package__)
 Classes = tuple[type[BaseException], ...]
@@ -130,13 +131,13 @@ class contained:  # noqa: N801  # a context manager, named like `suppress`
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        if error is None or not (issubclass(type(error), Exception) or is_own(error, self._task)):
+        if error is None or not (has_type(error, Exception) or is_own(error, self._task)):
             return
         bug = programming_error(error, self._hook, self._raises) if self._hook else None
         if bug is not None:
             raise bug from error
-        if not issubclass(type(error), Exception):
-            itself = ": it cancelled itself" if issubclass(type(error), asyncio.CancelledError) else ""
+        if not has_type(error, Exception):
+            itself = ": it cancelled itself" if has_type(error, asyncio.CancelledError) else ""
             raise RuntimeError(described(error) + itself) from error
 
 
@@ -153,11 +154,10 @@ def programming_error(error: BaseException, hook: str, raises: Classes = ()) -> 
     known = bug_in(error)
     if known is not None:  # logged before
         return known
-    kind = type(error)
-    if issubclass(kind, (SkillError, *raises)):
+    if issubclass(type(error), (SkillError, *raises)):
         return None
-    itself = ": it cancelled itself" if issubclass(kind, asyncio.CancelledError) else ""
-    refused = issubclass(kind, InputError)  # its message is complete without a line of this project
+    itself = ": it cancelled itself" if has_type(error, asyncio.CancelledError) else ""
+    refused = has_type(error, InputError)  # its message is complete without a line of this project
     said = described(error, named=not refused)
     said += _RETURNED if _RAISED in said else ""
     bug = ProgrammingError(f"{hook}: {said}{itself}{raised_at(error, only_users=refused)}")
@@ -178,7 +178,7 @@ def bug_in(error: BaseException) -> ProgrammingError | None:
 
 def reason_of(error: BaseException) -> str:
     """Return an error of a hook as text, without the class of an error whose message is complete."""
-    return described(error, named=not issubclass(type(error), (ProgrammingError, InputError)))
+    return described(error, named=not has_type(error, (ProgrammingError, InputError)))
 
 
 def executes(hook: str, task: asyncio.Task[Any]) -> str:
@@ -196,12 +196,11 @@ def is_own(error: BaseException, task: asyncio.Task[Any] | None) -> bool:
         error: the error, raised inside the hook.
         task: the task that runs the hook; `None` outside of a task.
     """
-    kind = type(error)  # `isinstance` would read the exception's `__class__`, which may fail
-    if issubclass(kind, asyncio.CancelledError):
+    if has_type(error, asyncio.CancelledError):
         return task is None or task.cancelling() == 0
-    if issubclass(kind, GeneratorExit):  # other code closes a coroutine, never the task that runs it
+    if has_type(error, GeneratorExit):  # other code closes a coroutine, never the task that runs it
         return task is running_task()
-    return not (issubclass(kind, KeyboardInterrupt) and _from_keyboard(error))
+    return not (has_type(error, KeyboardInterrupt) and _from_keyboard(error))
 
 
 def running_task() -> asyncio.Task[Any] | None:

@@ -28,6 +28,7 @@ from dsc.components.periodic_steps import StepCounts, step_periodically
 from dsc.errors import NotAliveError, ProgrammingError
 from dsc.run_log import run_logger
 from knowledge_base.errors import InputError
+from knowledge_base.user_objects import has_type
 
 _LOG = run_logger(__package__)
 
@@ -425,7 +426,7 @@ class LifeCycle(Announcer):
 
     def fail(self, error: Exception) -> None:
         """Enter FatalError after an error of a hook."""
-        bug = error if isinstance(error, ProgrammingError) else None
+        bug = error if has_type(error, ProgrammingError) else None
         self.become(Life.FATAL_ERROR, reason_of(error), bug)
 
     def become(self, state: Life, reason: str = "", bug: ProgrammingError | None = None) -> None:

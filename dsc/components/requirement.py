@@ -16,8 +16,8 @@ from dsc.data_types import data_type
 from dsc.errors import NoAnswerError, NotWiredError
 from dsc.outcomes import Outcome
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.tracebacks import calling_place
+from knowledge_base.user_objects import shown
 
 _Result = TypeVar("_Result")
 USUAL = ""

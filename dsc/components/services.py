@@ -11,7 +11,7 @@ from typing import Literal
 
 from dsc.data_types import data_type
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 Values = Mapping[str, str | None]
 """Names of values with types, see `dsc.data_types`; `None` accepts any plain data."""

@@ -19,7 +19,7 @@ from dsc.data_types import data_type
 from dsc.errors import NoAnswerError, NotWiredError
 from dsc.loop_calls import LoopCalls
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 Receiver = Callable[[dict[str, Any], float], None]
 """Function that receives pushed values, as a separate copy, and their age: the seconds since their `put`."""

@@ -11,7 +11,7 @@ from dsc.outcomes import Outcome, declared_outcomes
 from dsc.skills import AfterCrash, Execution, declaration, named
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 _Body = TypeVar("_Body", bound=Callable[..., Any])
 

@@ -20,7 +20,7 @@ from dsc.events import RESERVED
 from dsc.model.plot import ActionPlot
 from dsc.model.ranges import Who
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 MOST_BOUND = 64
 """Upper bound of cached compiled plots that were given as data.

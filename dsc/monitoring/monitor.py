@@ -10,7 +10,8 @@ from typing import Any
 from dsc.components.component import Component
 from dsc.errors import SkillError
 from dsc.monitoring.profile import CHANGE, MonitoringProfile, When
-from knowledge_base.errors import UnknownNameError, described
+from knowledge_base.errors import UnknownNameError
+from knowledge_base.user_objects import described
 
 EARLY = 0.05
 """Share of a period by which an observation may come early, as timers are not exact."""

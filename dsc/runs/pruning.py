@@ -9,8 +9,8 @@ from sqlite3 import Connection
 
 from dsc.runs.archive import Pruned, RunRow, archive
 from knowledge_base.errors import InputError
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.user_objects import shown
 
 _SEAL = "SELECT seal FROM runs WHERE run = ?"
 _NAMES_PLOTS = (

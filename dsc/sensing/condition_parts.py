@@ -14,7 +14,6 @@ from typing import Any
 from dsc.components.value_vocabulary import ValueVocabulary
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Value
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
@@ -31,6 +30,7 @@ from knowledge_base.language.syntax.expression import (
 )
 from knowledge_base.language.syntax.rewriting import inside, with_terms
 from knowledge_base.language.syntax.text import to_text
+from knowledge_base.user_objects import shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)

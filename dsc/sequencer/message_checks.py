@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from dsc.calls import OBSERVED, RECORDED
 from dsc.components.component import Component
-from dsc.components.hooks import is_own, running_task
+from dsc.components.hooks import is_own, reason_of, running_task
 from dsc.components.wiring import required_port
 from dsc.data_types import WORDS, Records, check_all, data_type, objects_in
 from dsc.dynamic.library import Library
@@ -24,11 +24,12 @@ from dsc.runs.store import RunStore
 from dsc.sequencer.clock import LoopClock
 from dsc.skills import SkillSignature
 from dsc.trace import Trace
-from knowledge_base.errors import HistoryError, InputError, SchemaError, UnknownNameError, described
+from knowledge_base.errors import HistoryError, InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import Delta
-from knowledge_base.language.checking.inputs import require, require_delta, require_several, require_text, shown
+from knowledge_base.language.checking.inputs import require, require_delta, require_several, require_text
 from knowledge_base.language.evaluation.world_protocol import World
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.user_objects import described, has_type, shown
 
 _LOG = run_logger("dsc.skills")
 Declared = Mapping[str, str | None]
@@ -184,8 +185,8 @@ def validated_in_world(
             after.apply(said.observed)
         _require_objects(said.event, said.attributes, message.declared or {}, skill.records, *worlds)
     except Exception as error:  # noqa: BLE001  # an outcome may contain anything, e.g. unhashable values
-        reason = described(error, named=not isinstance(error, InputError))
-        if isinstance(error, UnknownNameError) and _was_deleted(error.found, knowledge):
+        reason = reason_of(error)
+        if has_type(error, UnknownNameError) and _was_deleted(error.found, knowledge):
             outcome = failed(message.start, reason)
         else:
             outcome = _invalid(message.start, reason, skill.place)

@@ -18,6 +18,7 @@ from dsc.errors import ProgrammingError
 from dsc.messages import Told
 from dsc.run_log import run_logger
 from dsc.sequencer.message_checks import encoded
+from knowledge_base.user_objects import has_type
 
 _LOG = run_logger(__package__)
 CLOSING = GRACE
@@ -196,7 +197,7 @@ class Outbox:
             except Exception as error:
                 if first is None:  # the next skill fails with this error
                     raise
-                if are_settings and not isinstance(error, ProgrammingError):  # they may succeed later
+                if are_settings and not has_type(error, ProgrammingError):  # they may succeed later
                     self._postpone(component, outputs)
                 else:
                     self._refuse(outputs)

@@ -24,8 +24,8 @@ from dsc.sequencer.clock import LoopClock, ScheduledCall
 from dsc.sequencer.message_checks import failed, faulty, late, validated
 from dsc.sequencer.outbox import Configuring
 from dsc.skills import SkillSignature
-from knowledge_base.errors import described
 from knowledge_base.tracebacks import waits_at
+from knowledge_base.user_objects import described, has_type
 
 _LOG = run_logger(__package__)
 
@@ -200,7 +200,7 @@ class RunningSkill:
         """Return the outcome of a skill that raised an error; `None` if its task was cancelled from outside."""
         if not is_own(error, self.task):
             return None
-        if issubclass(type(error), DeadlineError) or (self.is_late and issubclass(type(error), TimeoutError)):
+        if has_type(error, DeadlineError) or (self.is_late and has_type(error, TimeoutError)):
             return late(self.start, self.within)
         outcome = self._outcome_of(error)
         return late(self.start, self.within) if self.is_late and outcome.event == SKILL_ERROR else outcome

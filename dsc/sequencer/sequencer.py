@@ -11,11 +11,10 @@ from typing import Any, cast
 
 from dsc.calls import Outputs, PlotCall
 from dsc.components.component import Component
-from dsc.components.hooks import GRACE, programming_errors, unheard_errors
+from dsc.components.hooks import GRACE, bug_in, programming_errors, unheard_errors
 from dsc.dynamic.library import Library
 from dsc.engine.machine import Machine
 from dsc.engine.steps import Output, Start
-from dsc.errors import ProgrammingError
 from dsc.messages import FromOutside, KnowledgeMessage, LateMessage, Message, PlotsMessage, SkillMessage
 from dsc.run_log import logged_run
 from dsc.runs.kept import Kept
@@ -360,8 +359,8 @@ class Sequencer(OutsideInput):
             await recover(kept, self.dispatcher)
         except InputError as error:
             self._reactor.problem = str(error)
-            if isinstance(error.__cause__, ProgrammingError):
-                self._reactor.fail(str(error.__cause__))
+            if (bug := bug_in(error)) is not None:
+                self._reactor.fail(str(bug))
 
     # -- macrosteps: commit, then dispatch ---------------------------------------------------------------
 

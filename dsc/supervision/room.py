@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dsc.components.component import ALWAYS, Component
 from dsc.components.life_cycle import Announcer
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 Amounts = Mapping[str, float]
 

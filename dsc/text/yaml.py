@@ -37,8 +37,9 @@ from ruamel.yaml.scanner import Scanner, ScannerError
 
 from dsc.model.reading import FormPath, in_yaml, misread
 from knowledge_base.errors import InputError, ParseError, Place
-from knowledge_base.language.checking.inputs import require_text, shown
+from knowledge_base.language.checking.inputs import require_text
 from knowledge_base.pddl.files import read_text, require_size
+from knowledge_base.user_objects import shown
 
 MAX_DEPTH = 128
 MAX_PARTS = 18_000

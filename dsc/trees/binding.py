@@ -17,7 +17,7 @@ from dsc.trees.main_tree import main_tree
 from dsc.trees.model import Node, Port, TreeFile
 from dsc.trees.running.ports import key_of
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 _WITHOUT_NAME = frozenset({
     inspect.Parameter.VAR_POSITIONAL,

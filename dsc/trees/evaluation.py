@@ -9,7 +9,7 @@ from typing import Any
 from dsc.trees.blackboard import EMPTY, Board, Entry
 from dsc.trees.script import Assignment, Binary, Comparison, Conditional, Expression, Literal, Name, Script, Unary
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 Enums = Mapping[str, int]
 """Constants of enumerations by name."""

@@ -33,7 +33,7 @@ from dsc.trees.running.node import COMPLETE, Run, RunningNode, Status
 from dsc.trees.running.ports import key_of, read_port
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 PERIOD = 0.1
 """Seconds between two ticks."""

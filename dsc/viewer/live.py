@@ -14,8 +14,8 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import IO, TYPE_CHECKING, Any
 
+from dsc.components.hooks import reason_of
 from dsc.viewer.control import Control
-from knowledge_base.errors import InputError, described
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -152,4 +152,4 @@ class LivePage:
         if error is None:
             self._tell({"answer": number, "said": done.result()})
         else:
-            self._tell({"answer": number, "wrong": described(error, named=not isinstance(error, InputError))})
+            self._tell({"answer": number, "wrong": reason_of(error)})

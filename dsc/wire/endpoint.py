@@ -21,10 +21,11 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from dsc.components.frames import encoded
-from dsc.components.hooks import contained
+from dsc.components.hooks import contained, reason_of
 from dsc.errors import NoAnswerError, ProgrammingError, RefusedError
 from dsc.wire.presence import Presence, PresenceChanged
-from knowledge_base.errors import InputError, described, text_of
+from knowledge_base.errors import InputError
+from knowledge_base.user_objects import text_of
 
 Answers = Callable[[str, Any], Awaitable[Any]]
 """Function that answers a call; receives the sender's address and the body."""
@@ -348,7 +349,7 @@ class Endpoint:
         except ProgrammingError as error:
             return frame("bug", str(error))
         except Exception as error:  # noqa: BLE001  # any error reaches the caller as text
-            return frame("refusal", described(error, named=not isinstance(error, InputError)))
+            return frame("refusal", reason_of(error))
 
 
 _TO_CALLER = frozenset({"answer", "refusal", "bug", "running"})

@@ -33,7 +33,8 @@ from dsc.wire.publication import HostedStreams, Publisher
 from dsc.wire.remote_ports import requirement_form
 from knowledge_base.errors import InputError
 from knowledge_base.exchange import delta_form, delta_of
-from knowledge_base.language.checking.inputs import require_delta, require_text, require_time, shown
+from knowledge_base.language.checking.inputs import require_delta, require_text, require_time
+from knowledge_base.user_objects import shown
 
 _LOG = run_logger(__package__)
 

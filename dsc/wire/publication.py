@@ -14,11 +14,12 @@ from functools import partial
 from typing import Any
 
 from dsc.components.component import Component
+from dsc.components.hooks import reason_of
 from dsc.components.services import Service, Values, require_fitting
 from dsc.components.streams import Push, Receiver, Stream
 from dsc.errors import NoAnswerError, RefusedError
 from dsc.wire.endpoint import Endpoint
-from knowledge_base.errors import InputError, described
+from knowledge_base.errors import InputError
 
 RENEWED = 1.0
 """Seconds after which a subscriber renews its subscription."""
@@ -134,7 +135,7 @@ class Subscription:
                     self.take(newest)
                     self.problem = None
                 except Exception as error:  # noqa: BLE001  # a faulty value must not end the subscription
-                    self.problem = described(error, named=not isinstance(error, InputError))
+                    self.problem = reason_of(error)
             await asyncio.sleep(RENEWED)
 
     def forget_age(self) -> None:

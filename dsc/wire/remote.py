@@ -33,8 +33,9 @@ from dsc.wire.heartbeat import Heartbeat
 from dsc.wire.host import CONDITION, outcome_of
 from dsc.wire.publication import RemotePush, Subscription
 from dsc.wire.remote_ports import RemoteWires, requirement_of
-from knowledge_base.errors import InputError, described, text_of
+from knowledge_base.errors import InputError
 from knowledge_base.language.checking.inputs import require_text
+from knowledge_base.user_objects import described, text_of
 
 WATCH = 1.0
 """Seconds between queries of an action's state."""

@@ -22,7 +22,8 @@ from urllib.parse import quote, unquote
 from dsc.run_log import run_logger
 from dsc.wire.endpoint import BROADCAST, MOST_BYTES, Receive, require_free
 from dsc.wire.presence import Presence, PresenceChanged
-from knowledge_base.errors import InputError, described
+from knowledge_base.errors import InputError
+from knowledge_base.user_objects import described
 
 if TYPE_CHECKING:
     import zenoh

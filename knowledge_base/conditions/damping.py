@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 from knowledge_base.errors import InputError
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.expression import (
     And,
     Arithmetic,
@@ -21,6 +20,7 @@ from knowledge_base.language.syntax.expression import (
     Not,
     Or,
 )
+from knowledge_base.user_objects import shown
 
 Fire = Literal["edge", "each"]
 FIRE: tuple[Fire, ...] = ("edge", "each")

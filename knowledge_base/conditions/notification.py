@@ -10,8 +10,8 @@ from functools import partial
 from itertools import count
 from typing import Generic, TypeVar
 
-from knowledge_base.errors import described
 from knowledge_base.facts import Change
+from knowledge_base.user_objects import as_exception
 from knowledge_base.world.read_write_lock import ReadWriteLock
 
 Listener = Callable[[Change], None]
@@ -75,9 +75,7 @@ class Notifier:
                 except Exception as error:  # noqa: BLE001  a failing listener must not prevent the calls of the others
                     errors.append(error)
                 except (SystemExit, GeneratorExit) as error:  # a listener must not end the program
-                    exits = RuntimeError(described(error))
-                    exits.__cause__ = error
-                    errors.append(exits)
+                    errors.append(as_exception(error))
         except BaseException:  # after an interrupt, another thread must be able to deliver
             if self._deliverer is me:
                 self._deliverer = None

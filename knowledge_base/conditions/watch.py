@@ -13,9 +13,10 @@ from knowledge_base.conditions.notification import Waiters
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.facts import Change, Delta, Value
 from knowledge_base.language.checking.check import check_arity
-from knowledge_base.language.checking.inputs import fitted_names, require_condition, require_params, shown
+from knowledge_base.language.checking.inputs import fitted_names, require_condition, require_params
 from knowledge_base.language.syntax.expression import Atom, Constant, Expression, Variable
 from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.user_objects import shown
 from knowledge_base.world.schema import Schema
 
 Touches = Callable[[Change], bool]

@@ -21,8 +21,8 @@ from typing import Literal, NamedTuple
 
 from knowledge_base.errors import DamagedStoreError, InputError, Place, StoreError
 from knowledge_base.journal.sidecar_files import INDEX, LOG, OLD_LOG, place, regular, require_no_strangers, unlocked
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.pddl.files import neighbour_files
+from knowledge_base.user_objects import shown
 
 Durability = Literal["memory", "process", "power"]
 """The failures that a commit survives.

@@ -29,6 +29,7 @@ from knowledge_base.errors import Place, StoreError
 from knowledge_base.journal.file import Durability, connect, reported, require_one_name, require_own, require_store
 from knowledge_base.journal.integrity import mark_open
 from knowledge_base.journal.sidecar_files import INDEX, LOG
+from knowledge_base.user_objects import described, has_type
 
 TIDY_UP_AFTER = 500
 """Number of commits between checkpoints.
@@ -133,7 +134,7 @@ class WriteTransaction:
         with reported(self._path, "write"):
             if self._connection.in_transaction:  # SQLite ends the transaction itself when the disk is full
                 self._connection.execute("ROLLBACK")
-            if isinstance(error, sqlite3.Error):
+            if has_type(error, sqlite3.Error):
                 raise error
 
     def _commit(self) -> None:
@@ -194,7 +195,7 @@ class TransactionGroup:
             raise
         finally:
             if error is not None and self.appended and self.behind is None:
-                self.behind = error if isinstance(error, StoreError) else StoreError(str(error) or type(error).__name__)
+                self.behind = error if has_type(error, StoreError) else StoreError(described(error, named=False))
 
     def require_abreast(self) -> None:
         """Raise `StoreError` if the file lacks changes of the world in memory."""

@@ -12,12 +12,13 @@ from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any, Generic, ParamSpec
 
-from knowledge_base.errors import Place, SchemaError, UserCodeError, described, text_of
+from knowledge_base.errors import Place, SchemaError, UserCodeError
 from knowledge_base.language.checking.vocabulary import Read
 from knowledge_base.language.syntax.expression import Atom, Call, Term, TypedVariable, free_variables, substitute
 from knowledge_base.language.syntax.text import parse_term, to_text
 from knowledge_base.pddl.domain_text import parse_declaration
 from knowledge_base.tracebacks import raised_at
+from knowledge_base.user_objects import described, text_of
 
 MOST_NESTED = 8
 """Maximum nesting of computed predicates that read each other.

@@ -13,7 +13,7 @@ from collections.abc import AsyncGenerator, Callable, Hashable, Iterable, Sequen
 from contextlib import aclosing
 from dataclasses import replace
 
-from knowledge_base.errors import described
+from knowledge_base.user_objects import described
 from planning.engines.planner import PlannerProcess
 from planning.engines.registry import Engine, chosen, refusal
 from planning.model.plan import (

@@ -208,7 +208,7 @@ def _answer(line: bytes, search: Search, said: int) -> None:
     except MemoryError:
         _say(said, {"failed": "it ran out of memory"})
     except Exception as error:  # noqa: BLE001  an engine may raise any error
-        from knowledge_base.errors import described  # noqa: PLC0415  a successful search does not need this import
+        from knowledge_base.user_objects import described  # noqa: PLC0415  a successful search does not need this import
 
         _say(said, {"failed": described(error)})
 

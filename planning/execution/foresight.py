@@ -6,10 +6,11 @@ import math
 from typing import TYPE_CHECKING, Protocol
 
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.checking.inputs import require_able, shown
+from knowledge_base.language.checking.inputs import require_able
 from knowledge_base.language.checking.relations import relation
 from knowledge_base.language.syntax.rewriting import names_of
 from knowledge_base.tracebacks import place_of
+from knowledge_base.user_objects import shown
 from planning.analysis.validation import Validation
 
 if TYPE_CHECKING:

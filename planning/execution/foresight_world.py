@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from knowledge_base.errors import SchemaError, UnknownNameError
 from knowledge_base.language.checking.check import value_fits
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.checking.relations import relation, relation_names
 from knowledge_base.language.syntax.expression import And, Atom, Constant, TypedVariable, Variable
+from knowledge_base.user_objects import shown
 from knowledge_base.view import View
 from knowledge_base.world.derived import type_test
 from planning.problem.derived import derivation

@@ -12,9 +12,9 @@ from sqlite3 import Connection
 from typing import Literal
 
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.user_objects import shown
 from planning.problem.construction import check_goal
 
 GoalState = Literal["waiting", "running", "reached", "failed", "withdrawn"]

@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dsc.sequencer.clock import PastClock
-from knowledge_base.errors import described
 from knowledge_base.language.syntax.text import to_text
+from knowledge_base.user_objects import described
 from knowledge_base.world.overlay import Overlay
 from planning.execution.link_monitor import OVERTAKING, OWN_STEPS, Broken, GoalReached, LinkMonitor, News, Shorter
 from planning.execution.outcomes import GoalHolds, Monitored, PlanInvalid

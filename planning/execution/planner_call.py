@@ -8,7 +8,7 @@ import math
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from dsc.components.hooks import contained
-from knowledge_base.errors import described, text_of
+from knowledge_base.user_objects import described, text_of
 from planning.engines.planner import Improving
 from planning.model.cancellable_work import alarm
 from planning.model.plan import EngineFailed, PlanFound, PlanningOutcome, TimedOut

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from knowledge_base.conditions.watch import Missed
-from knowledge_base.errors import described
 from knowledge_base.facts import Change
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.user_objects import described
 from planning.analysis.validation import Validation
 from planning.execution.link_monitor import Broken
 from planning.execution.plan_run import PlanRun

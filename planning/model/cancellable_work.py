@@ -13,8 +13,8 @@ import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from knowledge_base.errors import described
 from knowledge_base.language.evaluation.world_protocol import Bounds, Meter
+from knowledge_base.user_objects import as_exception
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -106,7 +106,7 @@ async def aside(work: Callable[[], T], patience: WorkLimit | None = None) -> T:
         try:
             done = work()
         except BaseException as error:  # noqa: BLE001  the waiting task receives the error
-            failed(error if isinstance(error, Exception) else RuntimeError(described(error)))
+            failed(as_exception(error))
         else:
             answered(done)
 

@@ -22,10 +22,11 @@ from dsc.model.plot import ActionPlot
 from dsc.text.plot_files import load_library
 from dsc.text.profiles import Profile
 from dsc.validation.subject import addressed_by
-from knowledge_base.errors import InputError, Place, UnknownNameError, described, tolerated
+from knowledge_base.errors import InputError, Place, UnknownNameError, tolerated
 from knowledge_base.facts import Delta
-from knowledge_base.language.checking.inputs import require, shown
+from knowledge_base.language.checking.inputs import require
 from knowledge_base.pddl.domain_text import DomainText, parse_domain, read_domain
+from knowledge_base.user_objects import described, shown
 from planning.execution.foresight import Foresight
 from planning.execution.shipped_plots import shipped_plots
 from planning.model.domain import PlanningDomain

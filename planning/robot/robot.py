@@ -24,8 +24,8 @@ from dsc.sequencer.run_end import SUSPENDED, RunEnd
 from dsc.sequencer.sequencer import Sequencer
 from dsc.sequencer.signals import OnSignal
 from knowledge_base.errors import InputError, StoreError
-from knowledge_base.language.checking.inputs import shown
 from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.user_objects import shown
 from planning.execution.goals import LATE, QueuedGoal
 from planning.execution.planning_component import PlanningComponent
 from planning.problem.construction import check_goal

@@ -17,9 +17,9 @@ from typing import Any
 
 from dsc.components.assembly import made, named_part
 from dsc.components.hooks import contained
-from knowledge_base.errors import InputError, Place, UnknownNameError, described
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.errors import InputError, Place, UnknownNameError
 from knowledge_base.tracebacks import raised_at
+from knowledge_base.user_objects import described, shown
 from planning.robot.bundles import GROUP, Bundle, installed
 
 ROBOT = "robot"

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from knowledge_base.errors import MAX_MESSAGE, InputError, described
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.errors import MAX_MESSAGE, InputError
+from knowledge_base.user_objects import described, shown
 
 
 class FailsError(Exception):

@@ -7,7 +7,7 @@ import math
 from dsc.trees.running.node import Decorator, RunningNode, Status, reset
 from dsc.trees.running.ports import integer_port, number_port, truth_port
 from knowledge_base.errors import InputError
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 
 class RecoveryNode(RunningNode):

@@ -6,7 +6,7 @@ from dsc.trees.blackboard import EMPTY, Board
 from dsc.trees.kinds import KINDS
 from dsc.trees.model import Node
 from knowledge_base.errors import InputError, UnknownNameError
-from knowledge_base.language.checking.inputs import shown
+from knowledge_base.user_objects import shown
 
 
 def key_of(port: str, text: str) -> str | None:

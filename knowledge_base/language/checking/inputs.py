@@ -6,22 +6,13 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError, type_name
+from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.facts import VALUE_TYPES, Delta, Fact, Value
 from knowledge_base.language.syntax.expression import Expression, free_variables
+from knowledge_base.user_objects import shown
 
 _NO_CHANGE = Delta()
 _Part = TypeVar("_Part")
-
-
-def shown(value: object) -> str:
-    """Return the text of any value for a message; never raise an exception."""
-    try:
-        return str.__str__(repr(value))
-    except ValueError:  # Python refuses to write such a long number
-        return "a number of thousands of digits" if isinstance(value, int) else f"an object of type {type_name(value)}"
-    except BaseException:  # noqa: BLE001  # user code may raise anything, `SystemExit` too
-        return f"an object of type {type_name(value)}"
 
 
 def require(value: object, kinds: type | tuple[type, ...], wanted: str) -> None:

@@ -97,6 +97,31 @@ def test_a_block_that_raises_leaves_nothing_in_the_file_and_closes_the_door(path
     assert on_file(path) == (1, ["p"])
 
 
+class NoTextError(Exception):
+    def __str__(self):
+        raise ValueError("no text")
+
+
+class NoClassError(Exception):
+    @property  # type: ignore[misc]
+    def __class__(self):
+        raise RuntimeError("no class")
+
+
+@pytest.mark.parametrize("kind", [NoTextError, NoClassError, SystemExit])
+def test_a_block_whose_error_cannot_be_read_closes_the_store_for_changes(path, kind):
+    def fail(kb):
+        with kb.together():
+            tell(kb, "p")
+            raise kind
+
+    with KnowledgeBase.open(SCHEMA, path) as kb:
+        with pytest.raises(kind):
+            fail(kb)
+        with pytest.raises(StoreError, match="lacks the last changes"):
+            tell(kb, "q")
+
+
 def test_a_change_that_is_refused_spoils_nothing_else(path):
     with KnowledgeBase.open(SCHEMA, path) as kb:
         with kb.together():

@@ -83,6 +83,16 @@ def test_an_exception_of_background_work_reaches_its_caller():
         asyncio.run(aside(lambda: 1 / 0))
 
 
+@pytest.mark.parametrize("error", [StopIteration("dry"), SystemExit("out"), GeneratorExit("shut")], ids=repr)
+def test_an_exception_that_a_future_refuses_reaches_the_caller_of_background_work(error):
+    def work():
+        raise error
+
+    with pytest.raises(RuntimeError, match=str(error)) as raised:
+        asyncio.run(asyncio.wait_for(aside(work), 5.0))
+    assert raised.value.__cause__ is error
+
+
 class Acted(Outcome): ...
 
 
