@@ -59,10 +59,10 @@ def place_of(made: type | Callable[..., Any]) -> Place | None:
         return None
 
 
-def calling_place(package: str) -> Place | None:
-    """Return the innermost line of the stack that is not in a folder; `None` without one."""
+def calling_place(*folders: str) -> Place | None:
+    """Return the innermost line of the stack that is in none of the folders; `None` without one."""
     frame = sys._getframe(1)  # noqa: SLF001  # the only way to the caller's line
-    while frame is not None and frame.f_code.co_filename.startswith((package, __file__)):
+    while frame is not None and frame.f_code.co_filename.startswith((*folders, __file__)):
         frame = frame.f_back  # type: ignore[assignment]  # `None` at the end
     return None if frame is None else Place(frame.f_code.co_filename, frame.f_lineno)
 

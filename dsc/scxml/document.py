@@ -12,6 +12,7 @@ from xml.parsers import expat
 from dsc.errors import NotExpressibleError
 from dsc.text.yaml import check_size
 from knowledge_base.errors import InputError, ParseError, Place, UnknownNameError, shortened
+from knowledge_base.origin import Origin, origin_of
 
 NAMESPACE = "http://www.w3.org/2005/07/scxml"
 MAX_DEPTH = 30
@@ -112,12 +113,13 @@ def read_xml(text: str, source: str | None = None, deepest: int = MAX_DEPTH) -> 
         ParseError: the text is not well-formed XML, has a document type or entity declaration, or is too large or deep.
     """
     data = text.encode(errors="surrogatepass")  # the parser then reports half a surrogate pair with its place
-    check_size(len(data), Place(source))
-    reader = _Reader(source, deepest)
+    origin = origin_of(text, source)
+    check_size(len(data), Place(origin.source))
+    reader = _Reader(origin, deepest)
     try:
         reader.parser.Parse(data, True)  # noqa: FBT003  # expat takes no keywords here
     except expat.ExpatError as error:
-        place = Place(source, error.lineno, error.offset + 1)
+        place = origin.place(error.lineno, error.offset + 1)
         raise ParseError(f"not readable as XML: {expat.ErrorString(error.code)}", place=place) from None
     return reader.root
 
@@ -128,8 +130,8 @@ def written(element: Element) -> str:
 
 
 class _Reader:
-    def __init__(self, source: str | None, deepest: int) -> None:
-        self._source = source
+    def __init__(self, origin: Origin, deepest: int) -> None:
+        self._origin = origin
         self._deepest = deepest
         self._open: list[Element] = []
         self.root: Element
@@ -141,7 +143,7 @@ class _Reader:
         self.parser.ProcessingInstructionHandler = self._instruction
 
     def _place(self) -> Place:
-        return Place(self._source, self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1)
+        return self._origin.place(self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1)
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         space, _, name = tag.rpartition(" ")

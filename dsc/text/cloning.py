@@ -15,7 +15,7 @@ from dsc.dynamic.library import Library, require_substitute
 from dsc.model.plot import ActionPlot
 from dsc.model.plot import Path as FormPath
 from dsc.model.states import DynamicState
-from dsc.text.plot_files import Neighbours, load_plot, parse_plot, plot_to_yaml
+from dsc.text.plot_files import Neighbours, file_of, load_plot, parse_plot, plot_to_yaml
 from dsc.text.profiles import BY_PLOT, Profile, adapted, load_profile, profile_to_yaml
 from dsc.text.yaml import read_file
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
@@ -191,15 +191,15 @@ def _plots_in(folder: Path) -> Iterator[tuple[Path, ActionPlot]]:
 
 
 def _stem(plot: ActionPlot) -> str:
-    place = plot.place(("plot",))
-    return Path(place.source).stem if place is not None and place.source else plot.name
+    file = file_of(plot)
+    return plot.name if file is None else file.stem
 
 
 def _text(original: ActionPlot, clone: ActionPlot, names: Mapping[str, str]) -> str:
     """Return the original's text with the clones' names if it reads as the clone; else the clone's YAML."""
-    place = original.place(("plot",))
-    if place is not None and place.source:
-        text = _substitute(read_file(place.source), original, names)
+    file = file_of(original)
+    if file is not None:
+        text = _substitute(read_file(file), original, names)
         lost = [key for key in original.to_form() if key not in clone.to_form()]
         text = "".join(line for line in text.splitlines(keepends=True) if line.partition(":")[0] not in lost)
         with suppress(InputError):

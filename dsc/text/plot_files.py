@@ -39,6 +39,13 @@ def load_plot(path: Path | str) -> ActionPlot:
     return parse_plot(read_file(path), str(path))
 
 
+def file_of(plot: ActionPlot) -> Path | None:
+    """Return the plot file from which a plot was read; `None` for a plot that a program contains or makes."""
+    place = plot.place(("plot",))
+    source = None if place is None else place.source
+    return None if source is None or source.endswith(".py") else Path(source)
+
+
 def load_library(folder: Path | str) -> Library:
     """Return a library of all plots (`*.yaml`) of a folder, in the order of file names.
 

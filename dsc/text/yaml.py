@@ -38,6 +38,7 @@ from ruamel.yaml.scanner import Scanner, ScannerError
 from dsc.model.reading import FormPath, in_yaml, misread
 from knowledge_base.errors import InputError, ParseError, Place
 from knowledge_base.language.checking.inputs import require_text
+from knowledge_base.origin import Origin, origin_of
 from knowledge_base.pddl.files import read_text, require_size
 from knowledge_base.user_objects import shown
 
@@ -132,18 +133,19 @@ def load_document(text: str, source: str | None = None, spans: Spans | None = No
         InputError: the text is too large.
     """
     require_text(text, "the YAML text")
-    check_size(len(text), Place(source))
-    places: dict[FormPath, Place] = {(): Place(source, 1)}
-    reader = _Reader(text, source, places, spans)
+    origin = origin_of(text, source)
+    check_size(len(text), Place(origin.source))
+    places: dict[FormPath, Place] = {(): Place(origin.source, origin.line)}
+    reader = _Reader(text, origin, places, spans)
     try:
         return Document(reader.document(), places)
     except MarkedYAMLError as error:
-        raise _parse_error(error, source) from None
+        raise _parse_error(error, origin) from None
     except ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         column = error.position - text.rfind("\n", 0, error.position)
         problem = f"not readable as YAML: the character U+{ord(text[error.position]):04X} is not allowed in a text"
-        raise ParseError(problem, place=Place(source, line, column)) from None
+        raise ParseError(problem, place=origin.place(line, column)) from None
 
 
 def dump(data: Mapping[str, Any]) -> str:
@@ -170,11 +172,11 @@ def inline(data: Any) -> str:
 class _Reader:
     """Builder of one document's data from the parser's events."""
 
-    def __init__(self, text: str, source: str | None, places: dict[FormPath, Place], spans: Spans | None) -> None:
+    def __init__(self, text: str, origin: Origin, places: dict[FormPath, Place], spans: Spans | None) -> None:
         yaml = YAML(typ="safe", pure=True, plug_ins=[])
         yaml.Scanner = _Scanner
         self._events: Iterator[Any] = yaml.parse(text)
-        self._source = source
+        self._origin = origin
         self._places = places
         self._spans = spans
         self._parts = 0
@@ -282,7 +284,7 @@ class _Reader:
             raise ParseError("only YAML 1.2 without tags is read here", place=self._place(event))
 
     def _place(self, event: Event) -> Place:
-        return Place(self._source, event.start_mark.line + 1, event.start_mark.column + 1)
+        return self._origin.place(event.start_mark.line + 1, event.start_mark.column + 1)
 
 
 _PLAIN: Mapping[str, bool | None] = {
@@ -343,16 +345,17 @@ _PLAINER = {
 """Clearer messages, by the message of the YAML library."""
 
 
-def _parse_error(error: MarkedYAMLError, source: str | None) -> ParseError:
+def _parse_error(error: MarkedYAMLError, origin: Origin) -> ParseError:
     mark, begun = error.problem_mark or error.context_mark, error.context_mark
-    place = Place(source, mark.line + 1, mark.column + 1) if mark else Place(source)
+    place = origin.place(mark.line + 1, mark.column + 1) if mark else Place(origin.source)
     problem = str(error.problem or error.context or "").strip().split("\n")[0]
     if problem == _TOO_DEEP:
         return ParseError(problem, place=place)
     for jargon, plainer in _PLAINER.items():
         problem = re.sub(jargon, plainer, problem)
-    since = f" (of what begins in line {begun.line + 1})" if begun and mark and begun.line != mark.line else ""
-    return ParseError(f"not readable as YAML: {problem}{since}", place=place)
+    if begun and mark and begun.line != mark.line:
+        problem += f" (of what begins in line {origin.line + begun.line})"
+    return ParseError(f"not readable as YAML: {problem}", place=place)
 
 
 _Model = TypeVar("_Model", bound=BaseModel)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from knowledge_base.errors import ParseError, Place, UnsupportedConstructError, nearest, printable
 from knowledge_base.language.syntax.sexpr import Group, Node, Word, read
+from knowledge_base.origin import Origin, origin_of
 
 REQUIREMENTS = frozenset({
     ":strips", ":typing", ":negative-preconditions", ":disjunctive-preconditions", ":equality",
@@ -74,7 +75,8 @@ def read_definition(text: str, source: str | None, kind: str, known: Collection[
         ParseError: the text is not a definition of that kind, or a section is unknown.
         UnsupportedConstructError: no planner here supports a section of the file.
     """
-    define = _define(read(text, source), source)
+    origin = origin_of(text, source)
+    define = _define(read(text, origin), origin)
     if len(define.items) < 2 or not isinstance(define.items[1], Group):
         raise ParseError(f"'define' is followed by ({kind} NAME)", place=define.place)
     name, place = _name(define.items[1], kind)
@@ -93,9 +95,9 @@ def word(node: Node, what: str) -> Word:
     return node
 
 
-def _define(nodes: list[Node], source: str | None) -> Group:
+def _define(nodes: list[Node], origin: Origin) -> Group:
     if not nodes:
-        raise ParseError("the file is empty; (define ...) is expected", place=Place(source, 1, 1))
+        raise ParseError("the file is empty; (define ...) is expected", place=origin.place(1, 1))
     if len(nodes) > 1:
         raise ParseError("the (define ...) ends before this; a file holds one", place=nodes[1].place)
     first = nodes[0]

@@ -15,7 +15,9 @@ from typing import Any
 
 from dsc.components.component import Component
 from dsc.editing.diagnostics import FileFinding
+from dsc.model.plot import ActionPlot
 from dsc.skills import SkillSignature
+from dsc.text.plot_files import file_of
 from knowledge_base.errors import DscError, collecting, tolerated
 from knowledge_base.exchange import schema_form
 from knowledge_base.language.checking.vocabulary import ROOT_TYPE
@@ -55,7 +57,7 @@ def facts_of(bundle: Bundle, target: str) -> dict[str, Any]:
         "skills": None if bundle.remote else [asdict(one) for one in _plain(skills)],
         "about": _docstrings(components),
         "components": {one.name: _component_facts(one) for one in components},
-        "plots": {plot.name: _file_of(plot.place(("plot",))) for one in bundles for plot in one.plots},
+        "plots": {plot.name: _path_of(plot) for one in bundles for plot in one.plots},
         "objects": _objects(bundle, simulation, target),
         "schema": schema_form(schema),
         "scenario": None if form is None else form.model_json_schema(by_alias=True),
@@ -101,8 +103,9 @@ def _describe(parameter: Any) -> str:
     return ", ".join(said)
 
 
-def _file_of(place: Any) -> str:
-    return "" if place is None or place.source is None else str(Path(place.source).absolute())
+def _path_of(plot: ActionPlot) -> str:
+    file = file_of(plot)
+    return "" if file is None else str(file.absolute())
 
 
 def _objects(bundle: Bundle, simulation: Simulation | None, target: str) -> dict[str, str] | None:

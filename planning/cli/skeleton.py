@@ -13,7 +13,7 @@ from dsc.model.plot import ActionPlot
 from dsc.model.states import SubmachineState
 from dsc.skeletons.python_code import MARK, Skeleton, module_name
 from dsc.skeletons.python_types import NOT_OBJECTS, first_object, object_types, sample_value
-from dsc.text.plot_files import Neighbours, load_plot, plot_to_yaml
+from dsc.text.plot_files import Neighbours, file_of, load_plot, plot_to_yaml
 from dsc.text.yaml import read_file
 from knowledge_base.errors import InputError, Place
 from knowledge_base.language.syntax.expression import Constant
@@ -55,7 +55,8 @@ class PlotProject:
         files = [file for one in given for file in (sorted(one.glob("*.yaml")) if one.is_dir() else [one])]
         plots = {file: load_plot(file) for file in files}
         for file in files:
-            plots |= {Path(_source(one)): one for one in Neighbours().of(file, plots[file])[0] if _source(one)}
+            related = Neighbours().of(file, plots[file])[0]
+            plots |= {path: one for one in related if (path := file_of(one)) is not None}
         if not plots:
             raise InputError("no plots (*.yaml) are there", place=Place(str(given[0])))
         domain = _domain(files)
@@ -155,11 +156,6 @@ def _require_plots(plots: Iterable[ActionPlot]) -> None:
         used = ", ".join(f"'{name}' (used by '{by}')" for name, by in sorted(missing.items()))
         message = f"these plots are not given: {used}; give their files with --from, also those of other bundles"
         raise InputError(message, found=min(missing))
-
-
-def _source(plot: ActionPlot) -> str:
-    place = plot.place(("plot",))
-    return (place.source if place is not None else None) or ""
 
 
 def _domain(files: Iterable[Path]) -> Path | None:

@@ -19,6 +19,7 @@ from dsc.model.plot import ActionPlot, initial_of
 from dsc.model.states import DynamicState
 from dsc.profiles import configure
 from dsc.skills import SkillSignature
+from dsc.text.plot_files import file_of
 from dsc.text.profiles import Profile, adapted, load_profile
 from dsc.validation import review_plot, validate_plot
 from dsc.validation.ignored import without_ignored
@@ -113,7 +114,7 @@ def check_project(target: str, remote: Sequence[Component] = ()) -> list[Finding
     if path.is_dir():
         read = {Path(one.place.source or "").resolve() for one in findings if one.place is not None}
         if bundle is not None:
-            read |= {Path(_source(plot) or "").resolve() for plot in bundle.plots}
+            read |= {file.resolve() for file in map(file_of, bundle.plots) if file is not None}
         findings += check_files(file for file in files if file.resolve() not in read)
     return in_order(without_ignored(findings, files))
 
@@ -175,11 +176,6 @@ def _sources(folder: Path) -> Iterator[Path]:
         hidden = any(part.startswith(".") for part in inside) or _SKIPPED.intersection(inside)
         if file.suffix in {".yaml", ".yml", ".pddl", ".py"} and file.is_file() and not hidden:
             yield file
-
-
-def _source(plot: ActionPlot) -> str | None:
-    place = plot.place(("plot",))
-    return None if place is None else place.source
 
 
 # -- a robot -------------------------------------------------------------------------------------------------
@@ -463,9 +459,9 @@ class _Robot:
 
     def _broken_files(self) -> Iterator[Path]:
         """Yield the plot files that were not read, because they contain an error."""
-        read = {_source(plot) for plot in self._plots}
-        folders = {Path(source).parent for source in read if source is not None}
-        return (file for folder in folders for file in folder.glob("*.yaml") if str(file) not in read)
+        read = set(filter(None, map(file_of, self._plots)))
+        folders = {file.parent for file in read}
+        return (file for folder in folders for file in folder.glob("*.yaml") if file not in read)
 
 
 _EMPTY = "(define (domain bundles))"

@@ -11,7 +11,7 @@ from threading import Event, Thread
 from dsc.dynamic.library import Library
 from dsc.model.plot import ActionPlot
 from dsc.sequencer.sequencer import Sequencer
-from dsc.text.plot_files import parse_plot
+from dsc.text.plot_files import file_of, parse_plot
 from dsc.text.profiles import Profile, with_profile
 from knowledge_base.errors import InputError
 from knowledge_base.pddl.unsaved_texts import readable_text
@@ -30,9 +30,8 @@ class PlotFiles:
     """
 
     def __init__(self, library: Library, profile: Profile | None = None) -> None:
-        places = [plot.place(("plot",)) for plot in library]
-        files = [Path(place.source) for place in places if place is not None and place.source is not None]
-        self._folders = sorted({file.parent for file in files if file.is_file() and file.suffix != ".py"})
+        files = filter(None, map(file_of, library))
+        self._folders = sorted({file.parent for file in files if file.is_file()})
         self._profile = profile
         self._texts = self._read({})
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from knowledge_base.errors import ParseError, Place
 from knowledge_base.language.syntax.expression import TypedVariable
+from knowledge_base.origin import Origin
 from knowledge_base.spelling import TRUTH_VALUES, is_number, text_inside
 
 MAX_DEPTH = 100
@@ -61,20 +62,21 @@ class Group:
 Node = Word | Group
 
 
-def read(text: str, source: str | None = None) -> list[Node]:
+def read(text: str, source: str | Origin | None = None) -> list[Node]:
     """Return the groups and words at the top level of `text`, in order.
 
     Args:
         text: the whole text.
-        source: name of the file that contains the text, for messages.
+        source: name of the file that contains the text, or the origin of the text in a file, for messages.
 
     Raises:
         ParseError: a parenthesis or quote has no partner, the nesting exceeds `MAX_DEPTH`, a byte is not UTF-8, or a
             word contains a control character.
     """
     top: list[Node] = []
-    stack = [(Place(source, 1, 1), top)]
-    for kind, word, place in _tokens(text, source):
+    origin = source if isinstance(source, Origin) else Origin(source)
+    stack = [(origin.place(1, 1), top)]
+    for kind, word, place in _tokens(text, origin):
         if kind == "open":
             if len(stack) > MAX_DEPTH:
                 raise ParseError(f"parentheses are nested more than {MAX_DEPTH} deep", place=place)
@@ -120,8 +122,8 @@ def _section_inside(node: Node) -> tuple[Group, Group] | None:
     return None
 
 
-def _tokens(text: str, source: str | None) -> Iterator[tuple[str, str, Place]]:
-    at, line, line_start = 0, 1, 0
+def _tokens(text: str, origin: Origin) -> Iterator[tuple[str, str, Place]]:
+    at, line, line_start, source = 0, origin.line, 1 - origin.column, origin.source
     while at < len(text):
         place = Place(source, line, at - line_start + 1)
         found = _TOKEN.match(text, at)
@@ -132,7 +134,7 @@ def _tokens(text: str, source: str | None) -> Iterator[tuple[str, str, Place]]:
             yield found.lastgroup, token, place
         if "\n" in token:
             line += token.count("\n")
-            line_start = found.start() + token.rindex("\n") + 1
+            line_start = found.start() + token.rindex("\n") + 1 - origin.indent
 
 
 def _word(kind: str, token: str, place: Place) -> Word:

@@ -63,7 +63,7 @@ def test_the_shipped_domain_is_read_and_consistent() -> None:
 
 
 def test_a_domain_in_the_wild() -> None:
-    domain = read_domain(WILD)
+    domain = read_domain(WILD, "wild.pddl")
     assert (domain.name, domain.requirements) == ("logistics-adl", (":adl", ":typing", ":action-costs"))
     drive, noop = domain.actions
     assert (drive.name, [p.name for p in drive.parameters]) == ("drive", ["t", "from", "to", "c"])

@@ -416,3 +416,36 @@ def test_an_object_in_a_profile_is_checked(project):
     (project / "profiles" / "other.yaml").rename(project / "profiles" / "other.yml")
     (found,) = check_project(str(project))
     assert "the name of a profile's file ends in `.yaml`" in str(found)
+
+
+def test_mistakes_in_texts_of_a_python_file_have_its_lines(tmp_path):
+    robot = tmp_path / "waver.py"
+    robot.write_text(
+        '''from textwrap import dedent
+
+from dsc import parse_plot
+from planning import Bundle, PlanningDomain
+
+DOMAIN = """(define (domain waving)
+  (:predicates (waved))
+  (:action wave :parameters () :effect (waved)))
+"""
+MAIN = parse_plot("""
+plot: main
+states:
+  a: {use: wave_, on: {done: b}}
+  b: {final: true}
+""")
+WAVE = parse_plot(
+    dedent("""
+        plot: wave
+        implements: wav
+        states: {a: {final: true}}
+    """)
+)
+robot = Bundle(name="waver", about="waves", domain=PlanningDomain.parse(DOMAIN), plots=[MAIN, WAVE], main="main")
+'''
+    )
+    found = {(Path(one.place.source or "").name, one.place.line, one.place.column)
+             for one in check_project(str(robot)) if one.place is not None and one.level == "error"}  # fmt: skip
+    assert found == {("waver.py", 8, 12), ("waver.py", 13, 7), ("waver.py", 19, 9)}
