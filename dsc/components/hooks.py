@@ -160,8 +160,10 @@ def programming_error(error: BaseException, hook: str, raises: Classes = ()) -> 
     refused = has_type(error, InputError)  # its message is complete without a line of this project
     said = described(error, named=not refused)
     said += _RETURNED if _RAISED in said else ""
-    bug = ProgrammingError(f"{hook}: {said}{itself}{raised_at(error, only_users=refused)}")
-    _LOG.error("%s\n%s", bug, whole_traceback(error))
+    place = raised_at(error, only_users=refused)
+    bug = ProgrammingError(f"{hook}: {said}{itself}{place}")
+    # Without a line of the user, e.g. for a mistake in a watched condition, the traceback has only code of this project.
+    _LOG.error("%s", f"{bug}\n{whole_traceback(error)}" if place else bug)
     found = _found.get()
     if found is not None and len(found) < _MOST_FOUND:
         found.append(str(bug))

@@ -69,7 +69,7 @@ class ValueCondition:
         out_of: int = 1,
     ) -> None:
         self._ports, self._checks = ports, checks
-        rise = parse_condition(condition) if isinstance(condition, str) else condition
+        rise = parse_condition(condition, "condition") if isinstance(condition, str) else condition
         pushed = {name: port.values for name, port in ports.items()}
         ValueVocabulary(pushed, checks, kinds_of(values), "the component pushes no").check(rise)
         self._rise, self._stay = rise, relaxed(rise, hysteresis) if hysteresis else rise

@@ -67,7 +67,7 @@ class WatchedCondition:
     ) -> None:
         self._call, self._given, self._hold = call, values, hold
         self._components, self._work, self._knowledge = components, work, knowledge
-        whole = parse_condition(condition)
+        whole = parse_condition(condition, "condition")
         if hysteresis:
             relaxed(whole, hysteresis)  # refuses a condition without bounds
         self._hysteresis = hysteresis

@@ -370,3 +370,18 @@ def test_the_watched_parts_of_the_knowledge_are_listed_with_their_truth():
         return watched, knowledge.conditions()
 
     assert run_simulated(main()) == ([("(wanted)", True)], [])
+
+
+@pytest.mark.parametrize(
+    ("condition", "said"),
+    [
+        ("(> (limt) 1)", "condition:1:4: there is no function 'limt'; did you mean 'limit'?"),
+        ("(> hand.pose.y 1)", "condition:1:4: no component pushes a value 'hand.pose.y'"),
+        ("(held cup1", "condition:1:1: '(' is never closed"),
+    ],
+)
+def test_a_mistake_in_a_condition_has_its_place_in_the_condition_and_no_traceback(condition, said, caplog):
+    _, emitted, _ = run(condition, [])
+    assert said in emitted[-1].attributes["why"]
+    assert said in caplog.text
+    assert "Traceback" not in caplog.text
