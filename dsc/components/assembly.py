@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib import import_module
-from inspect import iscoroutinefunction, signature
+from inspect import getattr_static, iscoroutinefunction, signature
 from pathlib import Path
 
 from dsc.components.component import ALWAYS, Component
@@ -17,7 +17,7 @@ from dsc.components.parameters import Parameters, ParameterValues
 from dsc.components.ports import EventActivations
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
-from knowledge_base.language.checking.inputs import require_several
+from knowledge_base.language.checking.inputs import require_several, require_text
 from knowledge_base.tracebacks import place_of, raised_at
 from knowledge_base.user_objects import described, shown
 
@@ -135,6 +135,7 @@ def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:
             hint = f"; an instance is made by {one.__name__}()" if isinstance(one, type) else ""
             raise InputError(f"a component is an instance of a subclass of Component, not {shown(one)}{hint}")
         require_whole(one)
+        require_text(one.name, f"`name` of {type(one).__name__}")
         _require_modes(one)
         _require_period(one)
         if one.name in names:
@@ -154,18 +155,29 @@ _OF_EVERY_COMPONENT = {
     "pushes": dict,
     "requirements": dict,
 }
+_METHODS = tuple(name for name in dir(Component) if name[:2] != "__" and callable(getattr(Component, name)))
 
 
 def require_whole(component: Component) -> None:
-    """Raise `SchemaError` if the `__init__` of a component's class omits or replaces attributes of every component."""
+    """Raise `SchemaError` if a component lacks or replaces attributes or methods of every component."""
     kind = type(component)
+    if not all(hasattr(component, name) for name in _OF_EVERY_COMPONENT):
+        raise SchemaError(f"{kind.__name__}.__init__ does not call super().__init__()", place=place_of(kind.__init__))
+    for name in _hidden_names(component):
+        message = f"'{name}' of {kind.__name__} hides an attribute of every component; choose another name"
+        raise SchemaError(message, place=place_of(kind.__init__ if "__init__" in vars(kind) else kind), found=name)
+
+
+def _hidden_names(component: Component) -> Iterator[str]:
+    """Yield the names of the attributes of every component that a component has in another form."""
     for name, wanted in _OF_EVERY_COMPONENT.items():
-        if not hasattr(component, name):
-            message = f"{kind.__name__}.__init__ does not call super().__init__()"
-            raise SchemaError(message, place=place_of(kind.__init__))
         if not isinstance(getattr(component, name), wanted):
-            message = f"'{name}' of {kind.__name__} hides an attribute of every component; choose another name"
-            raise SchemaError(message, place=place_of(kind.__init__), found=name)
+            yield name
+    if not isinstance(getattr_static(type(component), "mode"), property):
+        yield "mode"
+    for name in _METHODS:
+        if not callable(getattr(component, name)):
+            yield name
 
 
 def _require_modes(component: Component) -> None:

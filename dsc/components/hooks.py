@@ -162,7 +162,7 @@ def programming_error(error: BaseException, hook: str, raises: Classes = ()) -> 
     said += _RETURNED if _RAISED in said else ""
     place = raised_at(error, only_users=refused)
     bug = ProgrammingError(f"{hook}: {said}{itself}{place}")
-    # Without a line of the user, e.g. for a mistake in a watched condition, the traceback has only code of this project.
+    # Without a line of the user, e.g. for a mistake in a watched condition, the traceback has no code of the user.
     _LOG.error("%s", f"{bug}\n{whole_traceback(error)}" if place else bug)
     found = _found.get()
     if found is not None and len(found) < _MOST_FOUND:

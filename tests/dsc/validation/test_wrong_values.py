@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from pathlib import Path
 from typing import Annotated
@@ -26,6 +27,7 @@ from dsc import (
     skill,
     takes,
 )
+from dsc.components.assembly import require_instances
 from dsc.sequencer.clock import LoopClock, run_simulated
 from dsc.validation import validate_library, validate_plot
 from knowledge_base import InputError, KnowledgeBase
@@ -279,3 +281,42 @@ def test_a_skill_that_can_never_work_is_refused_when_it_is_made_with_its_line(ma
     assert refused.value.place is not None
     line = Path(__file__).read_text().splitlines()[(refused.value.place.line or 0) - 1]
     assert line.split("#")[0].strip() in {"@skill", "@query", '@skill(blocking="thread")', "class Low(Outcome):"}
+
+
+METHODS = [name for name in dir(Component) if not name.startswith("_") and inspect.isfunction(getattr(Component, name))]
+
+
+def arm_with(name: str, place: str) -> Component:
+    """Return a component with an attribute of that name in its class or in its object."""
+
+    class Arm(Component):
+        def __init__(self):
+            super().__init__()
+            if place == "object":
+                setattr(self, name, 3)
+
+    if place == "class":
+        setattr(Arm, name, 3)
+    return Arm()
+
+
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [
+        *[(name, place) for name in METHODS for place in ("class", "object")],
+        ("mode", "class"),
+        ("life", "object"),
+        ("pushes", "object"),
+    ],
+)
+def test_an_attribute_that_hides_one_of_every_component_is_refused(name, place):
+    with pytest.raises(InputError, match=f"'{name}' of Arm hides an attribute of every component") as refused:
+        require_instances([arm_with(name, place)])
+    assert refused.value.place is not None
+    line = Path(__file__).read_text().splitlines()[(refused.value.place.line or 0) - 1]
+    assert line.strip() == "def __init__(self):"
+
+
+def test_a_component_whose_name_is_no_text_is_refused():
+    with pytest.raises(InputError, match="`name` of Arm is text, not 3"):
+        require_instances([arm_with("name", "object")])
