@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from knowledge_base.cli.console import Json, print_line
+from knowledge_base.spelling import number_text
 
 if TYPE_CHECKING:
     from dsc.runs.archive import RunArchive, RunRow, StepRow
@@ -185,6 +186,14 @@ def prune(
         print_line({"deleted": deleted, "bytes_before": before, "bytes": size})
         return
     typer.echo(f"{deleted} runs deleted: {size / 1000:,.0f} kB, before {before / 1000:,.0f} kB")
+
+
+@app.command()
+def forget(file: Store) -> None:
+    """Delete all runs of a store, also those that another version of dsc has written; the knowledge stays."""
+    from dsc.runs.pruning import forget_runs
+
+    typer.echo(f"{number_text(forget_runs(file), 'run')} deleted; the knowledge is unchanged")
 
 
 @app.command()

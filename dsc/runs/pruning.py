@@ -1,14 +1,16 @@
-"""Pruning of a store: the oldest runs are deleted, and the later ones stay verifiable and resumable."""
+"""Deletion of runs: the oldest ones, so that the later ones stay verifiable and resumable, or all runs of a store."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from sqlite3 import Connection
 
 from dsc.runs.archive import Pruned, RunRow, archive
-from knowledge_base.errors import InputError
+from dsc.runs.tables import CHAIN, FORMAT, TABLES
+from knowledge_base.errors import InputError, Place, StoreError
+from knowledge_base.journal.integrity import NOTHING, Ends, Tip, put_ends
 from knowledge_base.store import KnowledgeBase
 from knowledge_base.user_objects import shown
 
@@ -47,6 +49,40 @@ def prune(knowledge: KnowledgeBase, path: Path, keep: int) -> int:
     if kept:
         knowledge.compact(kept[0].version)
     return len(gone)
+
+
+def forget_runs(path: Path) -> int:
+    """Delete all runs of a store, also in the format of another version; return their number. The knowledge stays.
+
+    An unfinished run cannot be resumed then. Action ids stay unique.
+
+    Raises:
+        StoreError: the store has no runs, or cannot be read or written.
+    """
+    with KnowledgeBase.open(None, path) as knowledge, knowledge.together() as connection:
+        columns = {
+            name: {column for _, column, *_ in connection.execute(f"PRAGMA table_info({name})")} for name in TABLES
+        }
+        if not columns["runs"]:
+            raise StoreError("this store has no runs", place=Place(str(path)))
+        (number,) = connection.execute("SELECT count(*) FROM runs").fetchone()
+        serials = [Pruned.read(Ends(connection, path)).serials, *_greatest(connection, "steps", "serials", columns)]
+        epochs = [1, *_greatest(connection, "fence", "epoch", columns)]
+        for name, statement in TABLES.items():
+            connection.execute(f"DROP TABLE IF EXISTS {name}")
+            connection.execute(statement)
+        connection.execute("INSERT INTO fence VALUES (?, ?)", (max(epochs), FORMAT))
+        put_ends(connection, [(CHAIN, Tip(0, NOTHING))])
+        Pruned(serials=max(serials)).write(connection)
+    return int(number)
+
+
+def _greatest(connection: Connection, table: str, column: str, columns: Mapping[str, Collection[str]]) -> list[int]:
+    """Return the greatest value of a column in a list; an empty list without values or without the column."""
+    if column not in columns[table]:
+        return []
+    (greatest,) = connection.execute(f"SELECT max({column}) FROM {table}").fetchone()  # noqa: S608  # own names
+    return [] if greatest is None else [int(greatest)]
 
 
 def _delete(connection: Connection, last: RunRow, serials: int) -> None:

@@ -46,11 +46,10 @@ def require_tables_of_runs(connection: sqlite3.Connection, path: Path) -> bool:
     """Return whether the store has tables of runs; raise `StoreError` if they are damaged or have another format."""
     ends = Ends(connection, path)
     require_own_log(path, ends.identity)
+    _require_format(connection, path)  # first, as the tables of another format may have other columns
     if CHAIN in ends.chains:
         require_tables(connection, path, TABLES)
-        _require_format(connection, path)
         return True
-    _require_format(connection, path)
     if connection.execute("SELECT 1 FROM sqlite_master WHERE name IN ('runs', 'steps')").fetchone() is not None:
         raise damaged(path, "the table 'ends' does not know of its runs")
     return False
@@ -61,12 +60,15 @@ def _require_format(connection: sqlite3.Connection, path: Path) -> None:
     if connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'runs'").fetchone() is None:
         return
     columns = {name for _, name, *_ in connection.execute("PRAGMA table_info(fence)")}
+    if not columns:
+        raise damaged(path, "the table 'fence' is missing")
     row = connection.execute("SELECT format FROM fence").fetchone() if "format" in columns else (1,)
     if row is None:
         raise damaged(path, "the table 'fence' is empty")
     if row[0] != FORMAT:
         said = f"the runs in this store have format {row[0]}, this program reads and resumes format {FORMAT}"
-        raise StoreError(said, place=Place(str(path)))
+        remedy = "read or resume them with the version that wrote them, or delete all runs, but not the knowledge"
+        raise StoreError(f"{said}; {remedy}: `dsc runs forget {path}`", place=Place(str(path)))
 
 
 class SnapshotRow(NamedTuple):

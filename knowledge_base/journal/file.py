@@ -53,14 +53,19 @@ class Kind(NamedTuple):
         name: name of the kind in messages.
         application_id: SQLite's `application_id`.
         form: number of the file format.
+        remedy: the advice for a file of another format, or empty.
     """
 
     name: str
     application_id: int
     form: int
+    remedy: str = ""
 
 
-STORE = Kind("knowledge store", APPLICATION_ID, FORMAT)
+STORE = Kind(
+    "knowledge store", APPLICATION_ID, FORMAT,
+    "; `dsc kb export` of the version that wrote it writes JSON, and `dsc kb import` adds this to a new store",
+)  # fmt: skip
 
 
 @contextmanager
@@ -219,7 +224,7 @@ def require_store(connection: sqlite3.Connection, path: Path, kind: Kind = STORE
         raise StoreError(f"this is a database, but no {kind.name}", place=Place(str(path)))
     form = _number(connection, "PRAGMA user_version")
     if form != kind.form:
-        said = f"the {kind.name.split()[-1]} has format {form}, this program reads format {kind.form}"
+        said = f"the {kind.name.split()[-1]} has format {form}, this program reads format {kind.form}{kind.remedy}"
         raise StoreError(said, place=Place(str(path)))
 
 

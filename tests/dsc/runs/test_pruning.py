@@ -1,4 +1,4 @@
-"""Pruned stores: the oldest runs are gone, and what is kept is verified, replayed, resumed and continued."""
+"""Pruned stores: the oldest runs or all runs are gone, and what is kept is verified, replayed, resumed and continued."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 from dsc import replay, run_simulated
 from dsc.cli.runs import app
-from dsc.runs.archive import archive, is_unfinished
+from dsc.runs.archive import archive, has_run, is_unfinished
+from dsc.runs.pruning import forget_runs, prune
 from knowledge_base import DamagedStoreError, InputError, KnowledgeBase, StoreError
 
 GOALS = ("(in cup d)", "(in book a)", "(in cup a)", "(in book d)", "(at c)", "(in cup c)")
@@ -141,3 +142,87 @@ def test_the_knowledge_before_the_first_kept_run_is_gone(store):
     pruned(store, 1)
     with archive(store) as runs, KnowledgeBase.open(None, store, None) as knowledge:
         assert knowledge.oldest == runs.run().version
+
+
+# -- all runs are deleted ----------------------------------------------------------------------------------
+
+SOME_GOALS = GOALS[:3]
+
+
+@pytest.fixture
+def kept(tmp_path):
+    served(tmp_path / "robot.kb", SOME_GOALS)
+    return tmp_path / "robot.kb"
+
+
+def execute(store, *statements):
+    with closing(sqlite3.connect(store)) as connection, connection:
+        for statement in statements:
+            connection.execute(statement)
+
+
+def contents(store):
+    with KnowledgeBase.open(None, store, read_only=True) as knowledge:
+        return knowledge.version, knowledge.to_json()
+
+
+OTHER_FORMATS = {
+    "earlier": ["UPDATE fence SET format = 6"],
+    "later": ["UPDATE fence SET format = 99"],
+    "other columns": [
+        "UPDATE fence SET format = 3", "ALTER TABLE runs ADD COLUMN more TEXT", "ALTER TABLE steps DROP COLUMN records",
+    ],
+    "without a number": ["DROP TABLE fence", "CREATE TABLE fence (epoch INTEGER NOT NULL)", "INSERT INTO fence VALUES (3)"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", OTHER_FORMATS.values(), ids=OTHER_FORMATS)
+@pytest.mark.parametrize("unfinished", [False, True])
+def test_runs_of_another_version_are_refused_with_the_remedy_which_keeps_the_knowledge(kept, change, unfinished):
+    if unfinished:
+        interrupted(kept, "(in cup b)")
+    execute(kept, *change)
+    refused = pytest.raises(StoreError, match=f"delete all runs, but not the knowledge: `dsc runs forget {kept}`")
+    with robot(kept, Body()) as one, refused:
+        one.achieve("(in cup c)")
+    before = contents(kept)
+    assert forget_runs(kept) == len(SOME_GOALS) + unfinished
+    assert contents(kept) == before
+    assert not has_run(kept)
+    served(kept, ["(in cup c)", "(in cup d)"])
+    assert numbers(kept) == [1, 2]
+    assert replay(kept).divergence is None
+
+
+def test_action_ids_stay_unique_after_the_runs_are_forgotten(kept):
+    with archive(kept) as runs:
+        before = runs.last(runs.run().number).serials
+    forget_runs(kept)
+    forget_runs(kept)
+    served(kept, ["(in cup c)"])
+    with archive(kept) as runs:
+        assert next(runs.steps(1)).serials > before
+    served(kept, ["(in cup d)"])
+    with KnowledgeBase.open(None, kept) as knowledge:
+        assert prune(knowledge, kept, 1) == 1
+    served(kept, ["(in cup a)"])
+    assert numbers(kept) == [2, 3]
+
+
+def test_a_robot_that_works_on_the_store_keeps_its_runs(kept):
+    with robot(kept, Body()), pytest.raises(StoreError, match="another writer has it open"):
+        forget_runs(kept)
+    assert numbers(kept) == [1, 2, 3]
+
+
+def test_a_store_without_runs_has_none_to_forget(tmp_path):
+    robot(tmp_path / "robot.kb", Body()).close()
+    with KnowledgeBase.open(None, tmp_path / "robot.kb"):
+        pass
+    with pytest.raises(StoreError, match="this store has no runs"):
+        forget_runs(tmp_path / "robot.kb")
+
+
+def test_the_command_tells_the_number_of_runs(kept):
+    done = CliRunner().invoke(app, ["forget", str(kept)])
+    assert (done.exit_code, done.output) == (0, "3 runs deleted; the knowledge is unchanged\n")
