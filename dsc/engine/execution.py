@@ -138,11 +138,11 @@ class Execution:
         """Execute the internal actions of a transition; return the arguments for its target's plot, by name."""
         assert part.edge is not None  # noqa: S101  # only a part with a transition has actions
         source = frame.compiled.nodes[part.edge.source].name
-        self.performer.act(frame, source, part.effect)
+        self.performer.act(frame, source, part.effect, part=part.edge.place)
         try:
             return self.performer.values(frame, part.edge.passed)
         except InputError as error:
-            self.performer.fail(frame, f"{frame.prefix}{source}", error)
+            self.performer.fail(frame, source, error, part=part.edge.place)
             return NOTHING
 
     # -- leaving -----------------------------------------------------------------------------------------
@@ -233,7 +233,7 @@ class Execution:
             elif isinstance(state, DynamicState):
                 self._bind_decision(frame, name, self._decide(frame, name, state, passed))
         except InputError as error:
-            self.performer.fail(frame, f"{frame.prefix}{name}", error)
+            self.performer.fail(frame, name, error)
         if before is not None:
             before.gone = True
             self.leave_plot(before)

@@ -262,8 +262,8 @@ class Macrostep:
             broken = (frame.serial, edge, self._turn if each else 0)
             if broken not in self._broken_guards:
                 self._broken_guards.add(broken)
-                source = frame.prefix + frame.compiled.nodes[edge.source].name
-                self._performer.fail(frame, f"guard of '{edge.trigger}' in {source}", error)
+                source, guard = frame.compiled.nodes[edge.source].name, f"guard of '{edge.trigger}' in "
+                self._performer.fail(frame, source, error, what=guard, part=(*edge.place, "when"))
             return False
 
     # -- time --------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, get_args
 
 from dsc.data_types import check_all
@@ -39,6 +40,8 @@ from dsc.model.actions import (
 )
 from dsc.model.data_forms import Values, is_literal, literal_value
 from dsc.model.language import TermField
+from dsc.model.plot import ActionPlot
+from dsc.model.reading import FormPath
 from dsc.rank import Rank
 from dsc.run_log import run_logger
 from knowledge_base.errors import InputError, UnknownNameError, UserCodeError
@@ -72,13 +75,24 @@ class Performer:
         self.results = results
         self.event: Event | None = None
 
-    def fail(self, frame: Frame, place: str, error: InputError) -> None:
-        """Fire an error event in the plot after a failed evaluation; for an exception of user code, another event."""
+    def fail(self, frame: Frame, state: str, error: InputError, *, what: str = "", part: FormPath = ()) -> None:
+        """Fire an error event in the plot after a failed evaluation; for an exception of user code, another event.
+
+        Args:
+            frame: the plot.
+            state: the name of the state.
+            error: the reason.
+            what: the part of the state, as text before the path of the state.
+            part: the path of this part in the form of the state.
+        """
+        subject = f"{what}{frame.prefix}{state}{_file_and_line(frame.compiled.plot, state, part)}"
+        known = error.place is not None and error.place.source is not None  # else it is a place in the term
+        reason = f"{subject}: {error if known else error.text}"
         name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
         if isinstance(error, UserCodeError) and not frame.compiled.scxml:
             name = PROGRAMMING_ERROR
-            _LOG.error("%s: %s\n%s", place, error, whole_traceback(error))
-        self.results.fire(Event(name, {"reason": f"{place}: {error}"}, frame=frame.serial))
+            _LOG.error("%s\n%s", reason, whole_traceback(error))
+        self.results.fire(Event(name, {"reason": reason}, frame=frame.serial))
 
     # -- values ------------------------------------------------------------------------------------------
 
@@ -117,8 +131,11 @@ class Performer:
         actions: Iterable[ExternalAction | Internal],
         activation: int = 0,
         first: int = 0,
+        part: FormPath = (),
     ) -> None:
         """Execute a block of actions of a state; action numbers start at `first` within the activation.
+
+        `part` is the path of the block in the form of the state, for messages.
 
         A failed evaluation fires an error event. The remaining actions are still executed; in dialect `scxml` they are
         skipped (SCXML 4.9). A branch condition whose evaluation fails counts as false (SCXML 5.9.1).
@@ -131,7 +148,7 @@ class Performer:
                 else:
                     self.results.put(self._output_of(frame, state, action, activation, number))  # type: ignore[arg-type]
             except InputError as error:
-                self.fail(frame, f"{frame.prefix}{state}", error)
+                self.fail(frame, state, error, part=part)
                 if frame.compiled.scxml or isinstance(action, Bind):  # later actions read what it binds
                     return
 
@@ -150,7 +167,7 @@ class Performer:
         try:
             delay = _delay_of(self.value(frame, seconds), least=SHORTEST_PERIOD if event == EVERY else 0)
         except InputError as error:
-            self.fail(frame, f"{frame.prefix}{node.name}", error)
+            self.fail(frame, node.name, error, part=(event, index))
         else:
             self.results.put(steps.StartTimer(activation, index, delay, event))
 
@@ -219,7 +236,7 @@ class Performer:
         try:
             return self.holds(frame, action.condition)
         except InputError as error:
-            self.fail(frame, f"condition of a branch in {frame.prefix}{state}", error)
+            self.fail(frame, state, error, what="condition of a branch in ")
             return False
 
     def _emit_later(self, frame: Frame, action: Emit, delay: TermField, attributes: Mapping[str, Any]) -> None:
@@ -247,6 +264,16 @@ class Performer:
         elif not frame.gone:
             self.results.fire(Event(name, attributes, to=frame.parent.activations[frame.host]))
         # Otherwise another transition of this microstep exited the host, and the outcome is dropped.
+
+
+def _file_and_line(plot: ActionPlot, state: str, part: FormPath) -> str:
+    """Return the place of a part of a state as ` (main.yaml:7)`; empty if it is unknown.
+
+    The folder is omitted, so that the records of a run do not depend on it.
+    """
+    path = next((path for name, _, path in plot.walk() if name == state), None)
+    place = None if path is None else plot.place((*path, *part))
+    return "" if place is None or place.source is None else f" ({Path(place.source).name}:{place.line})"
 
 
 def _set_variables(frame: Frame, values: dict[str, Any]) -> None:
