@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from html import escape
-from pkgutil import resolve_name
 from typing import Any
 
+Draw = Callable[[Any], str]
+"""A function that returns the SVG of a value."""
+_drawings: dict[str, Draw] = {}
 
-def svg_by(function: str) -> Callable[[Any], str]:
-    """Return a method `_repr_svg_` that calls the named function, e.g. `dsc.drawing:draw`.
 
-    The name replaces an import, because the room that draws a value is above the room that defines the value.
-    """
+def register_drawing(kind: str, draw: Draw) -> None:
+    """Draw the values of a kind by this function: the room that draws them is above the room that defines them."""
+    _drawings[kind] = draw
+
+
+def svg_of(kind: str) -> Draw:
+    """Return a method `_repr_svg_` for the values of a kind, see `register_drawing`."""
 
     def _repr_svg_(self: Any) -> str:
-        return str(resolve_name(function)(self))
+        return _drawings[kind](self)
 
     return _repr_svg_
 

@@ -14,7 +14,7 @@ from knowledge_base.language.evaluation.explanation import Explanation, explain
 from knowledge_base.language.evaluation.query_plan import QueryPlan, plan_query
 from knowledge_base.language.evaluation.world_protocol import BoundedWorld, Bounds, Meter, WorldDefaults
 from knowledge_base.language.syntax.expression import TRUE, Expression
-from knowledge_base.notebook import svg_by
+from knowledge_base.notebook import svg_of
 from knowledge_base.pddl.problem_text import Metric
 from knowledge_base.pddl.writer import problem_to_text
 from knowledge_base.questions import Binding, Prepared, Questions
@@ -38,7 +38,7 @@ class View(WorldDefaults):
     A view is itself a `World`.
     """
 
-    _repr_svg_ = svg_by("knowledge_base.drawing:draw")
+    _repr_svg_ = svg_of("world")
 
     def __init__(self, state: WorldState, version: int) -> None:
         self._lock = ReadWriteLock()

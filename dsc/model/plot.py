@@ -32,7 +32,7 @@ from dsc.model.states import (
 )
 from knowledge_base.errors import UnknownNameError
 from knowledge_base.language.syntax.expression import Term
-from knowledge_base.notebook import svg_by
+from knowledge_base.notebook import svg_of
 
 Path = FormPath
 """Path of a part in the written form of a plot, e.g. `("states", "look", "on", "recognised")`."""
@@ -106,7 +106,7 @@ class ActionPlot(Written):
     dialect: Literal["dsc", "scxml"] = "dsc"
     _text: str | None = PrivateAttr(default=None)
     _words: AddedNames = PrivateAttr(default=AddedNames({}, {}, {}))
-    _repr_svg_ = svg_by("dsc.drawing:draw")
+    _repr_svg_ = svg_of("plot")
 
     def scores(self) -> dict[str, Term]:
         """Return the declared terms by which dynamic states may choose the plot: `priority`, `utility` and `cost`."""
