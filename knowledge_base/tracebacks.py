@@ -68,7 +68,9 @@ def calling_place(*folders: str) -> Place | None:
 
 
 def user_place(error: BaseException) -> Place | None:
-    """Return the innermost line of a user's code that raised the error; `None` without one."""
+    """Return the innermost line of a user's code that raised the error, or that cannot be read; `None` without one."""
+    if has_type(error, SyntaxError) and error.filename is not None:
+        return Place(error.filename, error.lineno, error.offset)
     users = [frame for frame in _frames(error) if is_users_code(frame[0])]
     return Place(*users[-1]) if users else None
 
@@ -81,7 +83,11 @@ def is_users_code(file: str) -> bool:
 def whole_traceback(error: BaseException) -> str:
     """Return the traceback as printable lines; the description if a part of the error fails while it is formatted."""
     try:
-        text = "".join(traceback.format_exception(type(error), error, error.__traceback__)).rstrip()
+        begun = error.__traceback__  # the calls before the user's code are of no use to the user
+        while begun is not None and not is_users_code(begun.tb_frame.f_code.co_filename):
+            begun = begun.tb_next
+        begun = begun or error.__traceback__
+        text = "".join(traceback.format_exception(type(error), error, begun)).rstrip()
     except Exception:  # noqa: BLE001  # user code defines the text and type of an exception
         return described(error)
     return "\n".join(printable(shortened(line)) for line in text.splitlines()[-_MOST_LINES:])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -18,8 +19,8 @@ from dsc.components.ports import EventActivations
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
 from knowledge_base.errors import InputError, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import require_several, require_text
-from knowledge_base.tracebacks import place_of, raised_at
-from knowledge_base.user_objects import described, shown
+from knowledge_base.tracebacks import place_of, raised_at, user_place
+from knowledge_base.user_objects import described, has_type, shown, text_of
 
 
 def component_of(name: str, *functions: SkillBody) -> Component:
@@ -111,13 +112,27 @@ def named_part(named: str) -> object:
             raise
         raise InputError(f"the module '{module_name}' cannot be imported: {error}") from error
     except Exception as error:  # a user's module may raise any error
-        raise InputError(
-            f"the module '{module_name}' cannot be imported: {described(error)}{raised_at(error)}"
-        ) from error
+        raise module_error(error, f"the module '{module_name}' cannot be imported") from error
     if not hasattr(module, name):
         valid = [one for one in vars(module) if not one.startswith("_")]
         raise UnknownNameError(f"there is no '{name}' in the module '{module_name}'", found=name, valid=valid)
     return getattr(module, name)
+
+
+def module_error(error: BaseException, said: str) -> InputError:
+    """Return the error for an exception of a user's module, with its line and the nearest name of a failed import."""
+    found = _IMPORTED.match(text_of(error, str)) if has_type(error, ImportError) else None
+    module = None if found is None else sys.modules.get(found["module"])
+    reason = f"SyntaxError: {error.msg}" if has_type(error, SyntaxError) else described(error)
+    return InputError(
+        f"{said}: {reason if module is None else reason.split(' (')[0]}",
+        place=user_place(error),
+        found=found and found["name"],
+        valid=() if module is None else [name for name in dir(module) if name[0] != "_"],
+    )
+
+
+_IMPORTED = re.compile(r"cannot import name '(?P<name>\w+)' from '(?P<module>[\w.]+)'")
 
 
 def require_instances(components: Iterable[Component]) -> tuple[Component, ...]:

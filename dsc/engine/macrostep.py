@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import repeat
 from operator import attrgetter
@@ -13,7 +13,7 @@ from dsc.engine.execution import Execution
 from dsc.engine.frames import Frame
 from dsc.engine.idle_state import state_between
 from dsc.engine.machine_state import FrameState, MachineState
-from dsc.engine.performing import Performer
+from dsc.engine.performing import Performer, file_and_line
 from dsc.engine.plot_changes import ActivePlots, replace_plots
 from dsc.engine.reaction import reaction_of
 from dsc.engine.reaction_choice import choice_of, follow, settle_guard
@@ -32,6 +32,9 @@ from knowledge_base.language.syntax.expression import Expression
 
 MAX_MICROSTEPS = 1000
 """Upper bound of microsteps in one macrostep; a longer macrostep raises `RunawayError`."""
+_MOST_STATES = 40
+"""Number of microsteps in which an error looks for the round of states that a macrostep repeats."""
+_FEW_STATES = 6
 _is_spontaneous = attrgetter("configuration.spontaneous")
 
 
@@ -242,8 +245,13 @@ class Macrostep:
         return True
 
     def _runaway(self) -> RunawayError:
-        trail = [path for micro in self._results.microsteps[-6:] for path in micro.entered]
-        return RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round", trail)
+        entered = [path for micro in self._results.microsteps[-_MOST_STATES:] for path in micro.entered]
+        trail = _last_round(entered)
+        around, _, state = trail[-1].rpartition("/") if trail else ("", "", "")
+        places = [
+            file_and_line(frame.compiled.plot, state) for frame in self._root.frames() if frame.prefix[:-1] == around
+        ]
+        return RunawayError(f"no rest after {MAX_MICROSTEPS} microsteps; the chart goes round{''.join(places)}", trail)
 
     # -- guards ------------------------------------------------------------------------------------------
 
@@ -294,6 +302,12 @@ class Macrostep:
             node = frame.compiled.nodes[frame.compiled.index[state]]
             seconds = node.cycles[event.number].seconds
             self._performer.start_timer(frame, node, event.to or 0, EVERY, event.number, seconds)
+
+
+def _last_round(entered: Sequence[str]) -> Sequence[str]:
+    """Return the states since the last one was entered before; without such a round, the last few states."""
+    *before, last = entered or ("",)
+    return entered[len(before) - 1 - before[::-1].index(last) :] if last in before else entered[-_FEW_STATES:]
 
 
 def _is_frame(serial: int | None) -> Callable[[Frame | FrameState], bool]:

@@ -85,7 +85,7 @@ class Performer:
             what: the part of the state, as text before the path of the state.
             part: the path of this part in the form of the state.
         """
-        subject = f"{what}{frame.prefix}{state}{_file_and_line(frame.compiled.plot, state, part)}"
+        subject = f"{what}{frame.prefix}{state}{file_and_line(frame.compiled.plot, state, part)}"
         known = error.place is not None and error.place.source is not None  # else it is a place in the term
         reason = f"{subject}: {error if known else error.text}"
         name = EXECUTION_ERROR if frame.compiled.scxml else ERROR
@@ -266,7 +266,7 @@ class Performer:
         # Otherwise another transition of this microstep exited the host, and the outcome is dropped.
 
 
-def _file_and_line(plot: ActionPlot, state: str, part: FormPath) -> str:
+def file_and_line(plot: ActionPlot, state: str, part: FormPath = ()) -> str:
     """Return the place of a part of a state as ` (main.yaml:7)`; empty if it is unknown.
 
     The folder is omitted, so that the records of a run do not depend on it.

@@ -27,7 +27,7 @@ from planning.robot.bringup import begin, simulated
 from planning.robot.bundles import Bundle, components_of, gathered
 from planning.robot.checking import check_project
 from planning.robot.project_files import objects_in
-from planning.robot.simulation import Setup, Simulation
+from planning.robot.simulation import Setup, Simulation, components_in
 from planning.robot.soundness import run_skills
 from planning.robot.targets import bundle_at
 
@@ -48,7 +48,7 @@ def facts_of(bundle: Bundle, target: str) -> dict[str, Any]:
     """Return the facts of a robot and its target as JSON data; errors as for its components, simulation and domains."""
     simulation = simulated(bundle, Setup())
     bundles = gathered([bundle])
-    own = () if simulation is None else simulation.components()
+    own = () if simulation is None else components_in(simulation)
     components = [*components_of(bundles), *own]
     schema = bundle.planning_domain.schema
     skills = [*(skill for one in components for skill in one.skills().values()), *run_skills()]

@@ -30,7 +30,7 @@ from planning.problem.construction import check_goal
 from planning.robot.bundles import Bundle, components_of, conversions_of, gathered, plots_of, resources_of, wiring_of
 from planning.robot.program import Origin
 from planning.robot.robot import Robot, kind_of
-from planning.robot.simulation import Setup, Simulation
+from planning.robot.simulation import Setup, Simulation, components_in, knowledge_of
 from planning.robot.task import Task, own_task
 
 
@@ -220,7 +220,7 @@ def initial_knowledge(bundle: Bundle, simulation: Simulation | None) -> Delta:
         return bundle.knowledge
     with _usable(f"{type(simulation).__name__}.knowledge"):
         try:
-            return bundle.knowledge.then(simulation.knowledge())
+            return bundle.knowledge.then(knowledge_of(simulation))
         except InputError as error:
             error.place = error.place or user_place(error)
             raise
@@ -255,7 +255,7 @@ def simulated(bundle: Bundle, setup: Setup) -> Simulation | None:
 
 def _components(bundle: Bundle, simulation: Simulation | None) -> list[Component]:
     with _usable(f"the components of '{bundle.name}'"):
-        found = [*components_of(gathered([bundle])), *(() if simulation is None else simulation.components())]
+        found = [*components_of(gathered([bundle])), *(() if simulation is None else components_in(simulation))]
     return [*require_instances(found)]
 
 

@@ -70,7 +70,7 @@ from planning.robot.project_files import (
     without_consequences,
 )
 from planning.robot.scenario_files import check_scenarios
-from planning.robot.simulation import Setup, Simulation
+from planning.robot.simulation import Setup, Simulation, components_in, left_in
 from planning.robot.soundness import check_implementations, interfaces, run_skills
 from planning.robot.targets import bundle_at
 from planning.robot.unused import never_true, quoted_names, unused_plots
@@ -216,7 +216,7 @@ class _Robot:
             try:
                 self._simulation = simulated(self._bundle, Setup(profile=profile))
                 with contained(f"the components of '{self._bundle.name}'", (InputError,)):
-                    own = () if self._simulation is None else self._simulation.components()
+                    own = () if self._simulation is None else components_in(self._simulation)
                     found = [*components_of(self._bundles), *own, *self._remote]
                 if not all(isinstance(one, Component) for one in found):
                     require_instances(found)
@@ -262,6 +262,8 @@ class _Robot:
             if world is not None and not self._bundle.remote:  # else other programs may make a fact true
                 found += never_true(self._plots, self._domain, world, quoted)
         self._check_components()
+        if self._simulation is not None:
+            self._check_left(self._simulation)
         if self._components is not None and not self._lacks_remote:
             found += [Finding(error, "wiring") for _, error in wiring_errors([*self._components, planner_services()])]
         return found
@@ -299,6 +301,16 @@ class _Robot:
                 raise InputError(f"programming error in {error}") from error
             return world
         return None
+
+    def _check_left(self, simulation: Simulation) -> None:
+        """Check the type of what is left, which a run asks for only at its end; at its beginning, the code may fail."""
+        with tolerated():
+            try:
+                left_in(simulation)
+            except ProgrammingError as error:
+                raise InputError(f"programming error in {error}") from error
+            except Exception:  # noqa: BLE001, S110  # the end of a run reports it
+                pass
 
     def _objects_nearby(self, schema: Schema) -> dict[str, str]:
         """Return the objects of the project's problem files."""

@@ -7,18 +7,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from dsc.components.hooks import contained
-from dsc.errors import ProgrammingError
 from dsc.sequencer.clock import ClockKind
 from dsc.sequencer.run_end import RunEnd
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
-from knowledge_base.tracebacks import place_of
 from planning.analysis.explanation import unmet
 from planning.model.domain import PlanningDomain
 from planning.problem.derived import derivation
 from planning.robot.bundles import Bundle
 from planning.robot.report import Judge, Report, reason_of_end, summarise
-from planning.robot.simulation import Left, Simulation
+from planning.robot.simulation import Left, Simulation, left_in
 from planning.robot.tally import Tally
 from planning.robot.task import Task
 
@@ -88,12 +86,7 @@ class Judgement:
         if self.simulation is None or not self._is_own_task:
             return None
         with contained(f"{type(self.simulation).__name__}.left"):
-            left = self.simulation.left()
-            if left is None and type(self.simulation).left is not Simulation.left:
-                method = type(self.simulation).left
-                place = place_of(method)
-                raise ProgrammingError(f"{method.__qualname__}: it returns None instead of a list ({place})")
-            return None if left is None else list(left)
+            return left_in(self.simulation)
 
     @property
     def _is_own_task(self) -> bool:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from dsc.chance import choose, uniform
+from dsc.components.assembly import require_instances
 from dsc.components.component import Component
 from dsc.components.hooks import contained
+from dsc.errors import ProgrammingError
 from dsc.text.profiles import Profile
 from knowledge_base.errors import InputError
 from knowledge_base.facts import Delta
+from knowledge_base.tracebacks import place_of
+from knowledge_base.user_objects import shown
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -154,6 +158,50 @@ class Simulation(ABC):
 
     def close(self) -> None:  # noqa: B027  # most simulations have nothing to close
         """Close files and devices of the world; called once, after the run."""
+
+
+def knowledge_of(world: Simulation) -> Delta:
+    """Return the initial knowledge; raise `ProgrammingError` if the user's method returns something else."""
+    found: object = world.knowledge()
+    _require_result(type(world).knowledge, found, Delta, "a Delta")
+    return cast("Delta", found)
+
+
+def components_in(world: Simulation) -> list[Component]:
+    """Return the components of a world.
+
+    Raises:
+        ProgrammingError: the user's method returns something else than a list.
+        InputError: a part of the list is not a component.
+    """
+    found: object = world.components()
+    _require_result(type(world).components, found, Iterable, "a list")
+    listed = [*cast("Iterable[Component]", found)]
+    try:
+        if not all(isinstance(one, Component) for one in listed):
+            require_instances(listed)
+    except InputError as error:
+        error.place = error.place or place_of(type(world).components)
+        raise
+    return listed
+
+
+def left_in(world: Simulation) -> list[Left] | None:
+    """Return the parts that are left; raise `ProgrammingError` if the user's method returns something else."""
+    found: object = world.left()
+    if found is None and type(world).left is Simulation.left:
+        return None
+    _require_result(type(world).left, found, Iterable, "a list")
+    left = [*cast("Iterable[object]", found)]
+    for one in left:
+        _require_result(type(world).left, one, Left, "a Left in its list")
+    return cast("list[Left]", left)
+
+
+def _require_result(method: Callable[..., object], found: object, wanted: type, words: str) -> None:
+    if not isinstance(found, wanted) or isinstance(found, str):
+        said = f"{method.__qualname__}: it returns {shown(found)[:60]} instead of {words}"
+        raise ProgrammingError(f"{said} ({place_of(method)})")
 
 
 def scene_of(world: Simulation) -> list[dict[str, Any]] | None:

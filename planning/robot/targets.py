@@ -15,11 +15,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from dsc.components.assembly import made, named_part
+from dsc.components.assembly import made, module_error, named_part
 from dsc.components.hooks import contained
 from knowledge_base.errors import InputError, Place, UnknownNameError
-from knowledge_base.tracebacks import raised_at
-from knowledge_base.user_objects import described, shown
+from knowledge_base.user_objects import shown
 from planning.robot.bundles import GROUP, Bundle, installed
 
 ROBOT = "robot"
@@ -130,7 +129,7 @@ def _execute(file: Path) -> ModuleType:
             raise
         raise InputError(f"{file} cannot be executed: {error}") from error
     except Exception as error:  # a user's module may raise any error
-        raise InputError(f"{file} cannot be executed: {described(error)}{raised_at(error)}") from error
+        raise module_error(error, f"{file} cannot be executed") from error
 
 
 def _load(name: str, file: Path) -> ModuleType:

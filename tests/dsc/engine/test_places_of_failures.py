@@ -50,3 +50,27 @@ def test_a_failed_evaluation_has_its_file_and_line_in_every_folder(tmp_path, par
     assert problems[0].startswith(said)
     assert problems[0] == problems[1]
     assert "<text>" not in problems[0]
+
+
+@pytest.mark.parametrize(
+    ("states", "said"),
+    [
+        ("a: {always: a}", "(round.yaml:4): a -> a"),
+        ("a: {always: b}\n  b: {always: c}\n  c: {always: a}", "goes round (round.yaml:"),
+        ("a: {use: again, on: {done: e}}\n  e: {final: true}", "goes round (test_places_of_failures.py:"),
+    ],
+)
+def test_a_chart_that_goes_round_is_told_with_one_round_and_its_line(tmp_path, states, said):
+    file = tmp_path / "round.yaml"
+    file.write_text(f"plot: wrong\nstates:\n  s: {{after: {{seconds: 1, to: a}}}}\n  {states}\n")
+    again = parse_plot("{plot: again, states: {x: {always: y}, y: {always: x}}}")
+
+    async def main():
+        return await Sequencer(Library([load_plot(file), again]), KnowledgeBase(SCHEMA), (), LoopClock()).run("wrong")
+
+    problem = run_simulated(main()).problem
+    assert said in problem
+    *_, trail = problem.split(": ")
+    names = trail.split(" -> ")
+    assert names[0] == names[-1]
+    assert len(set(names)) == len(names) - 1

@@ -100,7 +100,9 @@ def test_a_bug_in_a_skill_ends_the_run_with_file_and_line_and_its_traceback_in_t
     assert ran.end.reason == f"programming error in {ran.end.programming_error}"
     (record,) = [one for one in caplog.records if one.levelno >= logging.ERROR]
     assert record.name.startswith("dsc.")
-    assert "Traceback" in record.getMessage()
+    _, head, first, *_ = record.getMessage().splitlines()
+    assert head.startswith("Traceback")
+    assert HERE in first  # without the calls that led to the user's code
     assert "self.pass_by" in record.getMessage()
     assert "stop" in arm.called  # exit actions are carried out
 

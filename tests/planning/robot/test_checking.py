@@ -449,3 +449,31 @@ robot = Bundle(name="waver", about="waves", domain=PlanningDomain.parse(DOMAIN),
     found = {(Path(one.place.source or "").name, one.place.line, one.place.column)
              for one in check_project(str(robot)) if one.place is not None and one.level == "error"}  # fmt: skip
     assert found == {("waver.py", 8, 12), ("waver.py", 13, 7), ("waver.py", 19, 9)}
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "said"),
+    [
+        ("return [Left(", "[Left(", "House.left: it returns None instead of a list ("),
+        ("return [Left(", "return str([Left(", "House.left: it returns '[]' instead of a list ("),
+        ("return [Left(one, at, ", "return [(one, at, ", "House.left: it returns ('parcel1', "),
+        ("return Delta(\n            nodes", "return dict(\n            nodes", "House.knowledge: it returns {'nodes': "),
+        ("return [Wheels(self), Gripper(self)]", "[Wheels(self)]", "House.components: it returns None instead of a list ("),
+        ("Gripper(self)]", "Gripper]", "delivery.py:25: a component is an instance of a subclass of Component, not <class"),
+    ],
+)  # fmt: skip
+def test_a_wrong_result_of_the_simulation_is_found_with_the_line_of_its_method(project, right, wrong, said):
+    text = (project / "delivery.py").read_text()
+    assert right in text
+    changed = text.replace(right, wrong, 1)
+    if wrong.startswith("return str("):
+        changed = changed.replace("if at != self.goes_to[one]]", "if at == self.goes_to[one]])")
+    (project / "delivery.py").write_text(changed)
+    (found,) = [str(one) for one in check_project(str(project)) if "simulation" not in str(one)][:1]
+    assert said in found
+    assert "delivery.py:" in found
+
+
+def test_a_simulation_whose_rest_fails_at_the_beginning_is_no_mistake(project):
+    planted(project, [("delivery.py", "return [Left(", "return [] if self.ended else [Left(", "")])
+    assert check_project(str(project)) == []

@@ -88,11 +88,12 @@ def test_a_file_with_one_bundle_need_not_name_it(tmp_path):
     [
         ("from planning import Bundle\na, b = Bundle('a'), Bundle('b')\n", r"has 2 bundles; name one as other.py:NAME"),
         ("import os\n", "has no bundle; name one as other.py:NAME, or call it `robot`"),
-        ("def robot(\n", "cannot be executed: SyntaxError"),
-        ("robot = 1 / 0\n", r"ZeroDivisionError: division by zero \(.*other.py:1\)"),
+        ("def robot(\n", r"other.py:1:10: .*cannot be executed: SyntaxError: '\(' was never closed"),
+        ("import json\n\nfrom planning import Bundel\n", r"other.py:3: .*from 'planning'; did you mean 'Bundle'"),
+        ("robot = 1 / 0\n", r"other.py:1: .*ZeroDivisionError: division by zero"),
         ("def robot():\n    return [][3]\n", r"IndexError: list index out of range \(.*other.py:2\)"),
-        ("import json\nrobot = json.loads('{')\n", r"\(.*other.py:2\)"),
-        ("import sys\nsys.exit(4)\n", r"SystemExit: 4 \(.*other.py:2\)"),
+        ("import json\nrobot = json.loads('{')\n", r"other.py:2: .*JSONDecodeError"),
+        ("import sys\nsys.exit(4)\n", r"other.py:2: .*SystemExit: 4"),
     ],
 )
 def test_an_invalid_bundle_file_is_refused_with_its_cause(tmp_path, text, said):
