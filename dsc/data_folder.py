@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from dsc.errors import LostDataError
 from knowledge_base.errors import InputError, StoreError
-from knowledge_base.user_objects import shown
+from knowledge_base.user_objects import described, shown
 
 SCHEME = "data:"
 """Beginning of each reference."""
@@ -204,7 +204,9 @@ def _json(data: Any) -> bytes:
         _require_text_keys(data)
         return json.dumps(data, separators=(",", ":"), allow_nan=False, sort_keys=True).encode()
     except (TypeError, ValueError, RecursionError) as error:
-        raise InputError(f"data are bytes, or plain data such as a list of numbers: {error}") from error
+        raise InputError(
+            f"data are bytes, or plain data such as a list of numbers: {described(error, named=False)}"
+        ) from error
 
 
 def _require_text_keys(data: Any) -> None:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import linecache
+import ast
 import os
-from collections.abc import Sequence
+import tokenize
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from functools import lru_cache
+from typing import NamedTuple
 
 from knowledge_base.errors import Place
-from knowledge_base.tracebacks import calling_place
-
-_PROJECT = tuple(f"{Path(__file__).parents[1] / package}{os.sep}" for package in ("knowledge_base", "dsc", "planning"))
+from knowledge_base.tracebacks import PROJECT, calling_place, is_program
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,60 +22,104 @@ class Origin:
         source: name of the file; `None` if it is unknown.
         line, column: place of the first character, from 1.
         indent: number of characters in the file before each later line, e.g. if `textwrap.dedent` has removed them.
+        whole: whether only the line of the whole text is known, because its lines differ from those of the file.
     """
 
     source: str | None = None
     line: int = 1
     column: int = 1
     indent: int = 0
+    whole: bool = False
 
     def place(self, line: int, column: int) -> Place:
         """Return the place in the file of a line and column of the text, which count from 1."""
+        if self.whole:
+            return Place(self.source, self.line)
         before = self.column - 1 if line == 1 else self.indent
-        return Place(self.source, self.line + line - 1, before + column)
+        return Place(self.source, self.line + line - 1, max(before + column, 1))
 
 
 def origin_of(text: str, source: str | None) -> Origin:
     """Return the origin of a text, which is the whole file `source`, or a literal in the file of the caller.
 
-    The caller is the innermost line of the stack outside of this project. A text that its file does not contain line by
-    line has an unknown origin, e.g. one with escapes.
+    The caller is the innermost line of the stack outside of this project. If the file has several literals with that
+    text, the nearest one is meant. The indentation may differ. A text that the program computes has an unknown origin.
     """
-    caller = calling_place(*_PROJECT) if source is None else None
-    if caller is None or caller.source is None or not os.path.isfile(caller.source):  # noqa: PTH113  # it is fast
+    caller = calling_place(*PROJECT) if source is None and isinstance(text, str) else None
+    if caller is None or caller.source is None or not is_program(caller.source):
         return Origin(source)
-    lines, program = text.split("\n"), linecache.getlines(caller.source)
-    written = [number for number, line in enumerate(lines) if line.strip()]
-    starts = _find([lines[number] for number in range(written[0], written[-1] + 1)], program) if written else []
-    if not starts:
+    try:
+        changed = os.stat(caller.source)  # noqa: PTH116  # it is fast
+    except OSError:  # e.g. a notebook
         return Origin()
+    program = _literals(caller.source, changed.st_mtime_ns, changed.st_size)
+    found = program.get(_key(text), ()) if text.strip() else ()
     called = caller.line or 1
-    above = min(starts, key=lambda start: abs(start + 1 - called)) - written[0]
-    shifts = {number: _indent(program[above + number], lines[number]) for number in written}
-    return Origin(caller.source, above + 1, shifts.pop(0, 0) + 1, next(iter(shifts.values()), 0))
+    literal = min(found, key=lambda one: abs(one.line - called), default=None)
+    return Origin() if literal is None else literal.origin(text, caller.source)
 
 
-def _find(lines: Sequence[str], program: Sequence[str]) -> list[int]:
-    """Return the numbers, from 0, of the lines at which a program has these lines; indentation may differ.
+class _Literal(NamedTuple):
+    """A text in a program, with its place and the lines of the program that contain it."""
 
-    In the program, other text may precede the first line and follow the last line.
-    """
-    first, *others = (line.strip() for line in lines)
-    found = [start for start, line in enumerate(program) if first in line]
-    if not others:
-        return found
-    *inside, last = others
-    return [
-        start
-        for start in found
-        if program[start].rstrip().endswith(first)
-        and [line.strip() for line in program[start + 1 : start + len(others)]] == inside
-        and "".join(program[start + len(others) : start + len(lines)]).strip().startswith(last)
-    ]
+    line: int
+    column: int
+    lines: Sequence[str]
+
+    def origin(self, text: str, source: str) -> Origin:
+        """Return the origin of the text, which has the same content as this literal."""
+        written = [(number, one.strip(), one) for number, one in enumerate(text.split("\n")) if one.strip()]
+        first = written[0][0]
+        begins = next((number for number in range(len(self.lines)) if self._column_of(written[0][1], number) >= 0), 0)
+        columns = [self._column_of(content, begins + number - first) for number, content, _ in written]
+        if min(columns) < 0:  # e.g. a line break that is written as an escape
+            return Origin(source, self.line, whole=True)
+        shifts = [column - one.index(content) for column, (_, content, one) in zip(columns, written, strict=True)]
+        own, later = (1, shifts[0]) if first else (shifts[0] + 1, next(iter(shifts[1:]), 0))
+        return Origin(source, self.line + begins - first, own, later)
+
+    def _column_of(self, content: str, number: int) -> int:
+        """Return the column, from 0, of a line of the text in a line of the program; -1 if it is missing."""
+        if number >= len(self.lines):
+            return -1
+        return self.lines[number].find(content, self.column if number == 0 else 0)
 
 
-def _indent(written: str, line: str) -> int:
-    """Return by how many characters a line is further right in the program than in the text."""
-    content = line.strip()
-    at = written.rindex(content) if written.rstrip().endswith(content) else written.index(content)
-    return at - line.index(content)
+@lru_cache(maxsize=64)
+def _literals(file: str, changed: int, size: int) -> Mapping[str, tuple[_Literal, ...]]:  # noqa: ARG001  the file's state
+    """Return the literals of a program by `_key`."""
+    try:
+        with tokenize.open(file) as stream:
+            text = stream.read()
+        tree = parse_program(text)
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
+        return {}
+    lines, found = text.splitlines(), dict[str, tuple[_Literal, ...]]()
+    for node in _constants(tree):
+        key = _key(str(node.value))
+        last = node.end_lineno or node.lineno
+        column = len(lines[node.lineno - 1].encode()[: node.col_offset].decode())
+        literal = _Literal(node.lineno, column, lines[node.lineno - 1 : last])
+        found[key] = (*found.get(key, ()), literal)
+    return found
+
+
+def parse_program(text: str) -> ast.Module:
+    """Return the syntax tree of a program; errors as for `ast.parse`."""
+    try:
+        return ast.parse(text)
+    except SystemError:  # finalizers that run during it confuse its counter (CPython issue 106905)
+        return ast.parse(text)
+
+
+def _constants(tree: ast.Module) -> Iterator[ast.Constant]:
+    """Yield the texts of a program, without the parts of f-strings."""
+    parts = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in ast.walk(node)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in parts:
+            yield node
+
+
+def _key(text: str) -> str:
+    """Return the lines of a text without indentation and without empty lines around them."""
+    return "\n".join(line.strip() for line in text.split("\n")).strip("\n")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from knowledge_base.errors import Place, printable, shortened
-from knowledge_base.user_objects import described, has_type
+from knowledge_base.user_objects import causes, described, traceback_of, unread_place
 
 
 def raised_at(error: BaseException, *, only_users: bool = False) -> str:
@@ -21,8 +21,9 @@ def raised_at(error: BaseException, *, only_users: bool = False) -> str:
     Code of this project, of the standard library and of installed packages counts only if no other code was involved,
     and never with `only_users`. A syntax error has the line that cannot be read.
     """
-    if has_type(error, SyntaxError) and error.filename is not None:
-        return f" ({error.filename}:{error.lineno})"
+    unread = unread_place(error)
+    if unread is not None:
+        return f" ({unread.source}:{unread.line})"
     frames = list(_frames(error))
     users = [frame for frame in frames if is_users_code(frame[0])]
     found = users if users or only_users else [frame for frame in frames if not frame[0].startswith(_FROZEN)]
@@ -31,11 +32,9 @@ def raised_at(error: BaseException, *, only_users: bool = False) -> str:
 
 def _frames(error: BaseException) -> Iterator[tuple[str, int]]:
     """Yield file and line of each frame of the error, of its causes, and of the first member of a group."""
-    cause: BaseException | None = error
-    while cause is not None:
-        for frame, line in traceback.walk_tb(cause.__traceback__):
+    for cause in causes(error, members=True):
+        for frame, line in traceback.walk_tb(traceback_of(cause)):
             yield frame.f_code.co_filename, line
-        cause = cause.exceptions[0] if has_type(cause, BaseExceptionGroup) else cause.__cause__
 
 
 def waits_at(coroutine: Any) -> str:
@@ -69,10 +68,21 @@ def calling_place(*folders: str) -> Place | None:
 
 def user_place(error: BaseException) -> Place | None:
     """Return the innermost line of a user's code that raised the error, or that cannot be read; `None` without one."""
-    if has_type(error, SyntaxError) and error.filename is not None:
-        return Place(error.filename, error.lineno, error.offset)
+    unread = unread_place(error)
+    if unread is not None:
+        return unread
     users = [frame for frame in _frames(error) if is_users_code(frame[0])]
     return Place(*users[-1]) if users else None
+
+
+def is_of_project(error: BaseException) -> bool:
+    """Return whether the frames of an error are all of this project or of the standard library."""
+    return not any(is_program(file) and not file.startswith(PROJECT) for file, _ in _frames(error))
+
+
+def is_program(file: str) -> bool:
+    """Return whether a file is not of the standard library; installed packages count as programs."""
+    return file.startswith(_PACKAGES) or not file.startswith((_STANDARD, _FROZEN))
 
 
 def is_users_code(file: str) -> bool:
@@ -83,12 +93,12 @@ def is_users_code(file: str) -> bool:
 def whole_traceback(error: BaseException) -> str:
     """Return the traceback as printable lines; the description if a part of the error fails while it is formatted."""
     try:
-        begun = error.__traceback__  # the calls before the user's code are of no use to the user
+        begun = traceback_of(error)  # the calls before the user's code are of no use to the user
         while begun is not None and not is_users_code(begun.tb_frame.f_code.co_filename):
             begun = begun.tb_next
-        begun = begun or error.__traceback__
+        begun = begun or traceback_of(error)
         text = "".join(traceback.format_exception(type(error), error, begun)).rstrip()
-    except Exception:  # noqa: BLE001  # user code defines the text and type of an exception
+    except BaseException:  # noqa: BLE001  # user code defines the text, notes and type of an exception
         return described(error)
     return "\n".join(printable(shortened(line)) for line in text.splitlines()[-_MOST_LINES:])
 
@@ -98,8 +108,8 @@ _MOST_LINES = 200
 _ROOT = Path(__file__).parents[1]
 _FROZEN = "<frozen"
 """The beginning of the file names of code inside the interpreter, e.g. of `import`."""
-_NOT_USERS = (
-    *(str(_ROOT / package) + os.sep for package in ("knowledge_base", "dsc", "planning")),
-    *{sysconfig.get_path(name) + os.sep for name in ("stdlib", "purelib", "platlib")},
-    _FROZEN,
-)
+PROJECT = tuple(str(_ROOT / package) + os.sep for package in ("knowledge_base", "dsc", "planning"))
+"""The folders of the packages of this project."""
+_PACKAGES = tuple({sysconfig.get_path(name) + os.sep for name in ("purelib", "platlib")})
+_STANDARD = sysconfig.get_path("stdlib") + os.sep
+_NOT_USERS = (*PROJECT, *_PACKAGES, _STANDARD, _FROZEN)

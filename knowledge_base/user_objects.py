@@ -6,17 +6,23 @@ An exception of a hook, listener or planner must not end the program while its r
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from types import TracebackType
 from typing import TypeGuard, TypeVar
 
-from knowledge_base.errors import MAX_NAME, printable, shortened
+from knowledge_base.errors import MAX_NAME, Place, printable, shortened
 
 _Type = TypeVar("_Type")
 MAX_MEMBERS = 3
 """Maximum number of exceptions in the description of a group; also the maximum depth of nested groups."""
 _name_of = type.__dict__["__name__"].__get__  # a metaclass may return another name, or fail
 _members_of = BaseExceptionGroup.__dict__["exceptions"].__get__
+_cause_of = BaseException.__dict__["__cause__"].__get__
+_traceback_of = BaseException.__dict__["__traceback__"].__get__
+_unread = [SyntaxError.__dict__[name].__get__ for name in ("filename", "lineno", "offset")]
+_MOST_CAUSES = 100
+"""Maximum number of causes that are read: an error may be its own cause."""
 
 
 def type_name(value: object) -> str:
@@ -41,6 +47,30 @@ def as_exception(error: BaseException) -> Exception:
     replacement = RuntimeError(described(error))
     replacement.__cause__ = error
     return replacement
+
+
+def causes(error: BaseException, *, members: bool = False) -> Iterator[BaseException]:
+    """Yield the error, its cause, the cause of this, and so on; with `members`, the first member of a group instead."""
+    cause: BaseException | None = error
+    for _ in range(_MOST_CAUSES):
+        if cause is None:
+            return
+        yield cause
+        cause = _members_of(cause)[0] if members and has_type(cause, BaseExceptionGroup) else _cause_of(cause)
+
+
+def traceback_of(error: BaseException) -> TracebackType | None:
+    """Return the traceback of the error."""
+    found: TracebackType | None = _traceback_of(error)
+    return found
+
+
+def unread_place(error: BaseException) -> Place | None:
+    """Return the place of a program that cannot be read; `None` for other errors than a `SyntaxError` with a file."""
+    if not has_type(error, SyntaxError):
+        return None
+    file, line, column = (read(error) for read in _unread)
+    return None if file is None else Place(str(file), line, column or None)
 
 
 def described(error: BaseException, *, named: bool = True) -> str:

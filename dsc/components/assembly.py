@@ -17,7 +17,7 @@ from dsc.components.life_cycle import NEUTRAL, LifeCycle
 from dsc.components.parameters import Parameters, ParameterValues
 from dsc.components.ports import EventActivations
 from dsc.skills import DECLARED, Declared, SkillBody, SkillSignature, signature_of
-from knowledge_base.errors import InputError, SchemaError, UnknownNameError
+from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.language.checking.inputs import require_several, require_text
 from knowledge_base.tracebacks import place_of, raised_at, user_place
 from knowledge_base.user_objects import described, has_type, shown, text_of
@@ -177,21 +177,31 @@ def require_whole(component: Component) -> None:
     """Raise `SchemaError` if a component lacks or replaces attributes or methods of every component."""
     kind = type(component)
     if not all(hasattr(component, name) for name in _OF_EVERY_COMPONENT):
-        raise SchemaError(f"{kind.__name__}.__init__ does not call super().__init__()", place=place_of(kind.__init__))
+        raise SchemaError(f"{kind.__name__}.__init__ does not call super().__init__()", place=_place_of_init(kind))
     for name in _hidden_names(component):
         message = f"'{name}' of {kind.__name__} hides an attribute of every component; choose another name"
-        raise SchemaError(message, place=place_of(kind.__init__ if "__init__" in vars(kind) else kind), found=name)
+        raise SchemaError(message, place=_place_of_init(kind), found=name)
+
+
+def _place_of_init(kind: type[Component]) -> Place | None:
+    """Return the line of a class's `__init__`, or of the class, e.g. of a dataclass."""
+    return (place_of(kind.__init__) if "__init__" in vars(kind) else None) or place_of(kind)
 
 
 def _hidden_names(component: Component) -> Iterator[str]:
-    """Yield the names of the attributes of every component that a component has in another form."""
+    """Yield the names of the attributes of every component that a component has in another form.
+
+    Without a period, `step` is the builder's own.
+    """
     for name, wanted in _OF_EVERY_COMPONENT.items():
         if not isinstance(getattr(component, name), wanted):
             yield name
-    if not isinstance(getattr_static(type(component), "mode"), property):
+    if not hasattr(getattr_static(type(component), "mode", None), "__get__"):
         yield "mode"
     for name in _METHODS:
-        if not callable(getattr(component, name)):
+        own = getattr_static(component, name, None)
+        found = own if isinstance(own, property) else getattr(component, name, None)  # a property calls users' code
+        if not callable(found) and not (name == "step" and component.period is None):
             yield name
 
 

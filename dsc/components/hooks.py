@@ -24,8 +24,8 @@ from weakref import WeakSet
 from dsc.errors import ProgrammingError, SkillError
 from dsc.run_log import run_logger
 from knowledge_base.errors import InputError
-from knowledge_base.tracebacks import is_users_code, raised_at, waits_at, whole_traceback
-from knowledge_base.user_objects import described, has_type
+from knowledge_base.tracebacks import is_of_project, is_users_code, raised_at, waits_at, whole_traceback
+from knowledge_base.user_objects import causes, described, has_type
 
 _LOG = run_logger(__package__)
 Classes = tuple[type[BaseException], ...]
@@ -162,8 +162,8 @@ def programming_error(error: BaseException, hook: str, raises: Classes = ()) -> 
     said += _RETURNED if _RAISED in said else ""
     place = raised_at(error, only_users=refused)
     bug = ProgrammingError(f"{hook}: {said}{itself}{place}")
-    # Without a line of the user, e.g. for a mistake in a watched condition, the traceback has no code of the user.
-    _LOG.error("%s", f"{bug}\n{whole_traceback(error)}" if place else bug)
+    useless = refused and is_of_project(error)  # e.g. for a mistake in a watched condition
+    _LOG.error("%s", bug if useless else f"{bug}\n{whole_traceback(error)}")
     found = _found.get()
     if found is not None and len(found) < _MOST_FOUND:
         found.append(str(bug))
@@ -172,10 +172,7 @@ def programming_error(error: BaseException, hook: str, raises: Classes = ()) -> 
 
 def bug_in(error: BaseException) -> ProgrammingError | None:
     """Return the programming error that an error is, or that caused it; `None` for other errors."""
-    cause: BaseException | None = error
-    while cause is not None and type(cause) is not ProgrammingError:
-        cause = cause.__cause__
-    return cause
+    return next((cause for cause in causes(error) if type(cause) is ProgrammingError), None)
 
 
 def reason_of(error: BaseException) -> str:

@@ -23,6 +23,7 @@ from knowledge_base.language.syntax.expression import (
     Variable,
 )
 from knowledge_base.language.syntax.text import to_text
+from knowledge_base.user_objects import described
 
 
 class ValueEvaluation:
@@ -98,7 +99,7 @@ class ValueEvaluation:
         except InputError as error:
             raise InputError(f"{to_text(form)}: {error.message}", place=form.place) from error
         except TypeError as error:  # a variable has a value of another type
-            raise InputError(f"{to_text(form)}: {error}", place=form.place) from error
+            raise InputError(f"{to_text(form)}: {described(error, named=False)}", place=form.place) from error
 
     def _argument(self, term: Term) -> Any:
         if isinstance(term, Constant) and isinstance(term.value, str) and term.value in self._series:

@@ -12,6 +12,7 @@ from dsc.deployment.schedule import Policy
 from dsc.model.language import Frozen, Written
 from dsc.model.reading import FormPath
 from dsc.text.yaml import load_document, read_file, read_model
+from knowledge_base.origin import origin_of
 
 EVERY_MODE = "all"
 """Name of the only mode of a deployment that declares no modes: all components are active, in all their modes."""
@@ -142,7 +143,7 @@ def parse_deployment(text: str, source: str | None = None) -> Deployment:
     Raises:
         InputError: the text is not a deployment model; the message has the place and the nearest valid key.
     """
-    document = load_document(text, source)
+    document = load_document(text, origin_of(text, source))
     return read_model(Deployment, document).written_at(document.places)
 
 

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field
 
 from dsc.model.language import Frozen, Written
 from dsc.text.yaml import load_document, read_file, read_model
+from knowledge_base.origin import origin_of
 
 CHANGE = "change"
 
@@ -56,7 +57,7 @@ def parse_monitoring(text: str, source: str | None = None) -> MonitoringProfile:
     Raises:
         InputError: the text is not a monitoring profile; the message has the place and the nearest valid key.
     """
-    document = load_document(text, source)
+    document = load_document(text, origin_of(text, source))
     return read_model(MonitoringProfile, document).written_at(document.places)
 
 

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from dsc.dynamic.experience import Experience
 from dsc.model.language import Frozen, Written
 from dsc.text.yaml import dump, load_document, read_file, read_model
+from knowledge_base.origin import origin_of
 
 
 class _Tries(Frozen):
@@ -41,7 +42,7 @@ def parse_experience(text: str, source: str | None = None) -> Experience:
     Raises:
         InputError: the text is not experience; the message has the place and the nearest valid key.
     """
-    read = read_model(_Experience, load_document(text, source))
+    read = read_model(_Experience, load_document(text, origin_of(text, source)))
     return Experience.from_form({"tries": [one.model_dump() for one in read.experience], "seed": 0})
 
 

@@ -15,6 +15,7 @@ from dsc.model.states import DynamicState
 from dsc.model.transitions import case_value
 from dsc.text.yaml import Document, dump, load_document, path_of, read_file, read_model
 from knowledge_base.errors import InputError, Place, tolerated
+from knowledge_base.origin import origin_of
 
 
 def parse_plot(text: str, source: str | None = None) -> ActionPlot:
@@ -23,7 +24,7 @@ def parse_plot(text: str, source: str | None = None) -> ActionPlot:
     Raises:
         InputError: the text is not a plot; the message has the place and the nearest valid key.
     """
-    return plot_in(load_document(text, source))
+    return plot_in(load_document(text, origin_of(text, source)))
 
 
 def plot_in(document: Document) -> ActionPlot:
@@ -42,8 +43,11 @@ def load_plot(path: Path | str) -> ActionPlot:
 def file_of(plot: ActionPlot) -> Path | None:
     """Return the plot file from which a plot was read; `None` for a plot that a program contains or makes."""
     place = plot.place(("plot",))
-    source = None if place is None else place.source
-    return None if source is None or source.endswith(".py") else Path(source)
+    file = None if place is None or place.source is None else Path(place.source)
+    return None if file is None or file.suffix not in _SUFFIXES else file
+
+
+_SUFFIXES = frozenset({".yaml", ".yml", ".json", ".scxml", ".xml"})
 
 
 def load_library(folder: Path | str) -> Library:

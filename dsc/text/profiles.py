@@ -16,6 +16,7 @@ from dsc.model.reading import FormPath
 from dsc.model.states import Choice, DynamicState
 from dsc.text.yaml import dump, load_document, read_file, read_model
 from knowledge_base.errors import InputError, UnknownNameError
+from knowledge_base.origin import origin_of
 
 Settings = dict[str, dict[str, Setting]]
 BY_PLOT = ("plots", "choose", "devices")
@@ -57,7 +58,7 @@ def parse_profile(text: str, source: str | None = None) -> Profile:
     Raises:
         InputError: the text is not a profile; the message has the place and the nearest valid key.
     """
-    document = load_document(text, source)
+    document = load_document(text, origin_of(text, source))
     if isinstance(document.data, Mapping) and "plot" in document.data and "profile" not in document.data:
         raise InputError("this is a plot, not a profile", place=document.place(("plot",)))
     return read_model(Profile, document).written_at(document.places)

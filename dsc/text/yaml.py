@@ -38,7 +38,7 @@ from ruamel.yaml.scanner import Scanner, ScannerError
 from dsc.model.reading import FormPath, in_yaml, misread
 from knowledge_base.errors import InputError, ParseError, Place
 from knowledge_base.language.checking.inputs import require_text
-from knowledge_base.origin import Origin, origin_of
+from knowledge_base.origin import Origin
 from knowledge_base.pddl.files import read_text, require_size
 from knowledge_base.user_objects import shown
 
@@ -125,15 +125,15 @@ class Spans:
     values: dict[FormPath, Span] = field(default_factory=dict)
 
 
-def load_document(text: str, source: str | None = None, spans: Spans | None = None) -> Document:
-    """Return the one YAML document in a text; `source` is the file name in messages, and `spans` receives all spans.
+def load_document(text: str, source: str | Origin | None = None, spans: Spans | None = None) -> Document:
+    """Return the one YAML document in a text from the file `source`, or with that origin; `spans` receives all spans.
 
     Raises:
         ParseError: the text is not YAML, or uses a refused feature.
         InputError: the text is too large.
     """
     require_text(text, "the YAML text")
-    origin = origin_of(text, source)
+    origin = source if isinstance(source, Origin) else Origin(source)
     check_size(len(text), Place(origin.source))
     places: dict[FormPath, Place] = {(): Place(origin.source, origin.line)}
     reader = _Reader(text, origin, places, spans)

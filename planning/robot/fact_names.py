@@ -10,6 +10,7 @@ from pathlib import Path
 from dsc.errors import Finding
 from knowledge_base.errors import InputError, Place, SchemaError, UnknownNameError
 from knowledge_base.language.checking.check import check_arity
+from knowledge_base.origin import parse_program
 from knowledge_base.world.schema import Schema
 
 _OTHERS = frozenset({"dsc", "planning", "knowledge_base", "builtins", "abc", "typing"})
@@ -34,20 +35,13 @@ def wrong_facts(files: Iterable[Path], schema: Schema) -> Iterator[Finding]:
     """Yield a finding for each `fact(...)` with an undeclared name, or with another number of arguments."""
     for file in files:
         try:
-            tree = _tree(file.read_text("utf-8"))
+            tree = parse_program(file.read_text("utf-8"))
         except (OSError, SyntaxError, ValueError):  # another finding reports it
             continue
         for call in ast.walk(tree):
             if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "fact":
                 mistake = _mistake(call, schema, Place(str(file), call.lineno, call.col_offset + 1))
                 yield from () if mistake is None else (Finding(mistake, "fact"),)
-
-
-def _tree(text: str) -> ast.Module:
-    try:
-        return ast.parse(text)
-    except SystemError:  # finalizers that run during it confuse its counter (CPython issue 106905)
-        return ast.parse(text)
 
 
 def _mistake(call: ast.Call, schema: Schema, place: Place) -> InputError | None:

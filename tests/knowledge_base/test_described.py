@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import sys
+import sysconfig
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from knowledge_base.errors import MAX_MESSAGE, InputError
+from knowledge_base.language.syntax.text import parse_condition
+from knowledge_base.tracebacks import is_of_project, raised_at, user_place, whole_traceback
 from knowledge_base.user_objects import described, shown
 
 
@@ -141,3 +147,93 @@ def test_a_description_is_made_where_the_stack_ends():
 def test_any_value_is_shown(kind):
     assert isinstance(shown(HOSTILE[kind]), str)
     assert isinstance(shown(Text("odd")), str)
+
+
+class NoCauseError(Exception):
+    @property
+    def __cause__(self):  # type: ignore[override]
+        raise RuntimeError("no cause")
+
+    @property
+    def __traceback__(self):  # type: ignore[override]
+        raise RuntimeError("no traceback")
+
+
+class OddCauseError(Exception):
+    __cause__ = 5  # type: ignore[assignment]
+
+
+class NotesError(Exception):
+    @property
+    def __notes__(self):  # type: ignore[override]
+        return sys.exit("in the notes")
+
+
+class UnreadError(SyntaxError):
+    @property
+    def filename(self):  # type: ignore[override]
+        raise RuntimeError("no file")
+
+
+class EmptyGroup(ExceptionGroup):
+    @property
+    def exceptions(self):
+        return ()
+
+
+def throw(error):
+    raise error
+
+
+def caught(error):
+    try:
+        throw(error)
+    except BaseException as raised:  # noqa: BLE001
+        return raised
+
+
+def own_cause():
+    error = ValueError("its own cause")
+    error.__cause__ = error
+    return error
+
+
+def causes_of_each_other():
+    first, second = ValueError("first"), ValueError("second")
+    first.__cause__, second.__cause__ = second, first
+    return first
+
+
+REPORTED = {
+    **HOSTILE,
+    "no cause": NoCauseError("so"),
+    "odd cause": OddCauseError("so"),
+    "notes exit": NotesError("so"),
+    "no file": UnreadError("so"),
+    "empty group": EmptyGroup("so", [ValueError("first")]),
+    "its own cause": own_cause(),
+    "causes of each other": causes_of_each_other(),
+}
+
+
+@pytest.mark.parametrize("kind", REPORTED)
+def test_any_exception_has_its_line_and_a_traceback(kind):
+    error = caught(REPORTED[kind])
+    assert Path(__file__).name in raised_at(error)
+    place = user_place(error)
+    assert place is not None
+    assert place.source == __file__
+    assert whole_traceback(error)
+
+
+def test_an_error_of_this_project_is_told_from_one_of_an_installed_package():
+    def parse():
+        parse_condition("(and")
+
+    names: dict[str, Any] = {"parse": partial(parse_condition, "(and")}
+    installed = Path(sysconfig.get_path("purelib")) / "my_robot.py"
+    exec(compile("def configure():\n    parse()\n", str(installed), "exec"), names)  # noqa: S102
+    for call, ours in ((parse, False), (names["configure"], False)):
+        with pytest.raises(InputError) as raised:
+            call()
+        assert is_of_project(raised.value) is ours

@@ -125,7 +125,7 @@ def _section_inside(node: Node) -> tuple[Group, Group] | None:
 def _tokens(text: str, origin: Origin) -> Iterator[tuple[str, str, Place]]:
     at, line, line_start, source = 0, origin.line, 1 - origin.column, origin.source
     while at < len(text):
-        place = Place(source, line, at - line_start + 1)
+        place = Place(source, line, max(at - line_start + 1, 1))  # a program may add indentation to its text
         found = _TOKEN.match(text, at)
         if found is None:  # every other character starts a token
             raise ParseError("'\"' is never closed", place=place)

@@ -6,6 +6,7 @@ import logging
 import re
 import threading
 import time
+from typing import Never
 
 import pytest
 from dsc_runs import SCHEMA, Ran
@@ -372,3 +373,18 @@ def test_a_skill_that_blocks_again_is_reported_once_with_the_number_of_its_block
     assert re.fullmatch(
         r"skill 'arm\.grasp' in grasp \(.*\) has blocked the event loop 3 times, 0\.\d s in all", said[1]
     )
+
+
+def raise_itself() -> Never:
+    error = ValueError("no gripper")
+    raise error from error
+
+
+def test_an_error_that_is_its_own_cause_ends_the_run_with_its_line():
+    class Endless(Arm):
+        @skill
+        async def grasp(self, call) -> Grasped:
+            return raise_itself()
+
+    end = Ran(GRASP, arm=Endless()).end
+    assert re.fullmatch(rf"arm\.grasp: ValueError: no gripper \(.*{HERE}:\d+\)", str(end.programming_error))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 import re
+from dataclasses import dataclass
+from functools import partialmethod
 from pathlib import Path
 from typing import Annotated
 
@@ -284,6 +286,7 @@ def test_a_skill_that_can_never_work_is_refused_when_it_is_made_with_its_line(ma
 
 
 METHODS = [name for name in dir(Component) if not name.startswith("_") and inspect.isfunction(getattr(Component, name))]
+METHODS.remove("step")  # without a period, it is no hook
 
 
 def arm_with(name: str, place: str) -> Component:
@@ -320,3 +323,39 @@ def test_an_attribute_that_hides_one_of_every_component_is_refused(name, place):
 def test_a_component_whose_name_is_no_text_is_refused():
     with pytest.raises(InputError, match="`name` of Arm is text, not 3"):
         require_instances([arm_with("name", "object")])
+
+
+class Status(Component):
+    @property
+    def status(self):
+        raise ConnectionError("not connected")
+
+
+@dataclass
+class Kept(Component):
+    status: str = "ok"  # type: ignore[assignment]
+
+    def __post_init__(self):
+        super().__init__()
+
+
+@pytest.mark.parametrize("kind", [Status, Kept])
+def test_a_property_and_a_field_that_hide_a_method_are_refused_with_their_class(kind):
+    with pytest.raises(InputError, match=f"'status' of {kind.__name__} hides") as refused:
+        require_instances([kind()])
+    assert refused.value.place is not None
+    assert refused.value.place.line is not None
+
+
+class Counter(Component):
+    """Its `step` is no hook, as it has no `period`."""
+
+    def __init__(self):
+        super().__init__()
+        self.step = 0  # type: ignore[assignment, method-assign]
+
+    remember = partialmethod(Component.recall, None)
+
+
+def test_own_steps_and_other_callables_are_accepted():
+    assert require_instances([Counter()])
