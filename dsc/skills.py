@@ -221,6 +221,11 @@ def skill(
     if blocking not in _EXECUTIONS:
         message = f"a skill blocks in a thread or a process, not {shown(blocking)}"
         raise InputError(message, found=str(blocking), valid=("thread", "process"))
+    if after_crash not in get_args(AfterCrash):
+        message = f"after a crash a skill is {', '.join(get_args(AfterCrash))}, not {shown(after_crash)}"
+        raise InputError(message, found=str(after_crash), valid=get_args(AfterCrash))
+    if not isinstance(unlimited, bool):
+        raise InputError(f"`unlimited` is true or false, not {shown(unlimited)}")
     if within is not None:
         _require_limit(within, unlimited=unlimited)
 

@@ -127,9 +127,9 @@ class Library:
         return found
 
     def require_receiver(self, event: str) -> None:
-        """Raise `UnknownNameError` if no plot has a reaction to the event; SCXML plots match events by prefix."""
+        """Raise `UnknownNameError` unless a plot declares the event under `receives`; SCXML plots match by prefix."""
         if self._received is None:
-            self._received = frozenset[str]().union(*(plot.heard() for plot in self))
+            self._received = frozenset[str]().union(*(plot.receives for plot in self))
         if event not in self._received and all(plot.dialect == "dsc" for plot in self):
             valid = self._received - RESERVED
             raise UnknownNameError(f"no plot receives the event '{event}'", found=event, valid=valid)

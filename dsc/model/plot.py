@@ -186,12 +186,6 @@ class ActionPlot(Written):
                 for _, block in state.blocks():
                     yield from flat(block)
 
-    def heard(self) -> frozenset[str]:
-        """Return the names of the events that the plot declares under `receives`, or for which it has a reaction."""
-        ways = (event for _, state, _ in self.walk() if isinstance(state, State) for event in state.on)
-        rules, handlers = (rule.on for rule in self.rules if rule.on), (handler.on for handler in self.handlers)
-        return frozenset((*self.receives, *ways, *rules, *handlers))
-
     def scopes(self) -> Iterator[Scope]:
         """Yield the scopes: the plot, then each composite state and region. A transition must not leave its scope."""
         yield self

@@ -63,8 +63,7 @@ class OutsideInput(ABC):
             UnknownNameError: no plot receives the event.
             StoreError: the store cannot be written.
         """
-        if self._over:
-            raise InputError("the run has ended and receives nothing")
+        self._require_running()
         self._hand_in(message_checks.checked_event(event, self.library, self.knowledge), after)
 
     def change(self, delta: Delta, author: str, *, after: float = 0.0) -> None:
@@ -76,9 +75,10 @@ class OutsideInput(ABC):
             after: as for `post`.
 
         Raises:
-            InputError: the change contradicts the schema; the knowledge is unchanged.
+            InputError: the change contradicts the schema, or the run has ended; the knowledge is unchanged.
             StoreError: the store cannot be written.
         """
+        self._require_running()
         self._hand_in(message_checks.checked_change(delta, author, self.knowledge), after)
 
     def set_parameter(self, owner: str, name: str, value: object, *, after: float = 0.0) -> None:
@@ -95,9 +95,11 @@ class OutsideInput(ABC):
 
         Raises:
             UnknownNameError: there is no such component or plot, or it declares no such parameter.
-            InputError: the value is out of range or violates a relation, or operators may not set the parameter.
+            InputError: the value is out of range or violates a relation, operators may not set the parameter, or the
+                run has ended.
             StoreError: the store cannot be written.
         """
+        self._require_running()
         setting = message_checks.checked_setting(owner, name, value, self.dispatcher.components, self.library)
         self._hand_in(setting, after)
 
@@ -111,9 +113,10 @@ class OutsideInput(ABC):
 
         Raises:
             UnknownNameError: there is no such component or port.
-            InputError: the service does not fit.
+            InputError: the service does not fit, or the run has ended.
             StoreError: the store cannot be written.
         """
+        self._require_running()
         self._hand_in(message_checks.checked_wire(port, to, self.dispatcher.components), after)
 
     def install(self, plots: ActionPlot | Iterable[ActionPlot] = (), components: Iterable[Component] = ()) -> None:
@@ -198,10 +201,13 @@ class OutsideInput(ABC):
         if room is not None:
             room.require(added)
 
-    def _coming(self) -> Library:
-        """Return a copy of the plots after all changes that were handed in."""
+    def _require_running(self) -> None:
         if self._over:
             raise InputError("the run has ended and receives nothing")
+
+    def _coming(self) -> Library:
+        """Return a copy of the plots after all changes that were handed in."""
+        self._require_running()
         library = self.library.copy()
         for message in [*self._changes]:  # the run takes them in its own thread
             library.change(message.plots)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dsc.calls import SkillCall
 from dsc.components.component import Component
 from dsc.components.ports import query
+from dsc.errors import SkillError
 from dsc.skills import skill
 from knowledge_base.errors import InputError
 from planning.execution.goals import LATE, GoalQueue
@@ -34,6 +35,8 @@ class GoalSkills(Component):
         goals = self._goals()
         goals.recover()
         taken = await goals.next()
+        if taken is None:
+            raise SkillError("the robot is closed; it serves no further goal")
         return GoalTaken(goal=taken.goal, number=taken.id)
 
     @skill(after_crash="repeat", unlimited=True)

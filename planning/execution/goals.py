@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import math
+import threading
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 from sqlite3 import Connection
-from typing import Literal
+from typing import Literal, get_args
 
+from dsc.loop_calls import LoopCalls
 from knowledge_base.errors import InputError, UnknownNameError
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.store import KnowledgeBase
@@ -52,7 +54,7 @@ class QueuedGoal:
 class GoalQueue:
     """The goals of a robot; `Robot.serve` or the plot `serve_goals` serves them.
 
-    Methods belong to the thread of the loop that serves the goals.
+    Any thread may call `put`, `withdraw`, `get` and `list`. The other methods belong to the loop that serves the goals.
 
     Args:
         knowledge: the knowledge base, against whose schema goals are checked.
@@ -67,12 +69,16 @@ class GoalQueue:
         self._goals: dict[int, QueuedGoal] = {}
         self._cancel: dict[int, Callable[[str], object]] = {}
         self._arrival = asyncio.Event()
+        self._calls = LoopCalls()
+        self._numbering = threading.Lock()
+        self._closed = False
         self._ends: dict[int, asyncio.Event] = {}
         if kept:
             with self._file() as connection:
                 connection.execute(_TABLE)
                 rows = connection.execute("SELECT id, goal, priority, deadline, state, reason FROM goals").fetchall()
             self._goals = {row[0]: QueuedGoal(*row) for row in rows}
+        self._last = max(self._goals, default=0)
 
     def put(
         self, goal: str, *, priority: float = 0.0, deadline: float | None = None, replaces: int | None = None
@@ -86,19 +92,24 @@ class GoalQueue:
             replaces: the number of a goal that this goal replaces: it is withdrawn, also if it is running.
 
         Raises:
-            InputError: the goal is not a condition, contains an undeclared name, or a number is not finite.
+            InputError: the goal is not a condition, contains an undeclared name, or a number is not finite; or the
+                robot is closed.
             UnknownNameError: the queue has no goal with the number `replaces`.
             StoreError: the store cannot be written.
         """
+        if self._closed:
+            raise InputError("the robot is closed; it serves no further goal")
         check_goal(parse_condition(goal, "goal"), self._knowledge)
         for name, value in (("priority", priority), ("deadline", 0.0 if deadline is None else deadline)):
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
                 raise InputError(f"`{name}` is a number, not {shown(value)}")
         if replaces is not None:
             self.withdraw(replaces, "replaced by another goal")
-        queued = QueuedGoal(max(self._goals, default=0) + 1, goal, float(priority), deadline)
+        with self._numbering:
+            number = self._last = self._last + 1
+        queued = QueuedGoal(number, goal, float(priority), deadline)
         self._write(queued)
-        self._arrival.set()
+        self._calls.call(self._arrival.set)
         return queued.id
 
     def withdraw(self, number: int, reason: str = "withdrawn") -> None:
@@ -112,7 +123,7 @@ class GoalQueue:
         if queued.state in ("waiting", "running"):
             self._write(replace(queued, state="withdrawn", reason=reason))
             if (cancel := self._cancel.pop(number, None)) is not None:
-                cancel(reason)
+                self._calls.call(cancel, reason)
 
     def get(self, number: int) -> QueuedGoal:
         """Return the goal of that number; raise `UnknownNameError` if there is no such goal."""
@@ -121,13 +132,21 @@ class GoalQueue:
         return self._goals[number]
 
     def list(self, *states: GoalState) -> tuple[QueuedGoal, ...]:
-        """Return the goals in these states in the order of service, by default those that wait or run."""
+        """Return the goals in these states in the order of service, by default those that wait or run.
+
+        Raises:
+            UnknownNameError: there is no such state.
+        """
         wanted = states or ("waiting", "running")
-        found = (one for one in self._goals.values() if one.state in wanted)
+        unknown = next((state for state in wanted if state not in get_args(GoalState)), None)
+        if unknown is not None:
+            raise UnknownNameError(f"a goal is never '{unknown}'", found=str(unknown), valid=get_args(GoalState))
+        found = [one for one in [*self._goals.values()] if one.state in wanted]
         return tuple(sorted(found, key=lambda one: (one.state == "waiting", -one.priority, one.id)))
 
     async def end_of(self, number: int) -> QueuedGoal:
         """Wait until a goal has ended, and return it; raise `UnknownNameError` if there is no such goal."""
+        self._calls.bind()
         while self.get(number).state in ("waiting", "running"):
             await self._ends.setdefault(number, asyncio.Event()).wait()
         return self.get(number)
@@ -140,12 +159,21 @@ class GoalQueue:
             if left.id not in self._cancel:
                 self._write(replace(left, state="waiting"))
 
-    async def next(self) -> QueuedGoal:
-        """Return the next waiting goal before its deadline; wait for it if there is none."""
-        while (found := self.first()) is None:
-            self._arrival.clear()
+    async def next(self) -> QueuedGoal | None:
+        """Return the next waiting goal before its deadline; wait for one, or return `None` after `close`."""
+        self._calls.bind()
+        while not self._closed:
+            self._arrival.clear()  # before the look: another thread may put a goal at any time
+            found = self.first()
+            if found is not None:
+                return found
             await self._arrival.wait()
-        return found
+        return None
+
+    def close(self) -> None:
+        """Take no further goals; those that wait stay in the store."""
+        self._closed = True
+        self._calls.call(self._arrival.set)
 
     def first(self) -> QueuedGoal | None:
         """Return the next waiting goal, or `None`; end the goals whose deadline has passed."""
@@ -157,6 +185,8 @@ class GoalQueue:
 
     def begin(self, number: int, cancel: Callable[[str], object]) -> float | None:
         """Note that a goal is being served; return the seconds until its deadline. `cancel` ends its run."""
+        with suppress(RuntimeError):  # without a loop, nothing waits
+            self._calls.bind()
         queued = self.get(number)
         self._write(replace(queued, state="running"))
         self._cancel[number] = cancel
@@ -181,7 +211,7 @@ class GoalQueue:
                 connection.executemany("DELETE FROM goals WHERE id = ?", [(number,) for number in dropped])
         self._goals[queued.id] = queued
         if queued.state not in ("waiting", "running") and (end := self._ends.pop(queued.id, None)) is not None:
-            end.set()
+            self._calls.call(end.set)
         for number in dropped:
             self._goals.pop(number, None)
 

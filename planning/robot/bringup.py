@@ -14,7 +14,7 @@ from dsc.components.wiring import choose_sources
 from dsc.dynamic.knowledge_situation import ACHIEVE
 from dsc.dynamic.library import Library
 from dsc.profiles import configure
-from dsc.runs.archive import RunRow, archive, has_run, unfinished
+from dsc.runs.archive import RunRow, archive, has_run, is_unfinished, unfinished
 from dsc.sequencer.clock import ClockKind
 from dsc.text.profiles import Profile, adapted
 from dsc.trace import Listener
@@ -75,7 +75,8 @@ def deploy(
     """
     _require_simulated(bundle, seed=seed, faults=faults, scenario=scenario)
     if store is not None and has_run(store):
-        raise InputError(f"'{store}' has a run already; resume it by --resume, or take another file")
+        choices = "resume it by --resume, or take" if is_unfinished(store) else "the run has ended: take"
+        raise InputError(f"'{store}' has a run already; {choices} another file")
     setup = Setup(seed, faults, scenario, profile, store)
     kept: dict[str, Any] = {} if target is None else {"target": target}
     if profile is not None:

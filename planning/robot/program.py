@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, get_args
 from zlib import crc32
 
 from dsc.components.assembly import require_deployed, require_instances
@@ -33,6 +33,7 @@ from dsc.trace import Listener, Trace
 from knowledge_base.errors import InputError, SchemaError, StoreError
 from knowledge_base.journal.file import Durability, located
 from knowledge_base.store import KnowledgeBase
+from knowledge_base.user_objects import shown
 from knowledge_base.world.schema_compatibility import require_extension
 from planning.engines.planner import Planner
 from planning.engines.race import CachingPlanner, PlannerRace
@@ -130,6 +131,9 @@ class RobotProgram:
                 self.library.add(plot)
         self.library = with_plots_of(self.library, self.components)
         self.experience = experience or NO_EXPERIENCE
+        if clock not in (None, *get_args(ClockKind)):
+            message = f"the clock of a robot is real or simulated, not {shown(clock)}"
+            raise InputError(message, found=str(clock), valid=get_args(ClockKind))
         self.clock = clock
         self._own_planners: dict[bool, CachingPlanner] = {}
         self._planner = planner

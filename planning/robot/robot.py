@@ -20,13 +20,12 @@ from dsc.runs.archive import RunRow, is_unfinished
 from dsc.runs.kept import Kept
 from dsc.runs.store import RunStore
 from dsc.sequencer.clock import ClockKind, LoopClock, run_real, run_simulated
-from dsc.sequencer.run_end import SUSPENDED, RunEnd
+from dsc.sequencer.run_end import RunEnd
 from dsc.sequencer.sequencer import Sequencer
 from dsc.sequencer.signals import OnSignal
 from knowledge_base.errors import InputError, StoreError
 from knowledge_base.language.syntax.text import parse_condition
 from knowledge_base.user_objects import shown
-from planning.execution.goals import LATE, QueuedGoal
 from planning.execution.planning_component import PlanningComponent
 from planning.problem.construction import check_goal
 from planning.robot.judgement import Judgement
@@ -34,6 +33,7 @@ from planning.robot.observations import record_observations
 from planning.robot.program import RobotProgram
 from planning.robot.report import Report
 from planning.robot.run import Run, require_loop, require_no_loop
+from planning.robot.serving import serve_goals
 from planning.robot.simulation import SceneWriter, scene_of
 from planning.robot.tally import Tally
 from planning.robot.task import Task
@@ -249,45 +249,14 @@ class Robot(RobotProgram):
             seconds: real time for each search.
             replans: the maximum number of plans for a goal after the first plan.
             until_empty: whether to return when no goal waits. Otherwise the robot waits for goals until the caller
-                cancels this coroutine, or suspends the run of a goal.
+                cancels this coroutine, suspends the run of a goal, or closes the robot.
 
         Raises:
+            InputError: the robot is closed, or runs already with its store.
             StoreError: the store cannot be read or written, or has an unfinished run that serves no goal.
             ChangedError: as for `resume`.
         """
-        goals, left = self.goals, self.goals.list("running")
-        resumed = left and self.store is not None and is_unfinished(self.store)
-        if resumed and not await self._serve(left[0], self.resuming()):
-            return
-        goals.recover()
-        while (queued := goals.first() if until_empty else await goals.next()) is not None:
-            try:
-                run = self.start(
-                    queued.goal, seconds=seconds, replans=replans, open_ended=True, header={"goal": queued.id}
-                )
-            except InputError as error:
-                if isinstance(error, StoreError):
-                    raise
-                goals.end(queued.id, reached=False, reason=str(error))
-                continue
-            if not await self._serve(queued, run):
-                return
-
-    async def _serve(self, queued: QueuedGoal, run: Run) -> bool:
-        """Wait for the end of the run of a goal, and keep the end; return `False` for a suspended run."""
-        remaining = self.goals.begin(queued.id, run.cancel)
-        late = None
-        if remaining is not None:
-            late = asyncio.get_running_loop().call_later(remaining, run.cancel, LATE)
-        try:
-            end = await run
-        finally:
-            if late is not None:
-                late.cancel()
-        if end.problem == SUSPENDED:
-            return False
-        self.goals.end(queued.id, reached=end.reached, reason="reached" if end.reached else end.reason)
-        return True
+        await serve_goals(self, until_empty=until_empty, seconds=seconds, replans=replans)
 
     def discard(self, reason: str = "discarded") -> None:
         """End the unfinished run of the store, so that another run can start; its kept end has the reason.
@@ -467,7 +436,7 @@ class Robot(RobotProgram):
 
     async def aclose(self) -> None:
         """Suspend the runs in progress, or end them without a store; then close the robot, see `close`."""
-        self._closed = True
+        self._end_queue()
         for run in [*self._runs]:
             if self.store is None:
                 run.cancel("the robot is closed")
@@ -483,13 +452,18 @@ class Robot(RobotProgram):
         Later calls that start a run raise `InputError`. Runs in progress are cancelled, which suspends a run with a
         store; `async with` or `aclose` waits for them.
         """
-        self._closed = True
+        self._end_queue()
         if self._runs:
             for run in self._runs:
                 run.task.cancel()
                 run.task.add_done_callback(self._release_after)
         else:
             self.release()
+
+    def _end_queue(self) -> None:
+        self._closed = True
+        if "goals" in vars(self):
+            self.goals.close()
 
     def _release_after(self, _: object) -> None:
         if not self._runs:

@@ -12,16 +12,17 @@ from dsc.sequencer.phase_watch import PhaseWatch
 from knowledge_base import KnowledgeBase, Schema, computed
 
 TEXTS = {
-    "entry": "plot: p\nstates: {a: {on: {go: b, stop: c}}, b: {always: {to: c, when: (slow)}, on: {stop: c}}, c: {final: true}}",
+    "entry": "plot: p\nreceives: {go: , stop: }\nstates: {a: {on: {go: b, stop: c}}, b: {always: {to: c, when: (slow)}, on: {stop: c}}, c: {final: true}}",
     "choice": """
         plot: p
+        receives: {go: , stop: }
         states:
           a: {on: {go: b, stop: c}}
           b: {dynamic: [one], on: {done: c, no_candidate: d, stop: c}}
           d: {on: {stop: c}}
           c: {final: true}
     """,
-    "guard": "plot: p\nstates: {a: {on: {go: {to: b, when: (slow)}, stop: b}}, b: {final: true}}",
+    "guard": "plot: p\nreceives: {go: , stop: }\nstates: {a: {on: {go: {to: b, when: (slow)}, stop: b}}, b: {final: true}}",
 }
 PLACES = {
     "entry": "state 'b' of plot 'p'",

@@ -475,10 +475,21 @@ def test_a_run_waits_for_what_is_still_to_come_and_for_no_longer():
 
 
 def test_an_event_still_pending_when_a_run_ends_is_dropped():
-    ran = Ran(GRASP, prepare=lambda sequencer: sequencer.post(Event("slipped"), after=50))
+    listening = GRASP.replace("    emits:", "    receives: {late: }\n    emits:").replace(
+        "on: {grasped", "on: {late: e, grasped"
+    )
+    ran = Ran(listening, prepare=lambda sequencer: sequencer.post(Event("late"), after=50))
     assert ran.end.finished
     assert ran.at == pytest.approx(2)
     assert [event["name"] for event in ran.of_type("event")] == ["grasped"]
+
+
+def test_the_outcome_of_a_skill_is_no_event_from_outside():
+    def post(sequencer):
+        with pytest.raises(UnknownNameError, match="no plot receives the event 'slipped'"):
+            sequencer.post(Event("slipped"))
+
+    assert Ran(GRASP, prepare=post).end.finished
 
 
 def test_an_event_pending_at_the_end_of_a_run_does_not_come_in_the_next_run():

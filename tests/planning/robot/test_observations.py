@@ -46,7 +46,10 @@ states:
   warm: {entry: {trigger: oven.warm, with: {seconds: 10}}, on: {heated: over}}
   over: {final: true}
 """
-WATCH = "{plot: watch, states: {watch: {entry: {trigger: oven.guard}, on: {heated: over}}, over: {final: true}}}"
+WATCH = (
+    "{plot: watch, receives: {enough: }, states: {watch: {entry: {trigger: oven.guard},"
+    " on: {heated: over, enough: over}}, over: {final: true}}}"
+)
 PROFILE = "{monitor: m, sample: 2, components: {oven: {diagnose: {life: 5}, streams: {heat: 3}}}}"
 
 
@@ -93,7 +96,7 @@ def test_time_of_an_idle_open_ended_run_stands_still():
         run = robot.start("watch", open_ended=True)
         for _ in range(1_000):
             await asyncio.sleep(0)
-        run.post("heated", after=5.0)
+        run.post("enough", after=5.0)
         return await run
 
     with robot:
