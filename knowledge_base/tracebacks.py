@@ -112,4 +112,4 @@ PROJECT = tuple(str(_ROOT / package) + os.sep for package in ("knowledge_base", 
 """The folders of the packages of this project."""
 _PACKAGES = tuple({sysconfig.get_path(name) + os.sep for name in ("purelib", "platlib")})
 _STANDARD = sysconfig.get_path("stdlib") + os.sep
-_NOT_USERS = (*PROJECT, *_PACKAGES, _STANDARD, _FROZEN)
+_NOT_USERS = (*PROJECT, *_PACKAGES, _STANDARD, _FROZEN, "<string>")  # the last one is e.g. a dataclass's `__init__`

@@ -14,6 +14,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
+from dsc.components.assembly import require_instances
 from dsc.components.component import Component
 from dsc.components.hooks import contained
 from dsc.conversions import Conversion
@@ -113,6 +114,9 @@ class Bundle:
     def __post_init__(self) -> None:
         if isinstance(self.failures, str):
             raise InputError(f"failures are a set of outcomes, not the text '{self.failures}'")
+        if not callable(self.components):
+            said = "`components` is a function that returns a list, as in components=lambda: [Arm()]"
+            raise InputError(f"{said}, not {shown(self.components)[:60]}")
         if isinstance(self.remote, str):
             raise InputError(f"remote is a tuple of names: remote=('{self.remote}',)", found=self.remote)
         for plot in self.plots:
@@ -336,10 +340,17 @@ def components_of(bundles: Collection[Bundle]) -> list[Component]:
     """
     found: dict[str, tuple[Component, str]] = {}
     for bundle in bundles:
-        for component in bundle.components():
+        own: object = bundle.components()
+        if isinstance(own, Component | str) or not isinstance(own, Iterable):
+            raise InputError(f"`components` of the bundle '{bundle.name}' returns {shown(own)} instead of a list")
+        for component in own:
+            if not isinstance(component, Component):
+                require_instances([component])
             if component.name in found:
                 whose = found[component.name][1]
-                raise InputError(f"the bundles '{whose}' and '{bundle.name}' both have a component '{component.name}'")
+                both = f"the bundles '{whose}' and '{bundle.name}' both have a component"
+                said = both if whose != bundle.name else f"the bundle '{whose}' has two components named"
+                raise InputError(f"{said} '{component.name}'", found=component.name)
             found[component.name] = component, bundle.name
     return [component for component, _ in found.values()]
 

@@ -7,9 +7,10 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from dsc.components.assembly import require_deployed, require_instances, require_whole
+from dsc.components.assembly import require_deployed, require_instances
 from dsc.components.component import Component
 from dsc.components.hooks import contained
+from dsc.components.instance_checks import require_whole
 from dsc.components.interface import Interface
 from dsc.components.wiring import choose_sources, wiring_errors
 from dsc.dynamic.knowledge_situation import ACHIEVE, choose
@@ -334,7 +335,8 @@ class _Robot:
             return
         goals: list[tuple[Expression, Place | None]] = []
         if self._bundle.goal is not None:
-            goals.append((parse_condition(self._bundle.goal), None))
+            with suppress(InputError):  # `_check_task` reports it
+                goals.append((parse_condition(self._bundle.goal), None))
         for plot in self._plots:
             goals += [(state.goal, plot.place((*path, "goal"))) for _, state, path in plot.walk()
                       if isinstance(state, DynamicState) and state.goal is not None]  # fmt: skip

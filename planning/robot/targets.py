@@ -18,6 +18,7 @@ from typing import Any
 from dsc.components.assembly import made, module_error, named_part
 from dsc.components.hooks import contained
 from knowledge_base.errors import InputError, Place, UnknownNameError
+from knowledge_base.tracebacks import user_place
 from knowledge_base.user_objects import shown
 from planning.robot.bundles import GROUP, Bundle, installed
 
@@ -127,7 +128,7 @@ def _execute(file: Path) -> ModuleType:
     except InputError as error:
         if error.place is not None:
             raise
-        raise InputError(f"{file} cannot be executed: {error}") from error
+        raise InputError(f"{file} cannot be executed: {error}", place=user_place(error)) from error
     except Exception as error:  # a user's module may raise any error
         raise module_error(error, f"{file} cannot be executed") from error
 

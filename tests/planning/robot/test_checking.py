@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -477,3 +478,22 @@ def test_a_wrong_result_of_the_simulation_is_found_with_the_line_of_its_method(p
 def test_a_simulation_whose_rest_fails_at_the_beginning_is_no_mistake(project):
     planted(project, [("delivery.py", "return [Left(", "return [] if self.ended else [Left(", "")])
     assert check_project(str(project)) == []
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "said"),
+    [
+        ("simulation=House,", "components=[1],", "delivery.py:{line}: .*`components` is a function that returns a list"),
+        ("simulation=House,", "components=lambda: 1,", "`components` of the bundle 'delivery' returns 1 instead of a list"),
+        ("    @skill\n    async def put(", "    def stop(self): ...\n\n    @skill\n    async def put(",
+         "delivery.py:{line}: 'stop' of component 'gripper' is a coroutine: write `async def stop`"),
+        ("robot = Bundle", 'skill(after_crash="sens")\nrobot = Bundle', "delivery.py:{line}: .*did you mean 'sense'"),
+    ],
+)  # fmt: skip
+def test_mistakes_at_the_entrances_of_a_robot_have_their_line(project, right, wrong, said):
+    planted(project, [("delivery.py", right, wrong, "")])
+    lines = (project / "delivery.py").read_text().splitlines()
+    marks = ("def stop(self)", 'skill(after_crash="sens")', "robot = Bundle.in_folder(")
+    line = next(n for mark in marks for n, text in enumerate(lines, 1) if mark in text)
+    found = [str(one) for one in check_project(str(project))]
+    assert any(re.search(said.format(line=line), one) for one in found), found
