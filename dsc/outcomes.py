@@ -139,7 +139,7 @@ def _refuse(kind: type[Outcome], given: Mapping[str, Any]) -> None:
     """Raise an error for an attribute that is missing or not declared."""
     for name in given.keys() - kind.declared.keys():
         message = f"outcome {kind.__name__} has no attribute '{name}'"
-        raise UnknownNameError(message, found=name, valid=kind.declared)
+        raise UnknownNameError(message, found=name, valid=(*kind.declared, "observed"))
     missing = ", ".join(f"'{name}'" for name in kind.declared if name not in given)
     raise SchemaError(f"outcome {kind.__name__} needs its attribute {missing}")
 

@@ -242,6 +242,8 @@ class RobotProgram:
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Call `listener` with every later record of all runs; return a function that ends this."""
+        if not callable(listener):
+            raise InputError(f"a listener is a function of a record, not {shown(listener)}")
         self._listeners.append(listener)
         for run in self._runs:
             run.listen(listener)

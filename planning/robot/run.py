@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable, Coroutine, Generator, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Self
@@ -194,8 +195,14 @@ class Records:
 
 def require_loop(method: str, instead: str) -> None:
     """Raise `InputError` unless an event loop is running in this thread; `instead` needs none."""
-    if not _loop_is_running():
-        raise InputError(f"no event loop is running in this thread: call `robot.{instead}(...)` instead of `{method}`")
+    if _loop_is_running():
+        return
+    message = f"no event loop is running in this thread: call `robot.{instead}(...)` instead of `{method}`"
+    if threading.current_thread() is not threading.main_thread():
+        message += (
+            ", or if the robot has a loop in another thread, `robot.goals.put` or `asyncio.run_coroutine_threadsafe`"
+        )
+    raise InputError(message)
 
 
 def require_no_loop(method: str, instead: str) -> None:

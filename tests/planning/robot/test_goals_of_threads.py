@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from obedient_robot import ObedientRobot, plots
@@ -156,3 +157,16 @@ def test_a_misspelt_option_of_a_skill_is_refused(how, said):
         @skill(**how)
         async def carry(self, call: SkillCall) -> Done:
             return Done()
+
+
+def test_advice_for_a_thread_without_a_loop_names_the_queue():
+    with robot() as one, ThreadPoolExecutor(1) as pool:
+        with pytest.raises(InputError, match=r"`robot\.goals\.put` or `asyncio\.run_coroutine_threadsafe`"):
+            pool.submit(one.start, "(on a)").result()
+        with pytest.raises(InputError, match="a listener is a function of a record, not 5"):
+            one.listen(5)
+
+
+def test_a_misspelt_observation_has_the_nearest_name():
+    with pytest.raises(UnknownNameError, match="no attribute 'observd'; did you mean 'observed'"):
+        Done(observd=Delta())  # type: ignore[call-arg]
